@@ -1,0 +1,230 @@
+"""What IEEE 1394 fixes: rates, limits, packet sizes, gap counts and the constants of the equations.
+
+Every number is a `Sourced` float: it names its unit, its source and how well it is known. "Paper" is
+G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Control System Using the
+IEEE-1394 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
+"""
+
+from types import MappingProxyType
+from typing import Final, Literal
+
+from busplan.sourced import Sourced
+
+Speed = Literal["S100", "S200", "S400"]
+
+# --- rates -----------------------------------------------------------------------------------------------
+
+BASE_RATE_MBIT_S: Final = Sourced(
+    98.304,
+    unit="Mbit/s",
+    grade="published",
+    source="IEEE 1394-1995; the gap tables of Linux, Apple and JHU know no packet speed",
+    meaning="base rate: S100's data rate, and the clock that gaps and PHY delays are counted in",
+)
+DATA_RATE_MBIT_S: Final = MappingProxyType(
+    {
+        speed: Sourced(
+            multiple * BASE_RATE_MBIT_S,
+            unit="Mbit/s",
+            grade="published",
+            source="IEEE 1394a" if speed != "S400" else "IEEE 1394a; paper, section IV-A",
+            meaning=f"data rate of {speed}",
+        )
+        for speed, multiple in {"S100": 1, "S200": 2, "S400": 4}.items()
+    }
+)
+"""Data rate by speed code, in Mbit/s (which is bit/us)."""
+
+# --- limits ----------------------------------------------------------------------------------------------
+
+MAX_NODES: Final = Sourced(
+    62,
+    unit="nodes",
+    grade="published",
+    source="paper, section I: 63 nodes on one bus, the host is one of them",
+    meaning="largest number of distributed nodes on one bus",
+)
+MAX_HOPS: Final = Sourced(
+    16,
+    unit="hops",
+    grade="published",
+    source="paper, section I; IEEE project page",
+    meaning="largest number of cable hops between two nodes",
+)
+MAX_GAP_COUNT: Final = 63
+"""The gap count is a six-bit field of the PHY; 63 is also its value after power-up."""
+
+MAX_PAYLOAD_BYTES: Final = MappingProxyType(
+    {
+        speed: Sourced(
+            limit,
+            unit="bytes",
+            grade="published",
+            source="IEEE 1394a, as in the Sederta driver header",
+            meaning=f"largest payload of an asynchronous packet at {speed}",
+        )
+        for speed, limit in {"S100": 512, "S200": 1024, "S400": 2048}.items()
+    }
+)
+"""Largest asynchronous payload by speed code, in bytes."""
+
+# --- packets on the wire, CRCs included --------------------------------------------------------------------
+
+_PACKETS = "JHU mechatronics-firmware, FireWire.v; the header formats of IEEE 1394"
+
+
+def _packet(size: int, meaning: str) -> Sourced:
+    return Sourced(size, unit="bytes", grade="published", source=_PACKETS, meaning=meaning)
+
+
+QUADLET_BYTES: Final = 4
+"""A quadlet, the unit of every packet (paper, section I)."""
+QUADLET_READ_REQUEST_BYTES: Final = _packet(16, "quadlet read request")
+QUADLET_READ_RESPONSE_BYTES: Final = _packet(20, "quadlet read response")
+QUADLET_WRITE_REQUEST_BYTES: Final = _packet(20, "quadlet write request")
+BLOCK_READ_REQUEST_BYTES: Final = _packet(20, "block read request")
+BLOCK_READ_RESPONSE_OVERHEAD_BYTES: Final = _packet(24, "block read response without its payload")
+BLOCK_WRITE_REQUEST_OVERHEAD_BYTES: Final = _packet(24, "block write request without its payload")
+WRITE_RESPONSE_BYTES: Final = _packet(16, "write response")
+
+# --- constants of equations (4)-(6), (10) and (15) ---------------------------------------------------------
+
+REFERENCE_CABLE_M: Final = Sourced(
+    4.5,
+    unit="m",
+    grade="published",
+    source="paper, sections I and IV-A",
+    meaning="length of the standard cable that CABLE_DELAY_US holds for",
+)
+CABLE_DELAY_US: Final = Sourced(
+    0.023,
+    unit="us",
+    grade="published",
+    source="eqs (4)-(6); 4.5 m at 5.05 ns/m",
+    meaning="signal delay of one standard cable",
+)
+PHY_DELAY_TICKS: Final = Sourced(
+    14,
+    unit="gap clock ticks",
+    grade="published",
+    source="eqs (4)-(6); at the base rate 0.142 us, the 144 ns PHY delay of P1394a",
+    meaning="repeat delay of one PHY",
+)
+ARBITRATION_GAP_TICKS: Final = Sourced(
+    4,
+    unit="gap clock ticks per gap count",
+    grade="published",
+    source="eq (4)",
+    meaning="arbitration delay for each unit of the gap count",
+)
+ARBITRATION_HOLD_US: Final = Sourced(
+    1.63,
+    unit="us",
+    grade="recalled",
+    source="published in eq (4); that it is MAX_BUS_HOLD, 160 base-rate ticks, is the likeliest reading",
+    meaning="constant part of the arbitration phase",
+)
+DATA_END_US: Final = Sourced(
+    0.25,
+    unit="us",
+    grade="recalled",
+    source="published in eq (6); that it is DATA_END_TIME, 0.24-0.26 us, is the likeliest reading",
+    meaning="constant part of the acknowledge phase",
+)
+SUBACTION_GAP_TICKS: Final = Sourced(
+    29,
+    unit="gap clock ticks",
+    grade="derived",
+    source="eq (10) taken apart: 82 + 48 g = (29 + 16 g) + (53 + 32 g)",
+    meaning="constant part of the subaction gap",
+)
+SUBACTION_GAP_TICKS_PER_COUNT: Final = Sourced(
+    16,
+    unit="gap clock ticks per gap count",
+    grade="derived",
+    source="eq (10) taken apart",
+    meaning="growth of the subaction gap with the gap count",
+)
+RESET_GAP_TICKS: Final = Sourced(
+    53,
+    unit="gap clock ticks",
+    grade="derived",
+    source="eq (10) taken apart",
+    meaning="constant part of the arbitration reset gap",
+)
+RESET_GAP_TICKS_PER_COUNT: Final = Sourced(
+    32,
+    unit="gap clock ticks per gap count",
+    grade="derived",
+    source="eq (10) taken apart",
+    meaning="growth of the arbitration reset gap with the gap count",
+)
+BITS_PER_BYTE: Final = 8
+EQ15_CONSTANT_US: Final = Sourced(
+    3.11,
+    unit="us",
+    grade="published",
+    source="eq (15)",
+    meaning="eqs (4)-(6) at one hop, gap count 63 and S400, each rounded to two decimals and added",
+)
+
+# --- gap count ---------------------------------------------------------------------------------------------
+
+GAP_COUNT_BY_HOPS: Final = (
+    5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62,
+)  # fmt: skip
+"""Smallest safe gap count for 1, 2, ... 23 hops of 4.5 m (P1394a table C-2, 1394a table E-1, as Apple, JHU
+and, to 15 hops, Linux carry it)."""
+
+
+def safe_gap_count(hops: int) -> int:
+    """Smallest gap count that is safe for a bus of that many hops.
+
+    Parameters
+    ----------
+    hops
+        Largest number of cable hops between two nodes, 1 or more [1].
+
+    Returns
+    -------
+    int
+        Gap count of the published table; the power-up value 63 beyond its 23 hops.
+
+    Raises
+    ------
+    ValueError
+        `hops` is below 1.
+
+    References
+    ----------
+    IEEE 1394a table E-1; see `GAP_COUNT_BY_HOPS`.
+
+    Examples
+    --------
+    >>> safe_gap_count(1), safe_gap_count(16), safe_gap_count(40)
+    (5, 43, 63)
+    """
+    if hops < 1:
+        raise ValueError(f"hops must be 1 or more, got {hops}")
+    return GAP_COUNT_BY_HOPS[hops - 1] if hops <= len(GAP_COUNT_BY_HOPS) else MAX_GAP_COUNT
+
+
+def padded_bytes(payload_bytes: int) -> int:
+    """Payload filled up to whole quadlets, as it travels in a block packet [bytes].
+
+    Parameters
+    ----------
+    payload_bytes
+        Payload [bytes].
+
+    Returns
+    -------
+    int
+        The next multiple of 4 [bytes]; arrays of integers broadcast.
+
+    Examples
+    --------
+    >>> padded_bytes(12), padded_bytes(13)
+    (12, 16)
+    """
+    return -(-payload_bytes // QUADLET_BYTES) * QUADLET_BYTES
