@@ -1,0 +1,5 @@
+"""`python -m busplan`."""
+
+from busplan.cli import main
+
+main()

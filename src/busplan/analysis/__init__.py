@@ -1,0 +1,1 @@
+"""From a profile to frozen results; everything a command shows is computed here."""

@@ -1,0 +1,137 @@
+"""Latency of single transactions: a profile in, every phase under each timing model out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile, TableExecution
+from busplan.timing import (
+    TIMING_MODELS,
+    TRANSACTION_KINDS,
+    Phases,
+    TimingModelName,
+    TransactionKind,
+    transaction,
+)
+
+BOTH_MODELS: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)
+
+
+@dataclass(frozen=True, slots=True)
+class Transaction:
+    """One transaction of the farthest node, taken apart."""
+
+    timing_model: TimingModelName
+    transaction: TransactionKind
+    payload_bytes: int
+    nodes: int
+    hops: int
+    gap_count: int
+    phases: Phases
+
+
+@dataclass(frozen=True, slots=True)
+class LatencyResult:
+    """Answer of `latency`."""
+
+    profile: str
+    transactions: tuple[Transaction, ...]
+
+
+def latency(
+    profile: Profile,
+    *,
+    payloads_bytes: Sequence[int] | None = None,
+    timing_models: Sequence[TimingModelName] = BOTH_MODELS,
+) -> LatencyResult:
+    """Take the read and the write of a profile apart.
+
+    Parameters
+    ----------
+    profile
+        The network; the transaction is that of its farthest node.
+    payloads_bytes
+        Payloads of both read and write [bytes]; without them the profile's own.
+    timing_models
+        Which timing models, in this order.
+
+    Returns
+    -------
+    LatencyResult
+        One transaction for each payload, kind and model, in this nesting.
+
+    Raises
+    ------
+    BusplanError
+        The execution time of a payload is not known.
+
+    References
+    ----------
+    Paper, equations (3)-(10), (12)-(14).
+    """
+    own = {"read": profile.payload.read_bytes, "write": profile.payload.write_bytes}
+    wanted: list[tuple[TransactionKind, int]] = (
+        [(kind, own[kind]) for kind in TRANSACTION_KINDS]
+        if payloads_bytes is None
+        else [(kind, size) for size in payloads_bytes for kind in TRANSACTION_KINDS]
+    )
+    return LatencyResult(
+        profile.name,
+        tuple(
+            Transaction(
+                timing_model=model,
+                transaction=kind,
+                payload_bytes=size,
+                nodes=profile.bus.nodes,
+                hops=profile.bus.hops(profile.bus.nodes),
+                gap_count=profile.bus.gap_count_for(profile.bus.nodes),
+                phases=phases(profile, kind, model=model, payload_bytes=size),
+            )
+            for kind, size in wanted
+            for model in timing_models
+        ),
+    )
+
+
+def phases(
+    profile: Profile,
+    kind: TransactionKind,
+    *,
+    model: TimingModelName,
+    payload_bytes: int,
+    nodes: int | None = None,
+) -> Phases:
+    """Phases of one transaction of a profile's farthest node.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    kind
+        "read" or "write".
+    model
+        Timing model.
+    payload_bytes
+        Payload [bytes].
+    nodes
+        Nodes on the bus [1]; without it the profile's own number.
+
+    Raises
+    ------
+    BusplanError
+        The execution time of that payload is not known.
+    """
+    execution = profile.node.execution
+    if isinstance(execution, TableExecution) and not execution.covers(payload_bytes):
+        raise BusplanError(
+            f"payload {payload_bytes} bytes: outside the execution table of {profile.name}, "
+            f"{execution.range_bytes}; nothing is extrapolated"
+        )
+    return transaction(
+        kind,
+        model=TIMING_MODELS[model],
+        link=profile.bus.link(profile.bus.nodes if nodes is None else nodes),
+        payload_bytes=payload_bytes,
+        overhead_bytes=profile.payload.overhead_bytes,
+        execution_us=execution.execution_us(payload_bytes),
+    )

@@ -1,0 +1,61 @@
+"""The command line: parse, call, render, exit. One module a command; heavy imports stand inside the commands."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from busplan import __version__
+from busplan.cli import capacity, init, latency, paper, profiles
+from busplan.cli.output import CANNOT, say
+from busplan.errors import BusplanError
+
+app = typer.Typer(
+    name="busplan",
+    help="Does this motion network fit its period, and how many axes can it carry?",
+    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job. Start with: busplan capacity paper-4ms",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+app.command("latency")(latency.latency_command)
+app.command("capacity")(capacity.capacity_command)
+app.command("paper")(paper.paper_command)
+app.command("profiles")(profiles.profiles_command)
+app.command("init")(init.init_command)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from busplan.cli.output import emit_text
+
+        emit_text(f"busplan {__version__}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option("--version", help="Show the version and exit.", callback=_print_version, is_eager=True),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line and exit: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal without UTF-8 gets escapes instead of a failure.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        # Typer exits by itself: 0, 2 for usage, 130 for Ctrl-C, and what a command asks for.
+        app(prog_name="busplan")
+    except BusplanError as error:
+        say(str(error))
+        sys.exit(CANNOT)
+    except Exception as error:  # noqa: BLE001 - the last net: Python's own exit code 1 would read as a verdict
+        say(f"busplan itself failed ({type(error).__name__}: {error}); please report this")
+        sys.exit(CANNOT)

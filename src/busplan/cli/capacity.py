@@ -1,0 +1,67 @@
+"""`busplan capacity`."""
+
+from typing import Annotated
+
+import typer
+
+from busplan.cli.options import (
+    BUS_OPTIONS,
+    FormatOption,
+    GapCountOption,
+    NodesOption,
+    ProfileArgument,
+    TimingOption,
+    bus_changes,
+    parse_time_us,
+    timing_models,
+)
+from busplan.cli.output import emit, emit_text
+
+
+def capacity_command(
+    profile: ProfileArgument,
+    period: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--period",
+            metavar="TIME",
+            help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
+            "May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+    nodes: NodesOption = None,
+    gap_count: GapCountOption = None,
+    timing: TimingOption = "both",
+    format_: FormatOption = "table",
+) -> None:
+    """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
+
+    The verdict comes first: it is that of the profile's own timing_model, with the largest term and the cheapest
+    change. Times are in us. A report: it exits 0 whatever the verdict is.
+
+    Example: busplan capacity paper-4ms --period 4ms --period 500us
+    """
+    from busplan.analysis.capacity import capacity
+    from busplan.analysis.verdict import verdicts
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    result = capacity(
+        plan,
+        periods_us=[parse_time_us(text, option="--period") for text in period] if period else None,
+        timing_models=timing_models(timing),
+    )
+    if format_ == "table":
+        from busplan.report.table import capacity_table
+
+        emit(capacity_table(result, verdicts(result)))
+        return
+    from busplan.report import documents, text
+
+    emit_text(
+        text.to_json(documents.capacity_document(result, verdicts(result)))
+        if format_ == "json"
+        else text.to_csv(documents.capacity_rows(result))
+    )

@@ -1,0 +1,36 @@
+"""`busplan init`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from busplan.cli.options import complete_profile
+from busplan.cli.output import say, write_file
+
+
+def init_command(
+    name: Annotated[
+        str,
+        typer.Argument(help="Name of the new profile, or the path of its file."),
+    ] = "my-machine",
+    source: Annotated[
+        str,
+        typer.Option(
+            "--from",
+            metavar="SHIPPED",
+            help="Shipped profile to start from (see `busplan profiles`).",
+            autocompletion=complete_profile,
+        ),
+    ] = "paper-4ms",
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is already there.")] = False,
+) -> None:
+    """Write a commented starter profile into the working directory.
+
+    Example: busplan init press-line --from paper-1ms
+    """
+    from busplan.profile.starter import starter_text
+
+    path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    write_file(path, starter_text(source, name=path.stem).encode(), overwrite=force)
+    say(f"wrote {path}; next: busplan capacity {path}")

@@ -1,0 +1,65 @@
+"""`busplan latency`."""
+
+from typing import Annotated
+
+import typer
+
+from busplan.cli.options import (
+    BUS_OPTIONS,
+    FormatOption,
+    GapCountOption,
+    NodesOption,
+    ProfileArgument,
+    TimingOption,
+    bus_changes,
+    parse_sizes,
+    timing_models,
+)
+from busplan.cli.output import emit, emit_text
+
+
+def latency_command(
+    profile: ProfileArgument,
+    payload: Annotated[
+        str | None,
+        typer.Option(
+            "--payload",
+            metavar="BYTES[,BYTES...]",
+            help="Payloads of both read and write in bytes, instead of the profile's, as 4,16,32.",
+            show_default=False,
+        ),
+    ] = None,
+    nodes: NodesOption = None,
+    gap_count: GapCountOption = None,
+    timing: TimingOption = "both",
+    format_: FormatOption = "table",
+) -> None:
+    """Show every phase of one read and one write, under both timing models.
+
+    The transaction is that of the farthest node. Times are in us, sizes in bytes; each row names the paper's
+    equation it comes from. A report: it exits 0 whatever the figures are.
+
+    Example: busplan latency paper-two-node --payload 4,16,1024
+    """
+    from busplan.analysis.latency import latency
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    result = latency(
+        plan,
+        payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
+        timing_models=timing_models(timing),
+    )
+    if format_ == "table":
+        from busplan.report.table import latency_table
+
+        emit(latency_table(result, max_payload_bytes=plan.bus.max_payload_bytes))
+        return
+    from busplan.report import documents, text
+
+    emit_text(
+        text.to_json(documents.latency_document(result))
+        if format_ == "json"
+        else text.to_csv(documents.latency_rows(result))
+    )

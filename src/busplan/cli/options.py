@@ -1,0 +1,112 @@
+"""Arguments and options that several commands share, and how their values are read."""
+
+import re
+from decimal import Decimal
+from typing import Annotated, Final, Literal
+
+import typer
+
+from busplan.errors import BusplanError
+
+Timing = Literal["paper", "standard", "both"]
+Format = Literal["table", "json", "csv"]
+
+_TIME: Final = re.compile(r"(?P<value>\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+)\s*(?P<unit>us|ms|s)")
+_EXPONENT: Final = {"us": 0, "ms": 3, "s": 6}
+
+
+def complete_profile(incomplete: str) -> list[str]:
+    """Shipped names that begin as typed, for the shell's completion."""
+    from busplan.profile.shipped import shipped_names
+
+    return [name for name in shipped_names() if name.startswith(incomplete)]
+
+
+ProfileArgument = Annotated[
+    str,
+    typer.Argument(
+        help="A profile file, the name of a shipped profile (see `busplan profiles`), or - for standard input.",
+        autocompletion=complete_profile,
+        show_default=False,
+    ),
+]
+NodesOption = Annotated[
+    int | None,
+    typer.Option(
+        "--nodes",
+        metavar="N",
+        help="Distributed nodes, instead of the profile's bus.nodes.",
+        show_default=False,
+    ),
+]
+GapCountOption = Annotated[
+    str | None,
+    typer.Option(
+        "--gap-count",
+        metavar="0..63|optimal",
+        help="Gap count, instead of the profile's bus.gap_count.",
+        show_default=False,
+    ),
+]
+TimingOption = Annotated[
+    Timing,
+    typer.Option(
+        "--timing",
+        help="Timing model to report: the paper's equations as published, the standard's clock and packets, or both.",
+    ),
+]
+FormatOption = Annotated[Format, typer.Option("--format", help="Form of the document on standard output.")]
+
+
+def bus_changes(*, nodes: int | None, gap_count: str | None) -> dict[str, object]:
+    """Changes of a profile that --nodes and --gap-count ask for, by dotted key."""
+    changes: dict[str, object] = {}
+    if nodes is not None:
+        changes["bus.nodes"] = nodes
+    if gap_count is not None:
+        # What is no number goes on as text: the profile knows what is right, and says so.
+        changes["bus.gap_count"] = int(gap_count) if re.fullmatch(r"[+-]?\d{1,9}", gap_count) else gap_count
+    return changes
+
+
+BUS_OPTIONS: Final = {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"}
+"""What the profile's keys are called on the command line."""
+
+
+def parse_time_us(text: str, *, option: str) -> float:
+    """Read a time with its unit, as 4ms, 250us or 0.001s [us].
+
+    Raises
+    ------
+    BusplanError
+        No number, no unit, or not above zero.
+    """
+    match = _TIME.fullmatch(text.strip())
+    if match is None:
+        raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
+    # Decimal keeps 0.0003 s the float nearest to 300 us.
+    value_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+    if not 0 < value_us < float("inf"):
+        raise BusplanError(f"{option} {text}: must be greater than 0")
+    return value_us
+
+
+def parse_sizes(text: str, *, option: str) -> list[int]:
+    """Read sizes between commas, as 4,16,32 [bytes].
+
+    Raises
+    ------
+    BusplanError
+        Not whole numbers above zero.
+    """
+    sizes = []
+    for part in text.split(","):
+        if not re.fullmatch(r"\s*\d{1,6}\s*", part) or int(part) == 0:
+            raise BusplanError(f"{option} {text}: expected payloads in bytes between commas, as 4,16,32")
+        sizes.append(int(part))
+    return sizes
+
+
+def timing_models(timing: Timing) -> tuple[Literal["paper", "standard"], ...]:
+    """Timing models that --timing asks for."""
+    return ("paper", "standard") if timing == "both" else (timing,)

@@ -1,0 +1,31 @@
+"""`busplan profiles`."""
+
+from typing import Annotated, Literal
+
+import typer
+
+from busplan.cli.output import emit, emit_text
+
+
+def profiles_command(
+    format_: Annotated[
+        Literal["table", "json", "csv"],
+        typer.Option("--format", help="Form of the document on standard output."),
+    ] = "table",
+) -> None:
+    """List the shipped profiles: what every command takes by name.
+
+    Example: busplan profiles
+    """
+    from busplan.profile.shipped import load, shipped_names
+    from busplan.report import documents, text
+
+    rows = documents.profile_rows([load(name).profile for name in shipped_names()])
+    if format_ == "table":
+        from busplan.report.table import profiles_table
+
+        emit(profiles_table(rows))
+    elif format_ == "json":
+        emit_text(text.to_json(documents.document("profiles", profiles=rows)))
+    else:
+        emit_text(text.to_csv(rows))

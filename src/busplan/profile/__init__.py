@@ -1,0 +1,1 @@
+"""Profiles: their schema, their TOML text, and the place of every key."""

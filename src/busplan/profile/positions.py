@@ -1,0 +1,226 @@
+"""Where every key and value of a TOML text stands.
+
+The standard library's parser gives values without places. This scanner gives places without values, and trusts
+the parser: it reads only text that `tomllib` has accepted, so it needs to find the ends of things and no errors.
+It keeps its own stack, so that depth of nesting costs no recursion.
+"""
+
+import re
+import tomllib
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Final
+
+KeyPath = tuple[str | int, ...]
+"""Keys from the top, and indexes into arrays: ("node", "execution", "time_us", 0)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a key stands, and where its value does: offsets into the text, ends excluded.
+
+    An element of an array has no key; its key span is its value span. A table has no value text of its own when it
+    is spread over the file (`[a]`, `a.b = 1`); its value span is its key span.
+    """
+
+    key_start: int
+    key_end: int
+    value_start: int
+    value_end: int
+
+
+class Lines:
+    """From offsets in a text to line and column, both counted from 1, columns in characters."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._starts = [0, *(match.end() for match in re.finditer("\n", text))]
+
+    def line_and_column(self, offset: int) -> tuple[int, int]:
+        """Line and column of an offset; one past the end belongs to the last line that has text."""
+        if offset >= len(self._text):
+            offset = len(self._text.rstrip("\r\n"))
+        line = bisect_right(self._starts, offset)
+        return line, offset - self._starts[line - 1] + 1
+
+
+_SPACE: Final = re.compile(r"[ \t]*")
+_SPACE_AND_LINES: Final = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
+_KEY_PART: Final = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'""")
+# A multi-line string may end in one or two quotes of its own before the closing three.
+_STRING: Final = re.compile(
+    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\'''',
+    re.DOTALL,
+)
+_SCALAR: Final = re.compile(r"[^,\]}#\r\n]*")
+
+
+@dataclass(slots=True)
+class _Container:
+    """An array or inline table that the scanner is inside of."""
+
+    path: KeyPath
+    start: int
+    index: int = 0
+    is_array: bool = True
+
+
+class _Scanner:
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.at = 0
+        self.places: dict[KeyPath, Place] = {}
+        self.last_element: dict[KeyPath, int] = {}
+        """Index of the newest table of each array of tables."""
+
+    def skip(self, pattern: re.Pattern[str]) -> None:
+        match = pattern.match(self.text, self.at)
+        if match:
+            self.at = match.end()
+
+    def document(self) -> dict[KeyPath, Place]:
+        table: KeyPath = ()
+        self.skip(_SPACE_AND_LINES)
+        while self.at < len(self.text):
+            if self.text[self.at] == "[":
+                table = self.header()
+            else:
+                self.key_and_value(table)
+            self.skip(_SPACE_AND_LINES)
+        return self.places
+
+    def header(self) -> KeyPath:
+        """Read [a.b] or [[a.b]] and give the path its keys belong to."""
+        is_array = self.text.startswith("[[", self.at)
+        self.at += 2 if is_array else 1
+        path: KeyPath = ()
+        parts = self.dotted_key()
+        for number, (part, start, end) in enumerate(parts, start=1):
+            path = (*path, part)
+            self.places.setdefault(path, Place(start, end, start, end))
+            if is_array and number == len(parts):
+                index = self.last_element[path] = self.last_element.get(path, -1) + 1
+                self.places[*path, index] = Place(start, end, start, end)
+            if path in self.last_element:
+                path = (*path, self.last_element[path])
+        self.skip(_SPACE)
+        self.at += 2 if is_array else 1
+        if not is_array:
+            # A table's own header says more than the [a.b] that first implied it.
+            _, start, end = parts[-1]
+            self.places[path] = Place(start, end, start, end)
+        return path
+
+    def dotted_key(self) -> list[tuple[str, int, int]]:
+        """Read a, "b" or a.b.c: each part with its span."""
+        parts = []
+        while True:
+            self.skip(_SPACE)
+            match = _KEY_PART.match(self.text, self.at)
+            if match is None:  # only for text that tomllib has not accepted
+                raise ValueError(f"no key at offset {self.at}")
+            parts.append((_key_value(match.group()), match.start(), match.end()))
+            self.at = match.end()
+            self.skip(_SPACE)
+            if not self.text.startswith(".", self.at):
+                return parts
+            self.at += 1
+
+    def key(self, table: KeyPath) -> KeyPath:
+        """Read a key and its equals sign; its value's end is not known yet."""
+        path = table
+        for part, start, end in self.dotted_key():
+            path = (*path, part)
+            self.places.setdefault(path, Place(start, end, start, end))
+        self.at += 1
+        self.skip(_SPACE)
+        return path
+
+    def close(self, path: KeyPath, start: int) -> None:
+        """Set the value span of a key that has one; an element of an array is its own key."""
+        known = self.places.get(path)
+        if known is None:
+            self.places[path] = Place(start, self.at, start, self.at)
+        else:
+            self.places[path] = Place(known.key_start, known.key_end, start, self.at)
+
+    def key_and_value(self, table: KeyPath) -> None:
+        """Read one key = value, with everything inside the value."""
+        open_containers: list[_Container] = []
+        path = self.key(table)
+        while True:
+            # One value stands at `at`: open it if it is a container, otherwise step over it.
+            start = self.at
+            if self.text[start] in "[{":
+                self.at += 1
+                open_containers.append(_Container(path, start, is_array=self.text[start] == "["))
+            else:
+                self.step_over_scalar()
+                self.close(path, start)
+            following = self.next_in(open_containers)
+            if following is None:
+                return
+            path = following
+
+    def step_over_scalar(self) -> None:
+        match = _STRING.match(self.text, self.at)
+        if match:
+            self.at = match.end()
+            return
+        match = _SCALAR.match(self.text, self.at)
+        self.at += len(match.group().rstrip()) if match else 0
+
+    def next_in(self, open_containers: list[_Container]) -> KeyPath | None:
+        """Close what ends here; the path of the next value, or None after the last."""
+        while open_containers:
+            container = open_containers[-1]
+            self.skip(_SPACE_AND_LINES)
+            if self.text[self.at] == ",":
+                self.at += 1
+                self.skip(_SPACE_AND_LINES)
+            if self.text[self.at] in "]}":
+                self.at += 1
+                self.close(container.path, container.start)
+                open_containers.pop()
+                continue
+            if container.is_array:
+                container.index += 1
+                return (*container.path, container.index - 1)
+            return self.key(container.path)
+        return None
+
+
+def _key_value(written: str) -> str:
+    """The key behind its quotes and escapes, as the standard library reads it."""
+    if written[0] in "\"'":
+        return next(iter(tomllib.loads(f"{written} = 0")))
+    return written
+
+
+def scan(text: str) -> dict[KeyPath, Place]:
+    r"""Find the place of every key and array element.
+
+    Parameters
+    ----------
+    text
+        TOML that `tomllib.loads` has accepted.
+
+    Returns
+    -------
+    dict
+        Key paths in the order they first stand, with their places as offsets into `text`.
+
+    References
+    ----------
+    TOML 1.0.0.
+
+    Examples
+    --------
+    >>> text = "[bus]\nnodes = 2  # two\n"
+    >>> place = scan(text)["bus", "nodes"]
+    >>> text[place.key_start : place.key_end], text[place.value_start : place.value_end]
+    ('nodes', '2')
+    >>> Lines(text).line_and_column(place.key_start)
+    (2, 1)
+    """
+    return _Scanner(text).document()

@@ -1,0 +1,143 @@
+"""From pydantic's validation errors to findings in the profile's own words."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, Final
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from busplan.profile.model import LinearExecution, Profile, TableExecution
+from busplan.profile.positions import KeyPath
+
+_EXECUTION: Final[KeyPath] = ("node", "execution")
+"""The one union of tables: in pydantic's locations its tag follows this path."""
+
+_WRONG_TYPE: Final = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "string_type": "a text in quotes",
+    "tuple_type": "an array",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "dict_attributes_type": "a table",
+}
+
+_OUT_OF_RANGE: Final = {
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be {ge:g} or more",
+    "less_than_equal": "must be {le:g} or less",
+    "finite_number": "must be finite",
+    "string_too_short": "must not be empty",
+    "too_short": "must not be empty",
+    "string_too_long": "must be no longer than {max_length} characters",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One problem: where in the data, and what."""
+
+    path: KeyPath
+    message: str
+    shows_value: bool = True
+    """Whether the value as written belongs into the message."""
+
+    @property
+    def key(self) -> str:
+        """The path as a dotted key, indexes in brackets: node.execution.time_us[0]."""
+        return "".join(
+            f"[{part}]" if isinstance(part, int) else f"{'.' if index else ''}{_quoted(part)}"
+            for index, part in enumerate(self.path)
+        )
+
+
+def _quoted(part: str) -> str:
+    bare = part.isascii() and part.replace("-", "").replace("_", "").isalnum()
+    return part if bare else f'"{part.encode("unicode_escape").decode()}"'
+
+
+def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:
+    """Translate a validation error.
+
+    Parameters
+    ----------
+    error
+        What pydantic raised for `data`.
+    data
+        The data that was checked.
+
+    Yields
+    ------
+    Finding
+        One for each problem, in pydantic's order.
+    """
+    for details in error.errors(include_url=False):
+        path = _path(details)
+        if details["type"] == "busplan":
+            for problem in details["ctx"]["problems"]:
+                yield Finding(_parsed(problem.key) if problem.key else path, problem.message)
+        elif details["type"] == "missing":
+            yield Finding(path, _missing(path, data), shows_value=False)
+        elif details["type"] == "extra_forbidden":
+            yield Finding(path, _unknown(path, data), shows_value=False)
+        elif details["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            yield Finding((*path, "kind"), 'expected kind = "table" or kind = "linear"')
+        else:
+            yield Finding(path, _expected(details))
+
+
+def _path(details: ErrorDetails) -> KeyPath:
+    location = details["loc"]
+    size = len(_EXECUTION)
+    if location[:size] == _EXECUTION and len(location) > size:
+        return (*_EXECUTION, *location[size + 1 :])
+    return location
+
+
+def _parsed(key: str) -> KeyPath:
+    return tuple(int(part) if part.isdigit() else part for part in key.split("."))
+
+
+def _expected(details: ErrorDetails) -> str:
+    """Say what would be right for an error of one value."""
+    kind, context = details["type"], details.get("ctx", {})
+    if kind in _WRONG_TYPE:
+        return f"expected {_WRONG_TYPE[kind]}"
+    if kind == "literal_error":
+        return f"expected {context['expected']}".replace("'", '"')
+    if kind in _OUT_OF_RANGE:
+        return _OUT_OF_RANGE[kind].format(**context)
+    return details["msg"]
+
+
+def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
+    """The model of the table that holds `path`."""
+    if path[:-1] == _EXECUTION:
+        kind = data["node"]["execution"]["kind"]
+        return TableExecution if kind == "table" else LinearExecution
+    section: type[BaseModel] = Profile
+    for part in path[:-1]:
+        annotation = section.model_fields[str(part)].annotation
+        if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+            raise TypeError(f"{part} is no section")  # only if a section of a new kind joins the profile
+        section = annotation
+    return section
+
+
+def _missing(path: KeyPath, data: dict[str, Any]) -> str:
+    field = _section(path, data).model_fields[str(path[-1])]
+    if not field.examples:
+        return f"missing section [{'.'.join(map(str, path))}]. {field.description}"
+    example = str(field.examples[0]) if not isinstance(field.examples[0], str) else f'"{field.examples[0]}"'
+    return f"missing key. {field.description}; for example {path[-1]} = {example}"
+
+
+def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
+    known = list(_section(path, data).model_fields)
+    close = get_close_matches(str(path[-1]), known, n=1)
+    if close:
+        return f"unknown key; did you mean {close[0]}?"
+    return f"unknown key; known here: {', '.join(known)}"

@@ -1,0 +1,70 @@
+"""The profiles that come with busplan."""
+
+from pathlib import Path
+
+from busplan.errors import BusplanError
+from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
+
+
+def shipped_folder() -> Path:
+    """Folder of the shipped profiles: inside the installed package, or `profiles/` of a source checkout."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "_shipped"
+    return installed if installed.is_dir() else package.parents[1] / "profiles"
+
+
+def shipped_names() -> list[str]:
+    """Names of the shipped profiles, sorted."""
+    return sorted(path.stem for path in shipped_folder().glob("*.toml"))
+
+
+def locate(argument: str) -> tuple[Path, str]:
+    """Find the file that a command's PROFILE argument means.
+
+    A shipped name means the shipped profile, whatever lies in the working directory, so that the answer does not
+    depend on where it is asked. A path is everything else: ./paper-4ms, paper-4ms.toml, or "-" for standard input.
+
+    Returns
+    -------
+    tuple
+        Path, and what to call it in messages.
+
+    Raises
+    ------
+    BusplanError
+        Neither a shipped name nor an existing file.
+    """
+    if argument == "-":
+        return Path("-"), "<stdin>"
+    names = shipped_names()
+    if argument in names:
+        path = shipped_folder() / f"{argument}.toml"
+        return path, path.name
+    path = Path(argument)
+    try:
+        exists = path.exists()
+    except (OSError, ValueError):  # a name too long, a NUL in it: reading will say so
+        exists = True
+    if not exists:
+        raise BusplanError(
+            f"{argument}: no such file, and no shipped profile of that name; shipped are {', '.join(names)}"
+        )
+    return path, argument
+
+
+def load(argument: str) -> LoadedProfile:
+    """Read and check the profile that a command's PROFILE argument means.
+
+    Parameters
+    ----------
+    argument
+        Shipped name, path, or "-" for standard input.
+
+    Raises
+    ------
+    BusplanError
+        Not there, not readable, no TOML or no profile; every problem with its place.
+    """
+    path, name = locate(argument)
+    document = decode(read_bytes(path, name=name), name=name)
+    return LoadedProfile(validate(document), document)

@@ -1,0 +1,34 @@
+"""A new profile from a shipped one, comments and layout kept."""
+
+from busplan.errors import BusplanError
+from busplan.profile.shipped import locate, shipped_names
+from busplan.profile.toml import decode, read_bytes, validate
+
+
+def starter_text(source: str, *, name: str) -> str:
+    """Text of a shipped profile under a new name.
+
+    Parameters
+    ----------
+    source
+        Name of the shipped profile.
+    name
+        Name of the new one.
+
+    Raises
+    ------
+    BusplanError
+        No such shipped profile, or a name that a profile cannot have.
+    """
+    if source not in shipped_names():
+        raise BusplanError(f"--from {source}: no shipped profile; shipped are {', '.join(shipped_names())}")
+    path, _ = locate(source)
+    document = decode(read_bytes(path, name=source), name=source)
+    place = document.places["name",]
+    quoted = '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    text = document.text[: place.value_start] + quoted + document.text[place.value_end :]
+    try:
+        validate(decode(text.encode(), name=source))
+    except (BusplanError, UnicodeEncodeError):  # the latter: a file name that is no UTF-8
+        raise BusplanError(f"{name!r}: no name for a profile; expected 1 to 100 printable characters") from None
+    return text

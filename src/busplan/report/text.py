@@ -1,0 +1,44 @@
+"""Plain data as JSON and CSV text."""
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def to_json(document: Mapping[str, Any]) -> str:
+    """Write one JSON document, indented, with a line end.
+
+    Raises
+    ------
+    ValueError
+        A number is not finite: such a document must not leave the program.
+    """
+    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Write rows of the same keys as CSV with a header; a list becomes words with spaces between.
+
+    Raises
+    ------
+    ValueError
+        A row has a key that the first has not.
+    """
+    if not rows:
+        return ""
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, fieldnames=list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({key: _cell(value) for key, value in row.items()})
+    return buffer.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return " ".join(map(str, value))
+    return value

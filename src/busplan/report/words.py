@@ -1,0 +1,141 @@
+"""Verdicts in words that a person can act on."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from busplan.analysis.advice import Change
+from busplan.analysis.capacity import CapacityFigures, Limit
+from busplan.analysis.verdict import Verdict
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M
+from busplan.profile.model import Profile
+
+Tone = Literal["good", "bad", "warning", "plain"]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One sentence and how it is meant."""
+
+    text: str
+    tone: Tone = "plain"
+
+
+def us(value: float) -> str:
+    """Write a time as reports do: three decimals, unless it is too small for them."""
+    return f"{value:.3f}" if abs(value) >= 0.001 or value == 0 else f"{value:.3g}"  # noqa: PLR2004
+
+
+def period(value_us: float) -> str:
+    """Write a period as people say it.
+
+    Examples
+    --------
+    >>> period(4000.0), period(250.0), period(1234.5)
+    ('4 ms', '250 us', '1.2345 ms')
+    """
+    return f"{value_us / 1000:g} ms" if value_us >= 1000 else f"{value_us:g} us"  # noqa: PLR2004
+
+
+def verdict_lines(verdict: Verdict, profile: Profile) -> Iterator[Line]:
+    """Say what the verdict is, what the bus carries, what to change, and what to beware of."""
+    yield _headline(verdict, profile)
+    if not verdict.models_agree:
+        yield Line(f"The {verdict.deciding.timing_model} model decides.")
+    figures = verdict.deciding
+    yield Line(f"Largest term: {figures.binding_term}, {us(binding_us(figures))} us of {us(figures.required_us)} us.")
+    yield Line(
+        f"The bus carries {_nodes(figures.max_nodes, figures.max_axes)} at this period, "
+        f"limited by {figures.limited_by}."
+    )
+    yield _advice(verdict)
+    yield from _warnings(figures, profile)
+
+
+def binding_us(figures: CapacityFigures) -> float:
+    """Size of the largest term [us]."""
+    key = figures.binding_term
+    own_key = f"{key}_us" if key in ("sync", "nonperiodic") else f"cycle_{key}_us"
+    return float(getattr(figures, own_key))
+
+
+def _headline(verdict: Verdict, profile: Profile) -> Line:
+    subject = f"{profile.name} at {period(verdict.period_us)}"
+    figures = verdict.deciding
+    if not verdict.models_agree:
+        stories = "; ".join(f"{one.timing_model}: {_story(one, profile)}" for one in (figures, *verdict.others))
+        return Line(f"{subject}: THE MODELS DISAGREE. {stories}.", "bad")
+    others = "".join(f"; {other.timing_model} agrees" for other in verdict.others)
+    return Line(
+        f"{subject}: {_story(figures, profile)} ({figures.timing_model} model{others}).",
+        "good" if figures.fits else "bad",
+    )
+
+
+def _story(figures: CapacityFigures, profile: Profile) -> str:
+    if figures.fits:
+        return (
+            f"fits, {us(figures.margin_us)} us to spare, "
+            f"{figures.utilisation:.1%} of {us(figures.available_us)} us used"
+        )
+    reasons = ", and ".join(_reason(limit, figures, profile) for limit in figures.exceeded)
+    return f"does not fit, {reasons}"
+
+
+def _reason(limit: Limit, figures: CapacityFigures, profile: Profile) -> str:
+    match limit:
+        case "time":
+            needed = f"{us(figures.required_us)} us needed of {us(figures.available_us)} us"
+            return f"{us(-figures.margin_us)} us short, {needed}"
+        case "payload":
+            payload = max(profile.payload.read_bytes, profile.payload.write_bytes)
+            limit_bytes = profile.bus.max_payload_bytes
+            return f"a payload of {payload} bytes is over the {limit_bytes} bytes of {profile.bus.speed}"
+        case "nodes":
+            return f"{figures.nodes} nodes are over the {MAX_NODES:g} of one bus"
+        case "hops":
+            return f"{figures.hops} hops are over the {MAX_HOPS:g} of one bus"
+
+
+def _nodes(nodes: int, axes: int) -> str:
+    return f"{nodes} node{'' if nodes == 1 else 's'} ({axes} axes)"
+
+
+def _advice(verdict: Verdict) -> Line:
+    change, figures = verdict.change, verdict.deciding
+    if change is not None:
+        return Line(f"{_purpose(change, figures)}: {_settings(change)}, which gives {_outcome(change)}.")
+    if figures.fits:
+        return Line(f"No setting of the cycle carries more nodes: the standard's {figures.limited_by} end here.")
+    return Line("No single kind of change makes it fit.", "bad")
+
+
+def _purpose(change: Change, figures: CapacityFigures) -> str:
+    if not figures.fits:
+        return "Cheapest way to make it fit"
+    more = change.figures.max_nodes - figures.max_nodes
+    return f"Cheapest way to {more} more node{'' if more == 1 else 's'}"
+
+
+def _settings(change: Change) -> str:
+    return ", ".join(f"{key} = {value}" for key, value in change.changes.items())
+
+
+def _outcome(change: Change) -> str:
+    after = change.figures
+    return f"{us(after.margin_us)} us to spare and {_nodes(after.max_nodes, after.max_axes)} at most"
+
+
+def _warnings(figures: CapacityFigures, profile: Profile) -> Iterator[Line]:
+    if figures.gap_count < figures.safe_gap_count:
+        yield Line(
+            f"Warning: gap count {figures.gap_count} is unsafe for {figures.hops} hops; "
+            f"the smallest safe one is {figures.safe_gap_count}.",
+            "warning",
+        )
+    if profile.bus.cable_length_m > REFERENCE_CABLE_M:
+        yield Line(
+            f"Warning: cables of {profile.bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m "
+            "that the gap-count table holds for.",
+            "warning",
+        )
