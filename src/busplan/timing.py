@@ -7,9 +7,8 @@ Operators only, as in `equations`: floats in, floats out; arrays in, arrays out.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from busplan import equations
 from busplan.ieee1394 import (
@@ -30,16 +29,14 @@ TransactionKind = Literal["read", "write"]
 TRANSACTION_KINDS: Final[tuple[TransactionKind, ...]] = ("read", "write")
 
 
-@dataclass(frozen=True, slots=True)
-class PacketSizes:
+class PacketSizes(NamedTuple):
     """Bytes on the wire of a transaction's two packets [bytes]."""
 
     request_bytes: float
     response_bytes: float
 
 
-@dataclass(frozen=True, slots=True)
-class TimingModel:
+class TimingModel(NamedTuple):
     """One reading of the equations.
 
     Parameters
@@ -57,8 +54,7 @@ class TimingModel:
     packets: Callable[[TransactionKind, int, int], PacketSizes]
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(NamedTuple):
     """The way of a packet between host and node.
 
     Parameters
@@ -79,8 +75,7 @@ class Link:
     cable_length_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class Phases:
+class Phases(NamedTuple):
     """Every phase of one transaction, all times in us; the number of the equation behind each."""
 
     request_bytes: float

@@ -6,8 +6,8 @@ advised has been seen to work.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import ceil
+from typing import NamedTuple
 
 from busplan.analysis.capacity import CapacityFigures, broken_limits, cycle, figures
 from busplan.errors import BusplanError
@@ -20,8 +20,7 @@ _RATIO_STEPS = 10_000
 """A slice ratio is advised in steps of 0.0001, a period in steps of 1 us, always rounded to the safe side."""
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(NamedTuple):
     """A change of a profile, and what it brings."""
 
     changes: dict[str, int | float]

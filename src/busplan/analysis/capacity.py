@@ -1,10 +1,9 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import chain
 from math import floor, sqrt
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from busplan import equations
 from busplan.analysis.latency import BOTH_MODELS, phases
@@ -21,8 +20,7 @@ FIT_ROUNDING: Final = 1e-12
 billionth of a crystal's tolerance and buys no time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cycle:
+class Cycle(NamedTuple):
     """One communication cycle with a given number of nodes."""
 
     nodes: int
@@ -62,8 +60,7 @@ class Cycle:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class CapacityFigures:
+class CapacityFigures(NamedTuple):
     """Capacity at one period under one timing model; the number of the equation behind each figure."""
 
     timing_model: TimingModelName
@@ -118,8 +115,7 @@ class CapacityFigures:
     fits: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Capacity:
+class Capacity(NamedTuple):
     """Answer of `capacity`: the profile as it was analysed, and the figures of each period, a set a model."""
 
     profile: Profile

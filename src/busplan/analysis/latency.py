@@ -1,7 +1,7 @@
 """Latency of single transactions: a profile in, every phase under each timing model out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile, TableExecution
@@ -17,8 +17,7 @@ from busplan.timing import (
 BOTH_MODELS: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)
 
 
-@dataclass(frozen=True, slots=True)
-class Transaction:
+class Transaction(NamedTuple):
     """One transaction of the farthest node, taken apart."""
 
     timing_model: TimingModelName
@@ -30,8 +29,7 @@ class Transaction:
     phases: Phases
 
 
-@dataclass(frozen=True, slots=True)
-class LatencyResult:
+class LatencyResult(NamedTuple):
     """Answer of `latency`."""
 
     profile: str

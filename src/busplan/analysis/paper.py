@@ -2,10 +2,9 @@
 
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan import equations
 from busplan.analysis.latency import BOTH_MODELS, phases
@@ -27,8 +26,7 @@ BENCH_PROFILE: Final = "paper-two-node"
 _DATA: Final = Path(__file__).resolve().parents[1] / "data" / "paper.toml"
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(NamedTuple):
     """One published figure and one way to compute it."""
 
     section: str
@@ -51,8 +49,7 @@ class Comparison:
         return None if self.published is None else (self.computed - self.published) / self.published
 
 
-@dataclass(frozen=True, slots=True)
-class PaperSection:
+class PaperSection(NamedTuple):
     """One table or passage of the paper."""
 
     title: str

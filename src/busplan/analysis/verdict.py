@@ -1,14 +1,13 @@
 """The verdict on one period: what decides, what the other model says, and what to do."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from busplan.analysis.advice import Change, cheapest_change
 from busplan.analysis.capacity import Capacity, CapacityFigures
 from busplan.profile.toml import override
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(NamedTuple):
     """What a person acts on."""
 
     period_us: float

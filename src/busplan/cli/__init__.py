@@ -44,7 +44,7 @@ def _options(
     pass
 
 
-def main() -> None:
+def run() -> None:
     """Run the command line and exit: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted."""
     for stream in (sys.stdout, sys.stderr):
         # A terminal without UTF-8 gets escapes instead of a failure.

@@ -54,9 +54,9 @@ def capacity_command(
         timing_models=timing_models(timing),
     )
     if format_ == "table":
-        from busplan.report.table import capacity_table
+        from busplan.report.capacity import capacity_lines
 
-        emit(capacity_table(result, verdicts(result)))
+        emit(capacity_lines(result, verdicts(result)))
         return
     from busplan.report import documents, text
 

@@ -52,9 +52,9 @@ def latency_command(
         timing_models=timing_models(timing),
     )
     if format_ == "table":
-        from busplan.report.table import latency_table
+        from busplan.report.latency import latency_lines
 
-        emit(latency_table(result, max_payload_bytes=plan.bus.max_payload_bytes))
+        emit(latency_lines(result, max_payload_bytes=plan.bus.max_payload_bytes))
         return
     from busplan.report import documents, text
 

@@ -1,12 +1,10 @@
 """The one place that writes: the document to stdout, the rest to stderr, files atomically."""
 
-import io
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
-from secrets import token_hex
 from typing import TYPE_CHECKING
 
 import typer
@@ -14,14 +12,12 @@ import typer
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
+    from busplan.report.lines import Line
 
 CANNOT: int = 2
 """Exit code of a run that could not do its job."""
 
-_PIPE_WIDTH = 100
-"""Columns of a table that goes to a file or pipe, where no terminal says how wide it is."""
-_ANY_WIDTH = 10_000
+_STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "heading": "bold", "plain": "", "table": ""}
 
 
 def say(message: str) -> None:
@@ -35,36 +31,23 @@ def emit_text(text: str) -> None:
     _to_stdout(lambda: sys.stdout.write(text))
 
 
-def emit(parts: "Sequence[RenderableType]") -> None:
-    """Write tables and sentences to stdout: colours on a terminal only, and none under NO_COLOR."""
+def emit(lines: Iterable["Line"]) -> None:
+    """Write a report to stdout: with colours on a terminal, and none under NO_COLOR."""
+    # A pipe gets plain lines, and does not wait for the renderer to load.
+    if sys.stdout.isatty() or os.environ.get("FORCE_COLOR"):
+        _to_stdout(lambda: _print_styled(lines))
+    else:
+        emit_text("".join(f"{line.text}\n" for line in lines))
+
+
+def _print_styled(lines: Iterable["Line"]) -> None:
     from rich.console import Console
+    from rich.text import Text
 
     console = Console(highlight=False, markup=False, emoji=False)
-    if console.is_terminal:
-        _to_stdout(lambda: _print_parts(console, parts))
-        return
-    # A file or pipe has no width: sentences stay on their line, and no line ends in blanks.
-    buffer = io.StringIO()
-    _print_parts(
-        Console(file=buffer, highlight=False, markup=False, emoji=False, width=_PIPE_WIDTH),
-        parts,
-        soft_wrap=True,
-    )
-    emit_text("".join(f"{line.rstrip()}\n" for line in buffer.getvalue().splitlines()))
-
-
-def _print_parts(console: "Console", parts: "Sequence[RenderableType]", *, soft_wrap: bool = False) -> None:
-    from rich.table import Table
-
-    for part in parts:
-        if isinstance(part, Table) and all(column.no_wrap for column in part.columns):
-            # On a narrow terminal the terminal breaks the lines: no figure is ever cut.
-            needed = console.measure(part, options=console.options.update(width=_ANY_WIDTH)).maximum
-            width, console.width = console.width, max(console.width, needed)
-            console.print(part)
-            console.width = width
-        else:
-            console.print(part, soft_wrap=soft_wrap and not isinstance(part, Table))
+    for line in lines:
+        # On a narrow terminal the terminal breaks the lines of a table: no figure is ever cut.
+        console.print(Text(line.text, style=_STYLES[line.tone]), soft_wrap=line.tone in ("table", "heading"))
 
 
 def _to_stdout(write: Callable[[], object]) -> None:
@@ -89,7 +72,7 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
         It exists and `overwrite` is false, or it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name}.{token_hex(4)}.tmp")
+    temporary = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     try:
         _write_synced(temporary, content)
         if overwrite:

@@ -17,9 +17,9 @@ def paper_command(format_: FormatOption = "table") -> None:
 
     sections = paper_sections(load(BENCH_PROFILE).profile)
     if format_ == "table":
-        from busplan.report.table import paper_tables
+        from busplan.report.paper import paper_lines
 
-        emit(paper_tables(sections))
+        emit(paper_lines(sections))
         return
     from busplan.report import documents, text
 

@@ -22,9 +22,9 @@ def profiles_command(
 
     rows = documents.profile_rows([load(name).profile for name in shipped_names()])
     if format_ == "table":
-        from busplan.report.table import profiles_table
+        from busplan.report.profiles import profiles_lines
 
-        emit(profiles_table(rows))
+        emit(profiles_lines(rows))
     elif format_ == "json":
         emit_text(text.to_json(documents.document("profiles", profiles=rows)))
     else:

@@ -89,7 +89,7 @@ GapCount = Annotated[Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] | Literal["op
 class Section(BaseModel):
     """What all sections of a profile share."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
 
 
 class Ieee1394Bus(Section):

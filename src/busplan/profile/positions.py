@@ -7,16 +7,14 @@ It keeps its own stack, so that depth of nesting costs no recursion.
 
 import re
 import tomllib
-from bisect import bisect_right
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 KeyPath = tuple[str | int, ...]
 """Keys from the top, and indexes into arrays: ("node", "execution", "time_us", 0)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(NamedTuple):
     """Where a key stands, and where its value does: offsets into the text, ends excluded.
 
     An element of an array has no key; its key span is its value span. A table has no value text of its own when it
@@ -27,21 +25,6 @@ class Place:
     key_end: int
     value_start: int
     value_end: int
-
-
-class Lines:
-    """From offsets in a text to line and column, both counted from 1, columns in characters."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-        self._starts = [0, *(match.end() for match in re.finditer("\n", text))]
-
-    def line_and_column(self, offset: int) -> tuple[int, int]:
-        """Line and column of an offset; one past the end belongs to the last line that has text."""
-        if offset >= len(self._text):
-            offset = len(self._text.rstrip("\r\n"))
-        line = bisect_right(self._starts, offset)
-        return line, offset - self._starts[line - 1] + 1
 
 
 _SPACE: Final = re.compile(r"[ \t]*")
@@ -220,7 +203,5 @@ def scan(text: str) -> dict[KeyPath, Place]:
     >>> place = scan(text)["bus", "nodes"]
     >>> text[place.key_start : place.key_end], text[place.value_start : place.value_end]
     ('nodes', '2')
-    >>> Lines(text).line_and_column(place.key_start)
-    (2, 1)
     """
     return _Scanner(text).document()

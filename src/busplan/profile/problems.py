@@ -1,15 +1,16 @@
 """From pydantic's validation errors to findings in the profile's own words."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from busplan.errors import BusplanError
+from busplan.profile.document import Document
 from busplan.profile.model import LinearExecution, Profile, TableExecution
-from busplan.profile.positions import KeyPath
+from busplan.profile.positions import KeyPath, Place
 
 _EXECUTION: Final[KeyPath] = ("node", "execution")
 """The one union of tables: in pydantic's locations its tag follows this path."""
@@ -36,8 +37,7 @@ _OUT_OF_RANGE: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(NamedTuple):
     """One problem: where in the data, and what."""
 
     path: KeyPath
@@ -141,3 +141,42 @@ def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
     if close:
         return f"unknown key; did you mean {close[0]}?"
     return f"unknown key; known here: {', '.join(known)}"
+
+
+def refusal(error: ValidationError, data: dict[str, Any], document: Document) -> BusplanError:
+    """Make the error for a document: every problem at its place, in the order of places."""
+    placed = sorted(
+        ((_place(document, found.path), found) for found in findings(error, data)), key=lambda pair: pair[0].key_start
+    )
+    return BusplanError(*(_message(document, place, found) for place, found in placed))
+
+
+def _place(document: Document, path: KeyPath) -> Place:
+    """Place of a key, or of the nearest table around one that is not there; the start of the file at last."""
+    while path:
+        if path in document.places:
+            return document.places[path]
+        path = path[:-1]
+    return Place(0, 0, 0, 0)
+
+
+def _message(document: Document, place: Place, found: Finding) -> str:
+    written = document.text[place.value_start : place.value_end] if found.shows_value else ""
+    subject = f"{found.key} = {_shortened(written)}" if written else found.key
+    return f"{document.at(place.key_start)}: {subject}: {found.message}"
+
+
+def _shortened(written: str, limit: int = 40) -> str:
+    line = "".join(character if character.isprintable() else " " for character in written)
+    return line if len(line) <= limit else f"{line[:limit]}..."
+
+
+def refused_changes(
+    error: ValidationError, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
+) -> BusplanError:
+    """Make the error for changes of a profile: each problem with the option or key that asked for it."""
+    messages = []
+    for found in findings(error, data):
+        value = f" {changes[found.key]}" if found.key in changes else ""
+        messages.append(f"{origin.get(found.key, found.key)}{value}: {found.message}")
+    return BusplanError(*messages)

@@ -4,15 +4,16 @@ Keys carry their units and are stable between releases; new ones may be added.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from busplan.analysis.capacity import Capacity, CapacityFigures
 from busplan.analysis.latency import LatencyResult, Transaction
-from busplan.analysis.paper import PaperSection
 from busplan.analysis.verdict import Verdict
 from busplan.profile.model import Profile
 from busplan.report.words import verdict_lines
+
+if TYPE_CHECKING:
+    from busplan.analysis.paper import PaperSection
 
 JSON_SCHEMA: Final = 1
 
@@ -31,8 +32,8 @@ def latency_rows(result: LatencyResult) -> list[Row]:
 
 
 def _transaction_row(transaction: Transaction) -> Row:
-    row = asdict(transaction)
-    phases = row.pop("phases")
+    row = transaction._asdict()
+    phases = row.pop("phases")._asdict()
     return {**row, **{key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}}
 
 
@@ -47,7 +48,7 @@ def capacity_rows(result: Capacity) -> list[Row]:
 
 
 def _figures_row(figures: CapacityFigures) -> Row:
-    return {**asdict(figures), "exceeded": list(figures.exceeded)}
+    return {**figures._asdict(), "exceeded": list(figures.exceeded)}
 
 
 def capacity_document(result: Capacity, verdicts: tuple[Verdict, ...]) -> Document:
@@ -92,11 +93,11 @@ def profile_rows(profiles: Sequence[Profile]) -> list[Row]:
     ]
 
 
-def paper_rows(sections: Sequence[PaperSection]) -> list[Row]:
+def paper_rows(sections: "Sequence[PaperSection]") -> list[Row]:
     """One row a published figure and way to compute it."""
     return [
         {
-            **asdict(comparison),
+            **comparison._asdict(),
             "residual": comparison.residual,
             "relative_residual": comparison.relative_residual,
         }
@@ -105,7 +106,7 @@ def paper_rows(sections: Sequence[PaperSection]) -> list[Row]:
     ]
 
 
-def paper_document(sections: Sequence[PaperSection]) -> Document:
+def paper_document(sections: "Sequence[PaperSection]") -> Document:
     """Answer of `busplan paper`."""
     return document(
         "paper",

@@ -1,29 +1,13 @@
 """Verdicts in words that a person can act on."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
 from busplan.analysis.advice import Change
 from busplan.analysis.capacity import CapacityFigures, Limit
 from busplan.analysis.verdict import Verdict
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M
 from busplan.profile.model import Profile
-
-Tone = Literal["good", "bad", "warning", "plain"]
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One sentence and how it is meant."""
-
-    text: str
-    tone: Tone = "plain"
-
-
-def us(value: float) -> str:
-    """Write a time as reports do: three decimals, unless it is too small for them."""
-    return f"{value:.3f}" if abs(value) >= 0.001 or value == 0 else f"{value:.3g}"  # noqa: PLR2004
+from busplan.report.lines import Line, plural, us
 
 
 def period(value_us: float) -> str:
@@ -98,7 +82,7 @@ def _reason(limit: Limit, figures: CapacityFigures, profile: Profile) -> str:
 
 
 def _nodes(nodes: int, axes: int) -> str:
-    return f"{nodes} node{'' if nodes == 1 else 's'} ({axes} axes)"
+    return f"{plural(nodes, 'node')} ({axes} axes)"
 
 
 def _advice(verdict: Verdict) -> Line:

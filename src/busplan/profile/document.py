@@ -1,0 +1,99 @@
+"""One TOML text: its data, and the line and column of what stands in it."""
+
+import re
+import tomllib
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Final, NoReturn
+
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.profile.positions import KeyPath, Place
+
+_TOMLLIB_MESSAGE: Final = r"(?s)(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)\Z"
+_LONG_INTEGER: Final = r"[0-9_]{4000,}"
+_MAX_NESTING: Final = 100
+
+
+class Lines:
+    """From offsets in a text to line and column, both counted from 1, columns in characters."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._starts = [0, *(at + 1 for at, character in enumerate(text) if character == "\n")]
+
+    def line_and_column(self, offset: int) -> tuple[int, int]:
+        """Line and column of an offset; one past the end belongs to the last line that has text."""
+        if offset >= len(self._text):
+            offset = len(self._text.rstrip("\r\n"))
+        line = bisect_right(self._starts, offset)
+        return line, offset - self._starts[line - 1] + 1
+
+
+@dataclass(frozen=True)
+class Document:
+    """One TOML text with the name it is called by in messages."""
+
+    name: str
+    text: str
+
+    @cached_property
+    def lines(self) -> Lines:
+        """Line and column of every offset."""
+        return Lines(self.text)
+
+    @cached_property
+    def places(self) -> "dict[KeyPath, Place]":
+        """Place of every key; the text must be one that tomllib accepts."""
+        from busplan.profile.positions import scan  # only who asks for places pays for the scanner
+
+        return scan(self.text)
+
+    def at(self, offset: int) -> str:
+        """Make file:line:column of an offset."""
+        line, column = self.lines.line_and_column(offset)
+        return f"{self.name}:{line}:{column}"
+
+    def data(self) -> dict[str, Any]:
+        """Parse the text.
+
+        Raises
+        ------
+        BusplanError
+            The text is no TOML; with the place where it stops being so.
+        """
+        try:
+            return tomllib.loads(self.text)
+        except RecursionError:
+            raise BusplanError(
+                f"{self.at(_first_deep_bracket(self.text))}: nested too deeply; "
+                "a profile needs no more than two brackets inside each other"
+            ) from None
+        except ValueError as error:
+            self._refuse(error)
+
+    def _refuse(self, error: ValueError) -> NoReturn:
+        match = re.match(_TOMLLIB_MESSAGE, str(error))
+        if match is None:  # the one error that is Python's own and not TOML's
+            long_integer = re.search(_LONG_INTEGER, self.text)
+            place = self.at(long_integer.start() if long_integer else 0)
+            raise BusplanError(f"{place}: not valid TOML: a number with too many digits") from None
+        what = match["what"][:1].lower() + match["what"][1:]
+        if match["line"]:
+            place = f"{self.name}:{match['line']}:{match['column']}"
+        else:
+            place = self.at(len(self.text))
+            what += ", and the file ends"
+        raise BusplanError(f"{place}: not valid TOML: {what}") from None
+
+
+def _first_deep_bracket(text: str) -> int:
+    """Offset of the first bracket that is nested deeper than any profile."""
+    depth = 0
+    for match in re.finditer(r"[\[\]{}\n]", text):
+        depth += {"[": 1, "{": 1, "]": -1, "}": -1, "\n": 0}[match.group()]
+        if depth > _MAX_NESTING:
+            return match.start()
+    return 0

@@ -1,0 +1,52 @@
+"""`busplan latency` for people."""
+
+from collections.abc import Sequence
+from typing import Final
+
+from busplan.analysis.latency import LatencyResult, Transaction
+from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
+
+_LATENCY_ROWS: Final = (
+    GridRow("request packet, bytes", "", "", "request_bytes", count),
+    GridRow("response packet, bytes", "", "", "response_bytes", count),
+    GridRow("arbitration, each", "(4)", "", "arbitration_us", us),
+    GridRow("data, request", "(5)", "", "request_data_us", us),
+    GridRow("data, response", "(5)", "", "response_data_us", us),
+    GridRow("acknowledge, each", "(6) (9)", "", "acknowledge_us", us),
+    GridRow("request T_req", "(7)", "", "request_us", us),
+    GridRow("response T_resp", "(8)", "", "response_us", us),
+    GridRow("T1+T2", "(13)", "", "request_and_acknowledge_us", us),
+    GridRow("execution T_exec = T3", "measured", "", "execution_us", us),
+    GridRow("T4+T5", "(14)", "", "response_and_acknowledge_us", us),
+    GridRow("latency T_lant", "(3) (12)", "", "latency_us", us),
+    GridRow("subaction gap", "(10)", "", "subaction_gap_us", us),
+    GridRow("arbitration reset gap", "(10)", "", "arbitration_reset_gap_us", us),
+    GridRow("gaps T_sum", "(10)", "", "gaps_us", us),
+    GridRow("T_lant + T_sum", "(3) (10)", "", "latency_with_gaps_us", us),
+)
+
+
+def latency_lines(result: LatencyResult, *, max_payload_bytes: int) -> list[Line]:
+    """Phases of each transaction, read and write and the models side by side; one table for each payload."""
+    models = len({one.timing_model for one in result.transactions})
+    size = 2 * models
+    lines: list[Line] = []
+    for at in range(0, len(result.transactions), size):
+        lines.extend((*_grid(result.transactions[at : at + size]), BLANK))
+    first = result.transactions[0]
+    lines.append(
+        Line(
+            f"{result.profile}: farthest of {plural(first.nodes, 'node')}, {plural(first.hops, 'hop')}, "
+            f"gap count {first.gap_count}."
+        )
+    )
+    over = sorted({one.payload_bytes for one in result.transactions if one.payload_bytes > max_payload_bytes})
+    if over:
+        sizes = ", ".join(map(str, over))
+        lines.append(Line(f"Warning: over the speed's limit of {max_payload_bytes} bytes: {sizes}.", "warning"))
+    return lines
+
+
+def _grid(transactions: Sequence[Transaction]) -> list[Line]:
+    columns = [(f"{one.transaction} {one.payload_bytes} B\n{one.timing_model}", one.phases) for one in transactions]
+    return grid("phase, us", columns, _LATENCY_ROWS)
