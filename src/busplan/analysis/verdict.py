@@ -15,8 +15,10 @@ class Verdict(NamedTuple):
     """Figures of the timing model that decides."""
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
+    advised: CapacityFigures
+    """The figures that the change is to better: those that do not fit where the models disagree, else the deciding."""
     change: Change | None
-    """The cheapest change; see `cheapest_change`."""
+    """The cheapest change for the model of `advised`; see `cheapest_change`."""
 
     @property
     def models_agree(self) -> bool:
@@ -35,10 +37,12 @@ def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
 def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
     wanted = capacity.profile.bus.timing_model
     deciding = next((figures for figures in results if figures.timing_model == wanted), results[0])
+    advised = next((figures for figures in (deciding, *results) if not figures.fits), deciding)
     profile = override(capacity.profile, {"cycle.period_us": deciding.period_us})
     return Verdict(
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(figures for figures in results if figures is not deciding),
-        change=cheapest_change(profile, model=deciding.timing_model),
+        advised=advised,
+        change=cheapest_change(profile, model=advised.timing_model),
     )

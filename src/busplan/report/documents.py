@@ -70,6 +70,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> Document:
         "models_agree": verdict.models_agree,
         "cheapest_change": change
         and {
+            "timing_model": verdict.advised.timing_model,
             "changes": change.changes,
             "fits": change.figures.fits,
             "margin_us": change.figures.margin_us,

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from busplan.analysis.advice import Change
 from busplan.analysis.capacity import CapacityFigures, Limit
 from busplan.analysis.verdict import Verdict
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M
@@ -86,28 +85,19 @@ def _nodes(nodes: int, axes: int) -> str:
 
 
 def _advice(verdict: Verdict) -> Line:
-    change, figures = verdict.change, verdict.deciding
+    change, figures = verdict.change, verdict.advised
     if change is not None:
-        return Line(f"{_purpose(change, figures)}: {_settings(change)}, which gives {_outcome(change)}.")
+        settings = ", ".join(f"{key} = {value}" for key, value in change.changes.items())
+        most = _nodes(change.figures.max_nodes, change.figures.max_axes)
+        if figures.fits:
+            more = plural(change.figures.max_nodes - figures.max_nodes, "more node")
+            return Line(f"Cheapest way to {more}: {settings}, which carries {most}.")
+        which = "" if verdict.models_agree else f" the {figures.timing_model} model"
+        spare = f"{us(change.figures.margin_us)} us to spare"
+        return Line(f"Cheapest way to make it fit{which}: {settings}, which gives {spare} and {most} at most.")
     if figures.fits:
         return Line(f"No setting of the cycle carries more nodes: the standard's {figures.limited_by} end here.")
     return Line("No single kind of change makes it fit.", "bad")
-
-
-def _purpose(change: Change, figures: CapacityFigures) -> str:
-    if not figures.fits:
-        return "Cheapest way to make it fit"
-    more = change.figures.max_nodes - figures.max_nodes
-    return f"Cheapest way to {more} more node{'' if more == 1 else 's'}"
-
-
-def _settings(change: Change) -> str:
-    return ", ".join(f"{key} = {value}" for key, value in change.changes.items())
-
-
-def _outcome(change: Change) -> str:
-    after = change.figures
-    return f"{us(after.margin_us)} us to spare and {_nodes(after.max_nodes, after.max_axes)} at most"
 
 
 def _warnings(figures: CapacityFigures, profile: Profile) -> Iterator[Line]:

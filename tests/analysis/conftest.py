@@ -1,0 +1,111 @@
+"""A second, exact implementation of the cycle, and profiles to try it on."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from hypothesis import strategies as st
+
+from busplan.profile.model import Profile
+
+# By hand from the standard's gap-count table, 1 to 23 hops.
+GAP_COUNTS = [5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62]
+
+
+def exact_required_us(profile: Profile, model: str, nodes: int) -> Fraction:
+    """Required time of a cycle in exact arithmetic, written from the equations and from nothing of busplan."""
+    data = profile.model_dump()
+    bus, payload = data["bus"], data["payload"]
+    rate = {"S100": Fraction("98.304"), "S200": Fraction("196.608"), "S400": Fraction("393.216")}[bus["speed"]]
+    clock = rate if model == "paper" else Fraction("98.304")
+    hops = nodes if bus["max_hops"] is None else bus["max_hops"]
+    gap = bus["gap_count"]
+    if gap == "optimal":
+        gap = GAP_COUNTS[hops - 1] if hops <= 23 else 63
+    hop_us = Fraction("0.023") * Fraction(bus["cable_length_m"]) / Fraction("4.5") + Fraction(14) / clock
+
+    def packets(kind: str, size: int) -> tuple[int, int]:
+        if model == "paper":
+            return size + payload["overhead_bytes"], size + payload["overhead_bytes"]
+        padded = -(-size // 4) * 4
+        if kind == "read":
+            return (16, 20) if size == 4 else (20, 24 + padded)
+        return (20, 16) if size == 4 else (24 + padded, 16)
+
+    def execution_us(size: int) -> Fraction:
+        execution = data["node"]["execution"]
+        return Fraction(execution["base_us"]) + Fraction(execution["per_byte_us"]) * size
+
+    total = Fraction(data["cycle"]["nonperiodic_us"])
+    total += Fraction(data["cycle"]["sync"]["ping_us"])
+    total += Fraction(data["cycle"]["sync"]["ping_per_node_us"]) * (nodes - 1)
+    for kind in ("read", "write"):
+        size = payload[f"{kind}_bytes"]
+        arbitration_us = hop_us * hops + Fraction(4 * gap) / clock + Fraction("1.63")
+        data_us = sum(hop_us * hops + 8 * Fraction(packet) / rate for packet in packets(kind, size))
+        acknowledge_us = hop_us * hops + Fraction("0.25")
+        gaps_us = Fraction(82 + 48 * gap) / clock
+        total += nodes * (2 * arbitration_us + data_us + 2 * acknowledge_us + execution_us(size) + gaps_us)
+    return total
+
+
+def make_profile(**changes: Any) -> Profile:
+    """Make a profile from a plain one and new values by dotted key with __ for the dot."""
+    data: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "test",
+        "bus": {"kind": "ieee1394", "speed": "S400", "gap_count": 63, "nodes": 2, "timing_model": "standard"},
+        "cycle": {"period_us": 4000.0, "slice_ratio": 0.5, "sync": {}},
+        "payload": {"read_bytes": 12, "write_bytes": 12},
+        "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}},
+    }
+    for key, value in changes.items():
+        *tables, last = key.split("__")
+        table = data
+        for name in tables:
+            table = table[name]
+        table[last] = value
+    return Profile.model_validate(data)
+
+
+@st.composite
+def profiles(draw: st.DrawFn) -> Profile:
+    """Random profiles over the whole range that a plan may have."""
+    return make_profile(
+        bus__speed=draw(st.sampled_from(["S100", "S200", "S400"])),
+        bus__gap_count=draw(st.one_of(st.integers(0, 63), st.just("optimal"))),
+        bus__nodes=draw(st.integers(1, 80)),
+        bus__max_hops=draw(st.one_of(st.none(), st.integers(1, 20))),
+        bus__cable_length_m=draw(st.sampled_from([0.5, 2.0, 4.5])),
+        bus__timing_model=draw(st.sampled_from(["paper", "standard"])),
+        cycle__period_us=draw(st.floats(1.0, 50_000.0)),
+        cycle__slice_ratio=draw(st.floats(0.01, 1.0)),
+        cycle__nonperiodic_us=draw(st.one_of(st.just(0.0), st.floats(0.0, 500.0))),
+        cycle__sync__ping_us=draw(st.floats(0.0, 5.0)),
+        cycle__sync__ping_per_node_us=draw(st.floats(0.0, 5.0)),
+        payload__read_bytes=draw(st.integers(1, 3000)),
+        payload__write_bytes=draw(st.integers(1, 3000)),
+        payload__overhead_bytes=draw(st.integers(0, 40)),
+        node__axes=draw(st.integers(1, 8)),
+        node__execution__base_us=draw(st.floats(0.0, 100.0)),
+        node__execution__per_byte_us=draw(st.floats(0.0, 1.0)),
+    )
+
+
+@pytest.fixture(scope="session")
+def make() -> Callable[..., Profile]:
+    """Maker of profiles."""
+    return make_profile
+
+
+@pytest.fixture(scope="session")
+def exact() -> Callable[[Profile, str, int], Fraction]:
+    """The exact second implementation."""
+    return exact_required_us
+
+
+@pytest.fixture(scope="session")
+def any_profile() -> st.SearchStrategy[Profile]:
+    """Random profiles."""
+    return profiles()

@@ -1,0 +1,53 @@
+"""The standard's figures against their public sources."""
+
+from math import ceil
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from busplan import ieee1394
+from busplan.sourced import Sourced
+
+
+@pytest.mark.parametrize("hops", range(1, 24))
+def test_gap_count_table_follows_from_cable_and_phy_delay(hops: int) -> None:
+    # 2 (4.5 m at 5.05 ns/m + 144 ns) in base-rate ticks, through the two gap conditions; offsets 58 and -16 are fitted.
+    ticks = 2 * (4.5 * 5.05e-3 + 0.144) * 98.304 * hops
+    assert ieee1394.safe_gap_count(hops) == max(ceil((ticks + 58) / 20), ceil((ticks - 16) / 12))
+
+
+def test_gap_count_beyond_the_table_is_the_power_up_value() -> None:
+    assert [ieee1394.safe_gap_count(hops) for hops in (23, 24, 62, 1000)] == [62, 63, 63, 63]
+
+
+@given(st.integers(1, 100))
+def test_gap_count_never_shrinks_with_hops(hops: int) -> None:
+    assert ieee1394.safe_gap_count(hops) <= ieee1394.safe_gap_count(hops + 1) <= ieee1394.MAX_GAP_COUNT
+
+
+@pytest.mark.parametrize("hops", [0, -1])
+def test_a_bus_without_hops_is_an_error(hops: int) -> None:
+    with pytest.raises(ValueError, match=f"got {hops}"):
+        ieee1394.safe_gap_count(hops)
+
+
+def test_rates_and_limits_by_speed() -> None:
+    assert dict(ieee1394.DATA_RATE_MBIT_S) == {"S100": 98.304, "S200": 196.608, "S400": 393.216}
+    assert dict(ieee1394.MAX_PAYLOAD_BYTES) == {"S100": 512.0, "S200": 1024.0, "S400": 2048.0}
+    assert (ieee1394.MAX_NODES, ieee1394.MAX_HOPS) == (62.0, 16.0)
+
+
+@given(st.integers(0, 5000))
+def test_padding_fills_the_last_quadlet(payload_bytes: int) -> None:
+    padded = ieee1394.padded_bytes(payload_bytes)
+    assert padded % 4 == 0
+    assert 0 <= padded - payload_bytes < 4
+
+
+def test_every_number_names_its_source() -> None:
+    numbers = [value for value in vars(ieee1394).values() if isinstance(value, Sourced)]
+    assert len(numbers) > 15
+    assert all(number.source and number.meaning and number.unit and number.grade for number in numbers)
+    # What no opened source confirms must be called so.
+    assert {number for number in numbers if number.grade == "recalled"} == {1.63, 0.25}

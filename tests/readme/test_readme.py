@@ -1,0 +1,126 @@
+"""The README says what the program does: its output blocks, its reference and its equations are checked."""
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+import pytest
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+
+from busplan import equations
+from busplan.analysis.capacity import CapacityFigures, capacity
+from busplan.analysis.latency import latency
+from busplan.profile.model import Profile
+from busplan.profile.shipped import load, shipped_names
+from busplan.report.documents import capacity_rows, latency_rows
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def shown_runs() -> Iterator[tuple[str, str]]:
+    """Each `$ busplan ...` of the README with the output printed below it."""
+    for block in CONSOLE.findall(README):
+        for run in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+            command, _, output = run.partition("\n")
+            if command.startswith("busplan"):
+                yield command, output
+
+
+@pytest.mark.parametrize(("command", "output"), list(shown_runs()), ids=lambda text: text[:40])
+def test_output_blocks_are_the_programs_own(command: str, output: str, tmp_path: Path) -> None:
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    environment.pop("FORCE_COLOR", None)
+    run = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, env=environment, check=False
+    )
+    assert run.stdout + run.stderr == output
+
+
+def test_there_are_blocks_to_check() -> None:
+    commands = {command.split()[1] for command, _ in shown_runs()}
+    assert commands >= {"capacity", "latency", "paper", "profiles", "init"}
+
+
+def sections(annotation: Any) -> list[type[BaseModel]]:
+    """Models inside an annotation: the section itself, or each member of a union of sections."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) in (Union, UnionType, Annotated):
+        return [model for part in get_args(annotation) for model in sections(part)]
+    return []
+
+
+def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """The README's row of every key of the profile, from the schema itself."""
+    for name, field in model.model_fields.items():
+        key = f"{prefix}{name}"
+        inner = sections(field.annotation)
+        if inner:
+            for one in inner:
+                yield from reference(one, f"{key}.")
+            continue
+        default = "required" if field.default is PydanticUndefined else repr(field.default).replace("'", '"')
+        range_ = allowed(model.model_json_schema()["properties"][name])
+        yield f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
+
+
+def allowed(schema: dict[str, Any]) -> str:
+    """Type and range of a key in words, from its JSON Schema."""
+    if "anyOf" in schema:
+        return " or ".join(allowed(one) for one in schema["anyOf"] if one.get("type") != "null")
+    if "enum" in schema or "const" in schema:
+        return ", ".join(str(one) for one in schema.get("enum", [schema.get("const")]))
+    if schema["type"] == "array":
+        return f"list of {allowed(schema['items'])}"
+    if schema["type"] == "string":
+        return f"text up to {schema['maxLength']} characters"
+    low = f"> {schema['exclusiveMinimum']:g}" if "exclusiveMinimum" in schema else f"{schema['minimum']:g}"
+    kind = "whole " if schema["type"] == "integer" else ""
+    return f"{kind}{low} to {schema['maximum']:g}"
+
+
+@pytest.mark.parametrize("row", list(dict.fromkeys(reference(Profile))))
+def test_profile_reference_lists_every_key_as_the_schema_has_it(row: str) -> None:
+    assert row in README.splitlines()
+
+
+def test_profile_reference_lists_no_key_that_is_not_there() -> None:
+    rows = [
+        line
+        for line in README.splitlines()
+        if re.match(r"\| `[a-z_.]+` \| [^|]+ \| (required|none|\"[a-z]*\"|[\d.]+) \|", line)
+    ]
+    assert sorted(rows) == sorted(dict.fromkeys(reference(Profile)))
+
+
+def test_the_example_profile_is_the_shipped_one() -> None:
+    block = re.search(r"^```toml\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    assert block[1] == (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
+
+
+def test_equations_table_names_each_function_with_its_equation() -> None:
+    rows = re.findall(r"^\| \((\d+)\)[^|]*\| `(\w+)` \|", README, re.MULTILINE)
+    assert sorted({int(number) for number, _ in rows}) == list(range(1, 16))
+    for number, name in rows:
+        assert f"equation ({number})" in getattr(equations, name).__doc__.splitlines()[0]
+
+
+def test_every_json_key_is_listed() -> None:
+    profile = load("paper-4ms").profile
+    keys = {*latency_rows(latency(profile))[0], *capacity_rows(capacity(profile))[0]}
+    assert keys >= set(CapacityFigures._fields)
+    missing = [key for key in sorted(keys) if f"`{key}`" not in README]
+    assert missing == []
+
+
+def test_every_shipped_profile_is_named() -> None:
+    assert [name for name in shipped_names() if f"`{name}`" not in README] == []
