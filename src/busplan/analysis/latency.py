@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile, TableExecution
+from busplan.profile.bus import TableExecution
+from busplan.profile.model import Profile
 from busplan.timing import (
     TIMING_MODELS,
     TRANSACTION_KINDS,

@@ -8,8 +8,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from busplan.errors import BusplanError
+from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.document import Document
-from busplan.profile.model import LinearExecution, Profile, TableExecution
+from busplan.profile.model import Profile
 from busplan.profile.positions import KeyPath, Place
 
 _EXECUTION: Final[KeyPath] = ("node", "execution")
