@@ -2,7 +2,8 @@
 
 import pytest
 
-from busplan.analysis.paper import BENCH_PROFILE, Comparison, paper_sections, published
+from busplan.analysis.circle_test import circle_test
+from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, Comparison, paper_sections, published
 from busplan.profile.shipped import load
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.
@@ -29,7 +30,9 @@ TABLE_2 = [
 
 @pytest.fixture(scope="module")
 def comparisons() -> list[Comparison]:
-    return [one for section in paper_sections(load(BENCH_PROFILE).profile) for one in section.comparisons]
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
+    return [one for section in sections for one in section.comparisons]
 
 
 def chosen(comparisons: list[Comparison], section: str, method: str) -> dict[str, Comparison]:
@@ -96,3 +99,16 @@ def test_the_gaps_of_the_standard_are_four_times_the_papers(comparisons: list[Co
     assert rows["T_sum, gap count 63", "standard model"].computed == pytest.approx(31.60, abs=5e-3)
     assert rows["standard / paper", "standard model"].computed == 4.0
     assert all(one.published is one.residual is None for one in rows.values())
+
+
+def test_the_circles_of_figs_9_and_10_within_2_percent(comparisons: list[Comparison]) -> None:
+    circles = [one for one in comparisons if one.section == "Figs. 9 and 10: the circle test"]
+    assert [one.published for one in circles] == [48.656, 0.0036, 0.0187, 12.164, 0.0049, 0.0219]
+    assert all(one.computed == pytest.approx(one.published, rel=0.02) for one in circles)
+    assert [one.computed for one in circles if one.unit == "s"] == [48.656, 12.164]
+
+
+def test_sercos_is_below_10_percent_in_one_of_two_circles(comparisons: list[Comparison]) -> None:
+    published = [one.published or 0.0 for one in comparisons if one.section.endswith("SERCOS")]
+    assert published == pytest.approx([0.0036 / 0.0448, 0.0049 / 0.0448])
+    assert [share < 0.1 for share in published] == [True, False]

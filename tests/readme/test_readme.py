@@ -15,7 +15,9 @@ from pydantic_core import PydanticUndefined
 
 from busplan import equations
 from busplan.analysis.capacity import CapacityFigures, capacity
+from busplan.analysis.circle_test import CircleFigures
 from busplan.analysis.latency import latency
+from busplan.profile.machine import AxisOverride
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.report.documents import capacity_rows, latency_rows
@@ -46,7 +48,7 @@ def test_output_blocks_are_the_programs_own(command: str, output: str, tmp_path:
 
 def test_there_are_blocks_to_check() -> None:
     commands = {command.split()[1] for command, _ in shown_runs()}
-    assert commands >= {"capacity", "latency", "paper", "profiles", "init"}
+    assert commands >= {"capacity", "latency", "circle-test", "paper", "profiles", "init"}
 
 
 def sections(annotation: Any) -> list[type[BaseModel]]:
@@ -63,13 +65,21 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         inner = sections(field.annotation)
-        if inner:
+        if inner == [AxisOverride]:
+            yield f"| `{key}` | any key of one axis | none | {field.description} |"
+        elif inner:
             for one in inner:
                 yield from reference(one, f"{key}.")
-            continue
-        default = "required" if field.default is PydanticUndefined else repr(field.default).replace("'", '"')
-        range_ = allowed(model.model_json_schema()["properties"][name])
-        yield f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
+        else:
+            yield reference_row(model, name, key)
+
+
+def reference_row(model: type[BaseModel], name: str, key: str) -> str:
+    """One row of the reference."""
+    field = model.model_fields[name]
+    default = "required" if field.default is PydanticUndefined else repr(field.default).replace("'", '"')
+    range_ = allowed(model.model_json_schema()["properties"][name])
+    return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
 
 
 def allowed(schema: dict[str, Any]) -> str:
@@ -96,7 +106,7 @@ def test_profile_reference_lists_no_key_that_is_not_there() -> None:
     rows = [
         line
         for line in README.splitlines()
-        if re.match(r"\| `[a-z_.]+` \| [^|]+ \| (required|none|\"[a-z]*\"|[\d.]+) \|", line)
+        if re.match(r"\| `[a-z0-9_.]+` \| [^|]+ \| (required|none|\"[a-z]*\"|[\d.]+) \|", line)
     ]
     assert sorted(rows) == sorted(dict.fromkeys(reference(Profile)))
 
@@ -116,7 +126,7 @@ def test_equations_table_names_each_function_with_its_equation() -> None:
 
 def test_every_json_key_is_listed() -> None:
     profile = load("paper-4ms").profile
-    keys = {*latency_rows(latency(profile))[0], *capacity_rows(capacity(profile))[0]}
+    keys = {*latency_rows(latency(profile))[0], *capacity_rows(capacity(profile))[0], *CircleFigures._fields}
     assert keys >= set(CapacityFigures._fields)
     missing = [key for key in sorted(keys) if f"`{key}`" not in README]
     assert missing == []

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
-from busplan.cli import capacity, init, latency, paper, profiles
+from busplan.cli import capacity, circle_test, init, latency, paper, profiles
 from busplan.cli.output import CANNOT, say
 from busplan.errors import BusplanError
 
@@ -21,6 +21,7 @@ app = typer.Typer(
 )
 app.command("latency")(latency.latency_command)
 app.command("capacity")(capacity.capacity_command)
+app.command("circle-test")(circle_test.circle_test_command)
 app.command("paper")(paper.paper_command)
 app.command("profiles")(profiles.profiles_command)
 app.command("init")(init.init_command)

@@ -2,10 +2,11 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from errno import EISDIR
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import typer
 
@@ -14,6 +15,8 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from busplan.report.lines import Line
 
+PLAN_FAILS: int = 1
+"""Exit code of a plan that does not hold."""
 CANNOT: int = 2
 """Exit code of a run that could not do its job."""
 
@@ -64,7 +67,23 @@ def _to_stdout(write: Callable[[], object]) -> None:
 
 
 def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
-    """Write a file as a whole or not at all: into a temporary file beside it, which then takes its name.
+    """Write a file as a whole or not at all.
+
+    Raises
+    ------
+    BusplanError
+        It exists and `overwrite` is false, or it cannot be written.
+    """
+    with new_file(path, overwrite=overwrite) as file:
+        file.write(content)
+
+
+@contextmanager
+def new_file(path: Path, *, overwrite: bool) -> Iterator[BinaryIO]:
+    """Open a file that appears as a whole or not at all: a temporary one beside it, which takes its name at the end.
+
+    It is opened at once, so that a path that cannot be written is refused before the work for it is done. What fails
+    inside leaves the old file as it was.
 
     Raises
     ------
@@ -74,7 +93,12 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     try:
-        _write_synced(temporary, content)
+        _refuse_target(target, overwrite=overwrite)
+        # "x" gives the file the permissions that any new file of the user has.
+        with temporary.open("xb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
         if overwrite:
             temporary.replace(target)
         else:
@@ -89,12 +113,12 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
             temporary.unlink()
 
 
-def _write_synced(path: Path, content: bytes) -> None:
-    # "x" gives the file the permissions that any new file of the user has.
-    with path.open("xb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+def _refuse_target(target: Path, *, overwrite: bool) -> None:
+    """Say before the work what renaming would say after it."""
+    if target.is_dir():
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
+    if not overwrite and os.path.lexists(target):
+        raise FileExistsError
 
 
 def _rename_new(temporary: Path, target: Path) -> None:

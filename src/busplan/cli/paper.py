@@ -2,20 +2,25 @@
 
 from busplan.cli.options import FormatOption
 from busplan.cli.output import emit, emit_text
+from busplan.cli.progress import progress_bar
 
 
 def paper_command(format_: FormatOption = "table") -> None:
     """Show every published figure that the equations reach, beside the computed one and the residual.
 
-    Table I and Table II, the comparison with CAN, the constant of equation (15) and the gaps of equation (10), each
-    with the way it is computed. The residual is computed less published; the last column is its share in percent.
+    Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of equation (10), Figs. 9 and
+    10 and the comparison with SERCOS, each with the way it is computed. The residual is computed less published; the
+    last column is its share in percent. The servo values behind the circles are a calibration to these very figures.
 
     Example: busplan paper --format csv
     """
-    from busplan.analysis.paper import BENCH_PROFILE, paper_sections
+    from busplan.analysis.circle_test import circle_test
+    from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
     from busplan.profile.shipped import load
 
-    sections = paper_sections(load(BENCH_PROFILE).profile)
+    with progress_bar("circle tests") as progress:
+        circles = [circle_test(load(name).profile, progress=progress).results[0] for name in CIRCLE_PROFILES]
+    sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
     if format_ == "table":
         from busplan.report.paper import paper_lines
 

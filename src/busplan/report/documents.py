@@ -3,7 +3,7 @@
 Keys carry their units and are stable between releases; new ones may be added.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from busplan.analysis.capacity import Capacity, CapacityFigures
@@ -13,9 +13,20 @@ from busplan.profile.model import Profile
 from busplan.report.words import verdict_lines
 
 if TYPE_CHECKING:
+    from busplan.analysis.circle_test import CircleTest
     from busplan.analysis.paper import PaperSection
 
 JSON_SCHEMA: Final = 1
+
+TRACE_COLUMNS: Final = (
+    "period_us",
+    "time_us",
+    "command_x_mm",
+    "command_y_mm",
+    "x_mm",
+    "y_mm",
+    "contour_error_mm",
+)
 
 Document = dict[str, Any]
 Row = dict[str, Any]
@@ -92,6 +103,54 @@ def profile_rows(profiles: Sequence[Profile]) -> list[Row]:
         }
         for profile in profiles
     ]
+
+
+def circle_rows(test: "CircleTest", *, with_contributions: bool) -> list[Row]:
+    """One flat row a period: the centre in two columns, failures by name, what each source takes by its name."""
+    sources = sorted({one.source for result in test.results for one in result.contributions or ()})
+    rows = []
+    for result in test.results:
+        row = result._asdict()
+        offset = row.pop("centre_offset_mm") or (None, None)
+        row |= {"centre_offset_x_mm": offset[0], "centre_offset_y_mm": offset[1]}
+        row["failures"] = [failure.name for failure in result.failures]
+        removed = {one.source: one.removed_mm for one in row.pop("contributions") or ()}
+        if with_contributions:
+            row |= {f"removed_{source}_mm": removed.get(source) for source in sources}
+        rows.append(row)
+    return rows
+
+
+def circle_document(test: "CircleTest", *, with_contributions: bool) -> Document:
+    """Answer of `busplan circle-test`."""
+    results = []
+    for result in test.results:
+        row = result._asdict()
+        row["failures"] = [failure._asdict() for failure in result.failures]
+        row["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
+        ranked = row.pop("contributions")
+        if with_contributions:
+            row["contributions"] = [one._asdict() for one in ranked or ()]
+        results.append(row)
+    return document("circle-test", profile=test.profile.name, results=results)
+
+
+def trace_rows(test: "CircleTest", *, every: int) -> Iterator[Row]:
+    """One row for every n-th step of each simulated period."""
+    for result, run in zip(test.results, test.runs, strict=True):
+        if run is None:
+            continue
+        trace = run.trace(every=every)
+        columns = (
+            trace.time_us,
+            trace.command_x_mm,
+            trace.command_y_mm,
+            trace.x_mm,
+            trace.y_mm,
+            trace.contour_error_mm,
+        )
+        for values in zip(*(column.tolist() for column in columns), strict=True):
+            yield dict(zip(TRACE_COLUMNS, (result.period_us, *values), strict=True))
 
 
 def paper_rows(sections: "Sequence[PaperSection]") -> list[Row]:

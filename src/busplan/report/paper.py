@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from busplan.analysis.paper import Comparison, PaperSection
-from busplan.report.lines import BLANK, Line, table, us
+from busplan.report.lines import BLANK, Line, table
 
 
 def paper_lines(sections: Sequence[PaperSection]) -> list[Line]:
@@ -28,13 +28,16 @@ def _table(section: PaperSection) -> list[Line]:
 
 def _row(quantity: str, by_method: dict[str, Comparison], methods: Sequence[str]) -> list[str]:
     first = next(iter(by_method.values()))
-    published = "-" if first.published is None else f"{first.published:.4g}"
+    published = "-" if first.published is None else f"{first.published:.5g}"
     return [quantity, first.unit, published, *(cell for method in methods for cell in _compared(by_method.get(method)))]
 
 
 def _compared(one: Comparison | None) -> tuple[str, str, str]:
     if one is None:
         return "", "", ""
+    # Contour errors are micrometres: they need more digits than microseconds do.
+    digits = {"mm": 6, "1": 4}.get(one.unit, 3)
+    computed = f"{one.computed:.{digits}f}"
     if one.residual is None or one.relative_residual is None:
-        return us(one.computed), "-", "-"
-    return us(one.computed), f"{one.residual:+.4f}", f"{one.relative_residual * 100:+.1f}"
+        return computed, "-", "-"
+    return computed, f"{one.residual:+.{max(digits, 4)}f}", f"{one.relative_residual * 100:+.1f}"

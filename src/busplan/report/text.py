@@ -3,8 +3,10 @@
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+_BLOCK: Final = 1 << 16
 
 
 def to_json(document: Mapping[str, Any]) -> str:
@@ -26,14 +28,27 @@ def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     ValueError
         A row has a key that the first has not.
     """
-    if not rows:
-        return ""
+    return "".join(csv_blocks(rows, columns=list(rows[0]))) if rows else ""
+
+
+def csv_blocks(rows: Iterable[Mapping[str, Any]], *, columns: Sequence[str]) -> Iterator[str]:
+    """Write rows as CSV block by block, so that a long table needs no memory of its own.
+
+    Raises
+    ------
+    ValueError
+        A row has a key that is no column.
+    """
     buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, fieldnames=list(rows[0]), lineterminator="\n")
+    writer = csv.DictWriter(buffer, fieldnames=columns, lineterminator="\n")
     writer.writeheader()
     for row in rows:
         writer.writerow({key: _cell(value) for key, value in row.items()})
-    return buffer.getvalue()
+        if buffer.tell() > _BLOCK:
+            yield buffer.getvalue()
+            buffer.seek(0)
+            buffer.truncate()
+    yield buffer.getvalue()
 
 
 def _cell(value: object) -> object:

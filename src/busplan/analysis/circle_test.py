@@ -1,0 +1,311 @@
+"""The circle test: is the circle still round at this period, and does the bus carry it at all?
+
+The bus comes first. A cycle that does not fit its period delivers no set-points, so there is nothing to simulate. Then
+stability: a host loop's delay makes the circle better while it eats the margin, so no circle passes without one.
+"""
+
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import NamedTuple
+
+from busplan.analysis.capacity import CapacityFigures, Limit, figures
+from busplan.analysis.contributions import Contribution, Setup, contributions, sources
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.margins import LoopMargins
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.path import circle_path
+from busplan.timing import TimingModelName
+
+Progress = Callable[[int, int], None]
+"""Called with the steps done and the steps to do."""
+
+
+class Failure(NamedTuple):
+    """One thing that the test does not hold: a tolerance by its key, a limit of the bus, or stability."""
+
+    name: str
+    value: float | None
+    limit: float | None
+
+
+class CircleFigures(NamedTuple):
+    """The circle test at one period. What was not simulated is None."""
+
+    period_us: float
+    feed_mm_per_min: float
+    radius_mm: float
+    duration_s: float
+    setpoints: int
+    steps: int
+    step_us: float
+    loop: str
+    delay_us: float
+    """Bus delay inside the loop: the capacity result's required_us when the loop is on the host, otherwise 0."""
+    timing_model: TimingModelName
+    """Timing model that decided whether the bus fits."""
+    bus_fits: bool
+    required_us: float
+    available_us: float
+    servo_grade: str
+    """How the servo values are known: measured, calibrated or assumed."""
+    stable: bool | None
+    phase_margin_deg: float | None
+    """Of the axis with the smaller one; None also where the loop gain never reaches one."""
+    gain_margin_db: float | None
+    """Of the axis with the smaller one; None also where no gain makes the loop unstable."""
+    crossover_hz: float | None
+    mean_contour_error_mm: float | None
+    max_contour_error_mm: float | None
+    radial_deviation_min_mm: float | None
+    radial_deviation_max_mm: float | None
+    circular_deviation_mm: float | None
+    radius_deviation_mm: float | None
+    centre_offset_mm: tuple[float, float] | None
+    passed: bool
+    failures: tuple[Failure, ...]
+    contributions: tuple[Contribution, ...] | None
+    """Ranked, largest first; None where they were not asked for and nothing failed that they could explain."""
+
+
+class CircleTest(NamedTuple):
+    """Answer of `circle_test`: the profile as it was tested, and the figures and simulation of each period."""
+
+    profile: Profile
+    results: tuple[CircleFigures, ...]
+    runs: tuple[CircleRun | None, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every period holds every tolerance."""
+        return all(result.passed for result in self.results)
+
+
+def circle_test(
+    profile: Profile,
+    *,
+    periods_us: Sequence[float] | None = None,
+    with_contributions: bool = False,
+    progress: Progress | None = None,
+) -> CircleTest:
+    """Run the circle test of a profile.
+
+    Parameters
+    ----------
+    profile
+        The network, its servo and its circle.
+    periods_us
+        Communication periods T_s [us]; without them the profile's own.
+    with_contributions
+        Run again without each error source in turn; a contour tolerance that fails asks for it by itself.
+    progress
+        Called now and then with the steps simulated so far and those known to be needed.
+
+    Returns
+    -------
+    CircleTest
+        One result for each period.
+
+    Raises
+    ------
+    BusplanError
+        The period is no multiple of the step, the drive cannot reach the feed, or the circle is too short for its
+        ramps.
+
+    References
+    ----------
+    ISO 230-4 for the measures; the paper's section IV-B for the test.
+    """
+    periods = [profile.cycle.period_us] if periods_us is None else periods_us
+    variants = [
+        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
+    ]
+    counter = _Counter(progress)
+    # Everything is set up before anything is simulated: what is wrong with the last period is said at once.
+    setups = [setup(variant) for variant in variants]
+    for variant, one in zip(variants, setups, strict=True):
+        counter.expect(one, runs=1 + (len(sources(one)) if with_contributions else 0), wanted=bus(variant).fits)
+    pairs = [
+        _test(variant, one, with_contributions=with_contributions, counter=counter)
+        for variant, one in zip(variants, setups, strict=True)
+    ]
+    return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
+
+
+def bus(profile: Profile) -> CapacityFigures:
+    """Capacity under the timing model that decides."""
+    return figures(profile, model=profile.bus.timing_model)
+
+
+def setup(profile: Profile) -> Setup:
+    """What a profile's circle test simulates.
+
+    Raises
+    ------
+    BusplanError
+        As `circle_test`.
+    """
+    circle, servo, delivery, mechanics = profile.circle, profile.servo, profile.delivery, profile.mechanics
+    required_us = bus(profile).required_us
+    return Setup(
+        path=circle_path(
+            circle.radius_mm,
+            feed_mm_per_min=circle.feed_mm_per_min,
+            period_us=profile.cycle.period_us,
+            ramp_periods=circle.ramp_periods,
+            direction=circle.direction,
+        ),
+        x=Axis(**servo.axis_keys("x")),
+        y=Axis(**servo.axis_keys("y")),
+        timing=LoopTiming(
+            period_us=profile.cycle.period_us,
+            step_us=servo.step_us,
+            loop=servo.loop,
+            interpolation=servo.interpolation,
+            # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
+            delay_us=min(required_us, profile.cycle.period_us) if servo.loop == "host" else 0.0,
+        ),
+        delivery=Delivery(**delivery.model_dump()),
+        mechanics=Mechanics(**mechanics.model_dump()),
+    )
+
+
+class _Counter:
+    """Adds the steps of many runs up to one progress."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._expected = 0
+        self._done = 0
+
+    def expect(self, one: Setup, *, runs: int, wanted: bool) -> None:
+        self._expected += 2 * one.steps * runs * wanted
+
+    def run(self, one: Setup) -> CircleRun:
+        before = self._done
+
+        def report(done: int, _total: int) -> None:
+            self._done = before + done
+            if self._progress is not None:
+                self._progress(self._done, max(self._expected, self._done))
+
+        run = simulate_circle(
+            one.path,
+            x=one.x,
+            y=one.y,
+            timing=one.timing,
+            delivery=one.delivery,
+            mechanics=one.mechanics,
+            progress=report,
+        )
+        self._done = before + 2 * one.steps
+        return run
+
+
+def _test(
+    profile: Profile, one: Setup, *, with_contributions: bool, counter: _Counter
+) -> tuple[CircleFigures, CircleRun | None]:
+    capacity = bus(profile)
+    if not capacity.fits:
+        return _figures(profile, one, capacity, None), None
+    run = counter.run(one)
+    result = _figures(profile, one, capacity, run)
+    explained = {"mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm"}
+    if with_contributions or explained & {failure.name for failure in result.failures}:
+        if not with_contributions:
+            counter.expect(one, runs=len(sources(one)), wanted=True)
+        ranked = contributions(one, run.contour.max_contour_error_mm, simulate=counter.run)
+        result = result._replace(contributions=ranked)
+    return result, run
+
+
+def _figures(
+    profile: Profile,
+    one: Setup,
+    capacity: CapacityFigures,
+    run: CircleRun | None,
+) -> CircleFigures:
+    margins = _smaller(run) if run else None
+    contour = run.contour if run else None
+    failures = _bus_failures(profile, capacity) if run is None else _failures(profile, run)
+    return CircleFigures(
+        period_us=profile.cycle.period_us,
+        feed_mm_per_min=profile.circle.feed_mm_per_min,
+        radius_mm=profile.circle.radius_mm,
+        duration_s=one.path.duration_us / 1e6,
+        setpoints=one.path.setpoints,
+        steps=one.steps,
+        step_us=one.timing.step_us,
+        loop=one.timing.loop,
+        delay_us=one.timing.delay_us,
+        timing_model=capacity.timing_model,
+        bus_fits=capacity.fits,
+        required_us=capacity.required_us,
+        available_us=capacity.available_us,
+        servo_grade=profile.servo.grade,
+        stable=margins.stable if margins else None,
+        phase_margin_deg=margins.phase_margin_deg if margins else None,
+        gain_margin_db=margins.gain_margin_db if margins else None,
+        crossover_hz=margins.crossover_hz if margins else None,
+        mean_contour_error_mm=contour.mean_contour_error_mm if contour else None,
+        max_contour_error_mm=contour.max_contour_error_mm if contour else None,
+        radial_deviation_min_mm=contour.radial_deviation_min_mm if contour else None,
+        radial_deviation_max_mm=contour.radial_deviation_max_mm if contour else None,
+        circular_deviation_mm=contour.circular_deviation_mm if contour else None,
+        radius_deviation_mm=contour.radius_deviation_mm if contour else None,
+        centre_offset_mm=contour.centre_offset_mm if contour else None,
+        passed=not failures,
+        failures=failures,
+        contributions=None,
+    )
+
+
+def _smaller(run: CircleRun) -> LoopMargins:
+    """Margins of the axis that has less of them: an unstable one, else the smaller phase margin."""
+
+    def rank(margins: LoopMargins) -> tuple[bool, float, float]:
+        phase, gain = margins.phase_margin_deg, margins.gain_margin_db
+        return margins.stable, inf if phase is None else phase, inf if gain is None else gain
+
+    return min(run.margins_x, run.margins_y, key=rank)
+
+
+def _bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
+    """The limits of the bus that the cycle breaks."""
+    payload, bus_section = profile.payload, profile.bus
+    broken: dict[Limit, Failure] = {
+        "time": Failure("required_us", capacity.required_us, capacity.available_us),
+        "hops": Failure("hops", capacity.hops, MAX_HOPS),
+        "nodes": Failure("nodes", capacity.nodes, MAX_NODES),
+        "payload": Failure(
+            "payload_bytes", max(payload.read_bytes, payload.write_bytes), bus_section.max_payload_bytes
+        ),
+    }
+    return tuple(broken[limit] for limit in capacity.exceeded)
+
+
+def _failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
+    """What a simulated circle does not hold: stability first, then margins, then the contour."""
+    margins, contour, tolerance = (run.margins_x, run.margins_y), run.contour, profile.tolerance
+    if not all(one.stable for one in margins):
+        return (Failure("stability", None, None),)
+    phase = [one.phase_margin_deg for one in margins if one.phase_margin_deg is not None]
+    gain = [one.gain_margin_db for one in margins if one.gain_margin_db is not None]
+    low = (
+        ("min_phase_margin_deg", min(phase, default=inf), tolerance.min_phase_margin_deg),
+        ("min_gain_margin_db", min(gain, default=inf), tolerance.min_gain_margin_db),
+    )
+    high = (
+        ("mean_contour_error_mm", contour.mean_contour_error_mm, tolerance.mean_contour_error_mm),
+        ("max_contour_error_mm", contour.max_contour_error_mm, tolerance.max_contour_error_mm),
+        ("circular_deviation_mm", contour.circular_deviation_mm, tolerance.circular_deviation_mm),
+    )
+    return tuple(
+        Failure(name, value, limit)
+        for name, value, limit in (
+            *((name, value, limit) for name, value, limit in low if value < limit),
+            *((name, value, limit) for name, value, limit in high if limit is not None and value > limit),
+        )
+    )

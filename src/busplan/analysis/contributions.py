@@ -1,0 +1,98 @@
+"""Which error source makes the circle less round: each is removed in turn, as a ballbar report ranks them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from busplan.servo.circle import CircleRun
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.path import CirclePath
+
+
+class Setup(NamedTuple):
+    """All that one simulation of the circle test is made of."""
+
+    path: CirclePath
+    x: Axis
+    y: Axis
+    timing: LoopTiming
+    delivery: Delivery
+    mechanics: Mechanics
+
+    @property
+    def steps(self) -> int:
+        """Simulated steps of each axis [1]."""
+        return self.path.setpoints * self.timing.steps_per_period
+
+    def with_axes(self, **changes: Any) -> "Setup":
+        """The same with other parameters on both axes."""
+        return self._replace(x=replace(self.x, **changes), y=replace(self.y, **changes))
+
+
+class Contribution(NamedTuple):
+    """One error source, and the circle without it."""
+
+    source: str
+    max_contour_error_mm: float
+    """Largest contour error when this source is removed [mm]."""
+    removed_mm: float
+    """What its removal takes away from the largest contour error [mm]; negative where it hides another source."""
+
+
+Removal = Callable[[Setup], Setup]
+
+_REMOVALS: Mapping[str, Removal] = {
+    "velocity_feedforward": lambda one: one.with_axes(velocity_feedforward=1.0),
+    "drive_lag": lambda one: one.with_axes(drive_lag_us=0.0),
+    "drive_offset": lambda one: one.with_axes(drive_offset_mm_s=0.0),
+    "dac_resolution": lambda one: one.with_axes(dac_bits=0),
+    "encoder_resolution": lambda one: one.with_axes(encoder_resolution_mm=0.0),
+    "reversal": lambda one: one.with_axes(reversal_mm_s=0.0),
+    "axis_mismatch": lambda one: one._replace(y=one.x),
+    "hold": lambda one: one._replace(timing=replace(one.timing, interpolation="linear")),
+    "bus_delay": lambda one: one._replace(timing=replace(one.timing, delay_us=0.0)),
+    "jitter": lambda one: one._replace(delivery=replace(one.delivery, jitter_us=0.0)),
+    "skew": lambda one: one._replace(delivery=replace(one.delivery, skew_us=0.0)),
+    "loss": lambda one: one._replace(delivery=replace(one.delivery, loss_probability=0.0)),
+    "backlash": lambda one: one._replace(mechanics=replace(one.mechanics, backlash_mm=0.0)),
+    "scale": lambda one: one._replace(mechanics=replace(one.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
+    "squareness": lambda one: one._replace(mechanics=replace(one.mechanics, squareness_um_per_m=0.0)),
+}
+"""How each source is taken out. A feed-forward of 1 stands for none of its own error: the target's velocity itself."""
+
+
+def sources(one: Setup) -> dict[str, Setup]:
+    """The sources that a setup has, each with the setup that lacks it."""
+    without = {source: remove(one) for source, remove in _REMOVALS.items()}
+    if one.timing.loop == "host":
+        # The host's loop holds its command between periods: a line between set-points has no meaning there.
+        del without["hold"]
+    return {source: setup for source, setup in without.items() if setup != one}
+
+
+def contributions(
+    one: Setup, max_contour_error_mm: float, *, simulate: Callable[[Setup], CircleRun]
+) -> tuple[Contribution, ...]:
+    """Rank the error sources of a circle test.
+
+    Parameters
+    ----------
+    one
+        The test.
+    max_contour_error_mm
+        Its largest contour error [mm].
+    simulate
+        Runs a setup.
+
+    Returns
+    -------
+    tuple
+        What each source takes, largest first.
+
+    Notes
+    -----
+    Sources act together, so what they take one by one need not add up to the whole.
+    """
+    without = {source: simulate(setup).contour.max_contour_error_mm for source, setup in sources(one).items()}
+    ranked = (Contribution(source, left_mm, max_contour_error_mm - left_mm) for source, left_mm in without.items())
+    return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))

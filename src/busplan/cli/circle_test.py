@@ -1,0 +1,143 @@
+"""`busplan circle-test`."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, BinaryIO
+
+import typer
+
+from busplan.cli.options import FormatOption, ProfileArgument, parse_time_us
+from busplan.cli.output import PLAN_FAILS, emit, emit_text, new_file, say
+from busplan.cli.progress import progress_bar
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.analysis.circle_test import CircleTest
+
+_OPTIONS = {"circle.feed_mm_per_min": "--feed", "circle.radius_mm": "--radius", "delivery.seed": "--seed"}
+
+
+def circle_test_command(
+    profile: ProfileArgument,
+    period: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--period",
+            metavar="TIME",
+            help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
+            "May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+    feed: Annotated[
+        float | None,
+        typer.Option("--feed", metavar="MM_PER_MIN", help="Speed along the circle, instead of the profile's [mm/min]."),
+    ] = None,
+    radius: Annotated[
+        float | None,
+        typer.Option("--radius", metavar="MM", help="Radius of the circle, instead of the profile's [mm]."),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", metavar="N", help="Seed of jitter and lost set-points, instead of the profile's."),
+    ] = None,
+    contributions: Annotated[
+        bool, typer.Option("--contributions", help="Remove each error source in turn and rank them.")
+    ] = False,
+    trace: Annotated[
+        Path | None,
+        typer.Option("--trace", metavar="FILE.csv", help="Write time, command, actual position and contour error."),
+    ] = None,
+    every: Annotated[
+        int | None,
+        typer.Option("--every", metavar="N", help="Write every n-th step to --trace.  [default: 10]"),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Draw the magnified polar error and the error over time into FILE.png, FILE.svg or FILE.pdf; "
+            "needs the extra plot.",
+        ),
+    ] = None,
+    format_: FormatOption = "table",
+) -> None:
+    """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
+
+    First the bus: a cycle that does not fit its period fails the test before any simulation. Then stability: a loop
+    without its phase and gain margin fails, however round its circle. Then the tolerances of the profile. Errors are
+    in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4. Exits 0 when every
+    tolerance holds and 1 when one does not.
+
+    Example: busplan circle-test paper-4ms --contributions --plot circle.png
+    """
+    if every is not None and trace is None:
+        raise BusplanError("--every: goes with --trace FILE.csv")
+    if every is not None and every < 1:
+        raise BusplanError(f"--every {every}: must be 1 or more")
+    plot_format = None if plot is None else _plot_format(plot)
+    from busplan.analysis.circle_test import circle_test
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    asked = {"circle.feed_mm_per_min": feed, "circle.radius_mm": radius, "delivery.seed": seed}
+    changes: dict[str, object] = {key: value for key, value in asked.items() if value is not None}
+    plan = override(load(profile).profile, changes, origin=_OPTIONS)
+    with ExitStack() as files:
+        # Opened before the simulation: a path that cannot be written is said at once.
+        trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
+        plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
+        with progress_bar("circle test") as progress:
+            test = circle_test(
+                plan,
+                periods_us=[parse_time_us(text, option="--period") for text in period] if period else None,
+                with_contributions=contributions,
+                progress=progress,
+            )
+        if trace_file is not None:
+            _write_trace(test, trace_file, every=every or 10)
+        if plot_file is not None and plot_format is not None:
+            from busplan.report.plot import circle_figure
+
+            plot_file.write(circle_figure(test, file_format=plot_format))
+    for path in (trace, plot):
+        if path is not None:
+            say(f"wrote {path}")
+    _emit(test, format_=format_, contributions=contributions)
+    if not test.passed:
+        raise typer.Exit(PLAN_FAILS)
+
+
+def _plot_format(path: Path) -> str:
+    from busplan.report.plot import PLOT_FORMATS, require_matplotlib
+
+    file_format = path.suffix.removeprefix(".").lower()
+    if file_format not in PLOT_FORMATS:
+        raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
+    require_matplotlib()
+    return file_format
+
+
+def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
+    from busplan.report.documents import TRACE_COLUMNS, trace_rows
+    from busplan.report.text import csv_blocks
+
+    file.writelines(block.encode() for block in csv_blocks(trace_rows(test, every=every), columns=TRACE_COLUMNS))
+
+
+def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
+    if format_ == "table":
+        from busplan.analysis.contour_profile import contour_profile
+        from busplan.report.circle_test import PLOT_SECTORS, circle_lines
+
+        profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in test.runs]
+        emit(circle_lines(test, profiles, with_contributions=contributions))
+        return
+    from busplan.report import documents, text
+
+    emit_text(
+        text.to_json(documents.circle_document(test, with_contributions=contributions))
+        if format_ == "json"
+        else text.to_csv(documents.circle_rows(test, with_contributions=contributions))
+    )

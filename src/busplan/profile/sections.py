@@ -1,0 +1,33 @@
+"""What all sections of a profile share: strictness, ranges, and errors in our own words."""
+
+from typing import Annotated, Final, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+# Bounds that no machine comes near; they keep every product of two quantities finite.
+MAX_TIME_US: Final = 1e9
+MAX_COUNT: Final = 1_000_000
+
+TimeUs = Annotated[float, Field(ge=0, le=MAX_TIME_US, allow_inf_nan=False)]
+Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
+Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
+
+
+class Problem(NamedTuple):
+    """One thing that is wrong with a profile."""
+
+    message: str
+    key: str | None = None
+    """Dotted key it belongs to, where that is not the validator's own."""
+
+
+def refused(*problems: Problem) -> PydanticCustomError:
+    """Make an error whose words are ours; one validator can report several problems, each with its own key."""
+    return PydanticCustomError("busplan", "{text}", {"text": problems[0].message, "problems": problems})
+
+
+class Section(BaseModel):
+    """What all sections of a profile share."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)

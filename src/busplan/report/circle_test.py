@@ -1,0 +1,153 @@
+"""`busplan circle-test` for people."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+from busplan.analysis.circle_test import CircleFigures, CircleTest, Failure
+from busplan.analysis.contour_profile import ContourProfile
+from busplan.report.lines import BLANK, Line, table, us
+from busplan.report.words import period
+
+PLOT_SECTORS: Final = 72
+"""Columns of the plot in the terminal: one for every 5 degrees."""
+_PLOT_ROWS: Final = 9
+_SHOWN: Final = 1e-9
+"""Largest error, in mm, that still counts as none in a plot."""
+
+_FAILURES: Final[dict[str, str]] = {
+    "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
+    "hops": "{value:.0f} hops are over the {limit:.0f} of one bus",
+    "nodes": "{value:.0f} nodes are over the {limit:.0f} of one bus",
+    "payload_bytes": "a payload of {value:.0f} bytes is over the limit of {limit:.0f} bytes",
+    "stability": "the position loop is unstable",
+    "min_phase_margin_deg": "the phase margin of {value:.2f} deg is {under:.2f} deg under its {limit:g} deg",
+    "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
+    "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+}
+
+
+def circle_lines(
+    test: CircleTest, profiles: Sequence[ContourProfile | None], *, with_contributions: bool
+) -> list[Line]:
+    """Verdict of each period, one row of figures a period, the ranked sources and a plot of the error."""
+    lines: list[Line] = []
+    for result in test.results:
+        lines.extend(_verdict(test.profile.name, result))
+    if any(result.stable is not None for result in test.results):
+        # Said wherever a contour figure is shown: what it rests on.
+        lines.append(Line(f"The servo values behind these figures are {test.results[0].servo_grade}."))
+    lines.extend((BLANK, *_figures(test.results)))
+    for result, profile in zip(test.results, profiles, strict=True):
+        title = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min"
+        if with_contributions and result.contributions:
+            lines.extend((BLANK, *_contributions(title, result)))
+        if profile is not None:
+            lines.extend((BLANK, *_plot(title, profile)))
+    return lines
+
+
+def failure_text(failure: Failure) -> str:
+    """Say what does not hold, and by how much."""
+    value, limit = failure.value or 0.0, failure.limit or 0.0
+    return _FAILURES[failure.name].format(
+        value=value,
+        limit=limit,
+        under=limit - value,
+        um=value * 1e3,
+        limit_um=limit * 1e3,
+        over_um=(value - limit) * 1e3,
+    )
+
+
+def _verdict(name: str, result: CircleFigures) -> Iterator[Line]:
+    subject = f"{name} at {period(result.period_us)} and {result.feed_mm_per_min:g} mm/min"
+    if result.passed:
+        yield Line(f"{subject}: the circle holds every tolerance.", "good")
+        return
+    reasons = ", and ".join(failure_text(failure) for failure in result.failures)
+    yield Line(f"{subject}: FAILED, {reasons}.", "bad")
+    worst = result.contributions[0] if result.contributions else None
+    if worst is not None and worst.removed_mm > 0:
+        yield Line(
+            f"Attack {worst.source} first: without it the largest contour error is "
+            f"{_um(worst.max_contour_error_mm)} um, {_um(worst.removed_mm)} um less."
+        )
+
+
+def _um(value_mm: float | None) -> str:
+    return "-" if value_mm is None else us(value_mm * 1e3)
+
+
+def _two(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+_COLUMNS: Final[tuple[tuple[str, Callable[[CircleFigures], str]], ...]] = (
+    ("period", lambda one: period(one.period_us)),
+    ("feed\nmm/min", lambda one: f"{one.feed_mm_per_min:g}"),
+    ("duration\ns", lambda one: f"{one.duration_s:.3f}"),
+    ("set-\npoints", lambda one: str(one.setpoints)),
+    ("mean\num", lambda one: _um(one.mean_contour_error_mm)),
+    ("max\num", lambda one: _um(one.max_contour_error_mm)),
+    ("F_min\num", lambda one: _um(one.radial_deviation_min_mm)),
+    ("F_max\num", lambda one: _um(one.radial_deviation_max_mm)),
+    ("G\num", lambda one: _um(one.circular_deviation_mm)),
+    ("phase\ndeg", lambda one: _two(one.phase_margin_deg)),
+    ("gain\ndB", lambda one: _two(one.gain_margin_db)),
+    ("passed", lambda one: "yes" if one.passed else "no"),
+)
+
+
+def _figures(results: Sequence[CircleFigures]) -> list[Line]:
+    return table(
+        [heading for heading, _ in _COLUMNS],
+        ([write(result) for _, write in _COLUMNS] for result in results),
+        left=1,
+    )
+
+
+def _contributions(title: str, result: CircleFigures) -> list[Line]:
+    return [
+        Line(f"Error sources at {title}, each removed in turn", "heading"),
+        *table(
+            ["source", "max without it, um", "takes, um"],
+            (
+                [one.source, _um(one.max_contour_error_mm), f"{one.removed_mm * 1e3:+.3f}"]
+                for one in result.contributions or ()
+            ),
+            left=1,
+        ),
+    ]
+
+
+def _plot(title: str, profile: ContourProfile) -> list[Line]:
+    """Contour error over the angle, in characters that every terminal has."""
+    lows = [value for value in profile.low_mm if value is not None]
+    highs = [value for value in profile.high_mm if value is not None]
+    bottom, top = min((*lows, 0.0)), max((*highs, 0.0))
+    if top - bottom < _SHOWN:
+        return [Line(f"Contour error at {title}: none.", "heading")]
+    height = (top - bottom) / _PLOT_ROWS
+    lines = [Line(f"Contour error over the angle at {title}, um", "heading")]
+    for number in range(_PLOT_ROWS):
+        upper = top - number * height
+        lower = upper - height
+        label = {0: top, _PLOT_ROWS - 1: bottom}.get(number)
+        zero = lower <= 0.0 < upper or (upper == 0.0 == top and number == 0)
+        cells = "".join(
+            _cell(low, high, lower=lower, upper=upper, zero=zero)
+            for low, high in zip(profile.low_mm, profile.high_mm, strict=True)
+        )
+        text = f"{label * 1e3:+.1f}" if label is not None else "0" if zero else ""
+        lines.append(Line(f"{text:>9} |{cells}".rstrip(), "table"))
+    axis = "".join(f"{angle:<{PLOT_SECTORS // 4}}" for angle in (0, 90, 180, 270)).rstrip()
+    lines.append(Line(f"{'deg':>9}  {axis}", "table"))
+    return lines
+
+
+def _cell(low: float | None, high: float | None, *, lower: float, upper: float, zero: bool) -> str:
+    if low is not None and high is not None and low <= upper and high >= lower:
+        return "#"
+    return "-" if zero else " "

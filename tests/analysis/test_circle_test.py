@@ -1,0 +1,254 @@
+"""The circle test of a profile: bus first, then stability, then tolerances, and what to attack."""
+
+from collections.abc import Callable
+
+import pytest
+
+from busplan.analysis.capacity import figures
+from busplan.analysis.circle_test import CircleFigures, circle_test
+from busplan.analysis.contour_profile import contour_profile
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.shipped import load, shipped_names
+from busplan.profile.toml import override
+
+Make = Callable[..., Profile]
+
+# Section IV-B: mean and largest contour error in mm, execution time in s.
+PUBLISHED = {"paper-4ms": (0.0036, 0.0187, 48.656), "paper-1ms": (0.0049, 0.0219, 12.164)}
+
+
+@pytest.fixture
+def small(make: Make) -> Profile:
+    """A quick circle: 25 mm at 3 m/min, a P loop on an ideal drive."""
+    return make(
+        circle={"radius_mm": 25.0, "feed_mm_per_min": 3000.0, "ramp_periods": 20},
+        cycle__period_us=2000.0,
+        servo={"velocity_feedforward": 0.0, "position_gain_per_s": 50.0},
+    )
+
+
+def only(profile: Profile, **options: bool) -> CircleFigures:
+    return circle_test(profile, **options).results[0]  # type: ignore[arg-type]  # the one option is a bool
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_papers_test(name: str) -> None:
+    mean_mm, max_mm, duration_s = PUBLISHED[name]
+    result = only(load(name).profile)
+    assert result.duration_s == duration_s
+    assert result.setpoints == 12164
+    assert result.mean_contour_error_mm == pytest.approx(mean_mm, rel=0.02)
+    assert result.max_contour_error_mm == pytest.approx(max_mm, rel=0.02)
+    assert result.servo_grade == "calibrated"
+    assert result.passed
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_every_shipped_profile_runs_and_passes(name: str) -> None:
+    assert only(load(name).profile).passed
+
+
+def test_every_shipped_servo_is_the_calibrated_one_or_the_defaults() -> None:
+    servos = [load(name).profile.servo for name in shipped_names()]
+    calibrated = [servo for servo in servos if servo.grade == "calibrated"]
+    assert len(calibrated) == 4
+    assert len(set(map(repr, calibrated))) == 1
+
+
+def test_steady_radius_of_two_p_loops_is_the_closed_form(small: Profile) -> None:
+    result = only(small)
+    w_over_kp = 3000 / 60 / 25 / 50
+    assert result.radius_deviation_mm == pytest.approx(25 * (1 / (1 + w_over_kp**2) ** 0.5 - 1), rel=0.01)
+    assert result.failures == ()
+
+
+def test_a_cycle_that_does_not_fit_fails_before_any_simulation(small: Profile) -> None:
+    test = circle_test(override(small, {"bus.nodes": 16, "cycle.period_us": 500}))
+    result = test.results[0]
+    capacity = figures(override(small, {"bus.nodes": 16, "cycle.period_us": 500}), model="standard")
+    assert test.runs == (None,)
+    assert (result.bus_fits, result.passed, result.stable) == (False, False, None)
+    assert [(one.name, one.value, one.limit) for one in result.failures] == [
+        ("required_us", capacity.required_us, capacity.available_us)
+    ]
+    assert (result.max_contour_error_mm, result.phase_margin_deg, result.centre_offset_mm) == (None, None, None)
+    assert result.setpoints > 0
+
+
+def test_the_deciding_model_decides_whether_there_is_a_circle(small: Profile) -> None:
+    # Between what the paper's clock and the standard's clock need.
+    tight = override(small, {"cycle.period_us": 500, "servo.step_us": 100})
+    assert not only(tight).bus_fits
+    assert only(override(tight, {"bus.timing_model": "paper"})).bus_fits
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"bus.nodes": 63, "bus.max_hops": 2, "cycle.period_us": 100_000}, "nodes"),
+        ({"bus.nodes": 17, "cycle.period_us": 100_000}, "hops"),
+        ({"payload.write_bytes": 3000, "cycle.period_us": 100_000}, "payload_bytes"),
+    ],
+)
+def test_limits_of_the_standard_fail_by_name(small: Profile, changes: dict[str, object], name: str) -> None:
+    result = only(override(small, {**changes, "circle.feed_mm_per_min": 10, "circle.ramp_periods": 1}))
+    assert [one.name for one in result.failures] == [name]
+
+
+def test_an_unstable_loop_fails_whatever_its_circle(small: Profile) -> None:
+    # A P loop on an ideal drive is unstable from kp T = 2 on.
+    unstable = override(small, {"servo.position_gain_per_s": 25_000})
+    result = only(unstable)
+    assert (result.stable, result.passed) == (False, False)
+    assert [one.name for one in result.failures] == ["stability"]
+    assert result.phase_margin_deg is result.gain_margin_db is None
+
+
+def test_a_loop_with_too_little_margin_fails_however_round_its_circle(small: Profile) -> None:
+    result = only(override(small, {"servo.position_gain_per_s": 15_000, "servo.velocity_feedforward": 1.0}))
+    assert result.stable
+    assert {one.name for one in result.failures} >= {"min_gain_margin_db"}
+    assert result.max_contour_error_mm is not None
+    assert result.max_contour_error_mm < 1e-3
+
+
+def test_the_host_loop_has_the_bus_delay_inside(small: Profile) -> None:
+    node, host = (only(override(small, {"servo.loop": loop})) for loop in ("node", "host"))
+    assert host.delay_us == host.required_us
+    assert node.delay_us == 0.0
+    assert node.phase_margin_deg is not None
+    assert host.phase_margin_deg is not None
+    assert host.phase_margin_deg < node.phase_margin_deg
+    # The delay makes the circle better while it eats the margin.
+    assert abs(host.radius_deviation_mm or 0.0) < abs(node.radius_deviation_mm or 0.0)
+
+
+def test_more_nodes_on_the_bus_cost_the_host_loop_its_margin(small: Profile) -> None:
+    host = override(small, {"servo.loop": "host"})
+    few, many = (only(override(host, {"bus.nodes": nodes})).phase_margin_deg for nodes in (1, 5))
+    assert few is not None
+    assert many is not None
+    assert many < few
+
+
+def test_matched_axes_do_not_see_a_delay_outside_the_loop(small: Profile) -> None:
+    # A skew of the two axes does show; the same skew of both would not.
+    skewed = override(small, {"delivery.skew_us": 50})
+    assert (only(skewed).circular_deviation_mm or 0.0) > (only(small).circular_deviation_mm or 0.0) + 1e-4
+
+
+def test_tolerances_fail_by_name_value_and_limit(small: Profile) -> None:
+    tight = override(
+        small,
+        {
+            "tolerance.mean_contour_error_mm": 1e-6,
+            "tolerance.max_contour_error_mm": 1e-6,
+            "tolerance.circular_deviation_mm": 1e-9,
+            "tolerance.min_phase_margin_deg": 179.0,
+        },
+    )
+    result = only(tight)
+    assert [one.name for one in result.failures] == [
+        "min_phase_margin_deg",
+        "mean_contour_error_mm",
+        "max_contour_error_mm",
+        "circular_deviation_mm",
+    ]
+    for one in result.failures[1:]:
+        assert one.value == getattr(result, one.name)
+        assert one.limit == getattr(tight.tolerance, one.name)
+    # A contour that fails asks for its sources by itself.
+    assert result.contributions is not None
+
+
+def test_a_tolerance_of_exactly_the_error_holds(small: Profile) -> None:
+    error_mm = only(small).max_contour_error_mm
+    assert only(override(small, {"tolerance.max_contour_error_mm": error_mm})).passed
+
+
+def test_contributions_find_the_one_source(small: Profile) -> None:
+    ideal = override(small, {"servo.velocity_feedforward": 1.0})
+    cases: tuple[tuple[dict[str, object], str], ...] = (
+        ({"mechanics.backlash_mm": 0.01}, "backlash"),
+        ({"mechanics.squareness_um_per_m": 200}, "squareness"),
+        ({"mechanics.scale_x_ppm": 200}, "scale"),
+        ({"servo.y.drive_offset_mm_s": 0.5}, "drive_offset"),
+        ({"servo.interpolation": "hold"}, "hold"),
+        ({"delivery.skew_us": 100}, "skew"),
+        ({"delivery.loss_probability": 0.1}, "loss"),
+    )
+    for changes, source in cases:
+        result = only(override(ideal, changes), with_contributions=True)
+        assert result.contributions is not None
+        first = result.contributions[0]
+        assert first.source == source, changes
+        assert first.removed_mm == pytest.approx((result.max_contour_error_mm or 0.0) - first.max_contour_error_mm)
+        assert first.removed_mm > 0
+
+
+def test_contributions_are_ranked_and_only_of_sources_that_are_there(small: Profile) -> None:
+    rough = override(
+        small, {"servo.drive_lag_us": 3000, "servo.drive_offset_mm_s": 0.3, "servo.y.position_gain_per_s": 45.0}
+    )
+    result = only(rough, with_contributions=True)
+    assert result.contributions is not None
+    removed = [one.removed_mm for one in result.contributions]
+    assert removed == sorted(removed, reverse=True)
+    assert {one.source for one in result.contributions} == {
+        "velocity_feedforward",
+        "drive_lag",
+        "drive_offset",
+        "axis_mismatch",
+    }
+    assert only(override(small, {"servo.velocity_feedforward": 1.0}), with_contributions=True).contributions == ()
+
+
+def test_the_seed_decides_what_is_lost(small: Profile) -> None:
+    lossy = override(small, {"delivery.loss_probability": 0.05})
+    one, again, other = (only(override(lossy, {"delivery.seed": seed})) for seed in (1, 1, 2))
+    assert one == again
+    assert one.max_contour_error_mm != other.max_contour_error_mm
+
+
+def test_a_row_a_period(small: Profile) -> None:
+    test = circle_test(small, periods_us=[2000.0, 4000.0])
+    assert [result.period_us for result in test.results] == [2000.0, 4000.0]
+    assert [result.steps for result in test.results] == [run.steps if run else 0 for run in test.runs]
+    assert test.passed
+
+
+def test_progress_never_runs_back_and_ends_at_its_total(small: Profile) -> None:
+    seen: list[tuple[int, int]] = []
+    circle_test(
+        override(small, {"servo.drive_offset_mm_s": 0.1}),
+        with_contributions=True,
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert seen == sorted(seen)
+    assert seen[-1][0] == seen[-1][1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"servo.step_us": 3000}, "step_us = 3000"),
+        ({"servo.step_us": 150}, "step_us = 150"),
+        ({"circle.feed_mm_per_min": 60_000}, "feed_mm_per_min = 60000"),
+        ({"servo.y.max_velocity_mm_s": 10}, "axis y reaches"),
+        ({"circle.feed_mm_per_min": 29_999, "circle.ramp_periods": 1000}, "ramp"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_by_name(small: Profile, changes: dict[str, object], message: str) -> None:
+    with pytest.raises(BusplanError, match=message):
+        circle_test(override(small, changes))
+
+
+def test_the_error_around_the_circle_lies_between_f_min_and_f_max(small: Profile) -> None:
+    test = circle_test(override(small, {"servo.reversal_mm_s": 2.0}))
+    result, run = test.results[0], test.runs[0]
+    assert run is not None
+    profile = contour_profile(run, sectors=36)
+    assert len(profile.low_mm) == len(profile.high_mm) == 36
+    assert min(value for value in profile.low_mm if value is not None) == result.radial_deviation_min_mm
+    assert max(value for value in profile.high_mm if value is not None) == result.radial_deviation_max_mm
