@@ -12,9 +12,12 @@ def main() -> None:
     """
     gc.set_threshold(500_000)
     atexit.register(gc.freeze)
-    from busplan.cli import run
+    try:
+        from busplan.cli import run
 
-    run()
+        run()
+    except KeyboardInterrupt:  # before the command line is there to catch it
+        raise SystemExit(130) from None
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from busplan.report.documents import capacity_document, capacity_rows, latency_d
 from busplan.report.latency import latency_lines
 from busplan.report.lines import table, us
 from busplan.report.text import to_csv, to_json
-from busplan.report.words import verdict_lines
+from busplan.report.words import period, verdict_lines
 
 
 @pytest.fixture
@@ -73,13 +73,31 @@ def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> Non
     assert "The paper model decides." in text
     assert "Largest term: execution, 145.733 us of 205.917 us." in text
     assert "limited by time" in text
+    assert "Cheapest way to make it fit (paper and standard): bus.gap_count = 7, which leaves " in text
+
+
+def test_models_that_agree_on_the_fit_may_carry_different_numbers(profile: Profile) -> None:
+    text = words(override(profile, {"cycle.period_us": 4000}))
+    assert "standard agrees" in text
+    assert "The bus carries 16 nodes (64 axes) by the paper model, limited by hops; 11 nodes (44 axes) by the" in text
+
+
+@pytest.mark.parametrize(
+    ("value_us", "written"), [(999.99999, "999.99999 us"), (411.8349, "411.8349 us"), (1e9, "1000 s")]
+)
+def test_periods_keep_their_digits(value_us: float, written: str) -> None:
+    assert period(value_us) == written
 
 
 def test_an_unsafe_gap_count_and_a_long_cable_are_warned_of(profile: Profile) -> None:
     text = words(override(profile, {"bus.gap_count": 5, "bus.cable_length_m": 10}))
-    assert "gap count 5 is unsafe for 2 hops; the smallest safe one is 7" in text
+    assert "gap count 5 is unsafe for 2 hops (2 nodes); the smallest safe one is 7" in text
     assert "cables of 10 m are longer than the 4.5 m" in text
-    assert "Warning" not in words(override(profile, {"bus.gap_count": 7}))
+    assert "fits, " in text
+    assert "but only with an unsafe gap count" in text
+    assert "Warning" not in words(override(profile, {"bus.gap_count": 13}))
+    # Safe for the nodes there are, and not for those the sentence before speaks of.
+    assert "unsafe for 5 hops (5 nodes); the smallest safe one is 13" in words(override(profile, {"bus.gap_count": 9}))
 
 
 @pytest.mark.parametrize(
@@ -95,12 +113,20 @@ def test_the_verdict_says_which_limit_is_broken(profile: Profile, changes: dict[
 
 
 def test_latency_warns_of_payloads_over_the_limit(profile: Profile) -> None:
-    lines = latency_lines(latency(profile, payloads_bytes=[4, 1024]), max_payload_bytes=512)
-    assert lines[-1].text == "Warning: over the speed's limit of 512 bytes: 1024."
+    slow = override(profile, {"bus.speed": "S100"})
+    lines = latency_lines(latency(slow, payloads_bytes=[4, 1024]), slow)
+    assert lines[-1].text == "Warning: over the 512 bytes of S100: 1024."
+
+
+def test_latency_warns_of_hops_and_gap_count(profile: Profile) -> None:
+    long = override(profile, {"bus.nodes": 17, "bus.gap_count": 5})
+    text = "\n".join(line.text for line in latency_lines(latency(long), long))
+    assert "17 hops are over the 16 of one bus" in text
+    assert "gap count 5 is unsafe for 17 hops (17 nodes); the smallest safe one is 46" in text
 
 
 def test_one_table_a_payload_and_one_block_a_period(profile: Profile) -> None:
-    heads = latency_lines(latency(profile, payloads_bytes=[4, 16, 32]), max_payload_bytes=2048)
+    heads = latency_lines(latency(profile, payloads_bytes=[4, 16, 32]), profile)
     assert sum(line.text.startswith("phase, us") for line in heads) == 3
     result = capacity(profile, periods_us=[1000.0, 500.0])
     blocks = capacity_lines(result, verdicts(result))

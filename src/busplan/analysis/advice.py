@@ -2,101 +2,158 @@
 
 Changes are tried from the cheapest: the gap count is one register in each node, the slice ratio is computing time
 of the host, the period is what the machine is for. Each is put into the profile and computed again: what is
-advised has been seen to work.
+advised has been seen to work, and its gap count is safe for the nodes it is advised for.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import ceil
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, broken_limits, cycle, figures
+from busplan.analysis.capacity import CapacityFigures, broken_limits, cycle, figures, largest_nodes
 from busplan.errors import BusplanError
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, safe_gap_count
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, safe_gap_count
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
 from busplan.timing import TimingModelName
 
-_RATIO_STEPS = 10_000
+Value = int | float | str
+
+_RATIO_STEPS: Final = 10_000
 """A slice ratio is advised in steps of 0.0001, a period in steps of 1 us, always rounded to the safe side."""
+MAX_ADVISED_RATIO: Final = 0.9
+"""No larger slice ratio is advised: the host computes in what communication leaves of the period. Chosen."""
 
 
 class Change(NamedTuple):
     """A change of a profile, and what it brings."""
 
-    changes: dict[str, int | float]
+    changes: dict[str, Value]
     """New value by dotted key."""
+    nodes: int
+    """Nodes that the change is made for."""
     figures: CapacityFigures
-    """The capacity after it."""
+    """The capacity after it, under the first of the models it is made for."""
 
 
-def cheapest_change(profile: Profile, *, model: TimingModelName) -> Change | None:
-    """Find the cheapest change of a profile for one timing model.
+def change_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> Change | None:
+    """Find the cheapest change after which a profile fits under every one of some timing models.
 
     Parameters
     ----------
     profile
-        The network.
-    model
-        Timing model that decides.
+        A network that does not fit under one of them, or whose gap count is unsafe.
+    models
+        Timing models; the first gives the figures of the answer.
 
     Returns
     -------
     Change
-        If the profile does not fit: what makes it fit. If it fits and time limits its nodes: what makes room for
-        more nodes. None when no single kind of change does.
+        None when no single kind of change does.
     """
-    now = figures(profile, model=model)
-    if now.fits:
-        if now.limited_by != "time":
-            return None
-        cures, nodes = {}, now.max_nodes + 1
-    else:
-        cures = structural_cures(profile)
-        nodes = int(cures.get("bus.nodes", profile.bus.nodes))
+    cures = structural_cures(profile)
+    nodes = int(cures.get("bus.nodes", profile.bus.nodes))
     try:
         cured = override(profile, dict(cures))
-        candidates = [cures, *({**cures, **cure} for cure in _time_cures(cured, nodes, model))]
     except BusplanError:  # a payload that the bus could carry and the execution table does not know
         return None
-    for changes in candidates:
-        after = _after(profile, changes, model=model)
-        if after is not None and after.max_nodes >= nodes:
-            return Change(changes, after)
+    for cure in ({}, *_time_cures(cured, nodes, models)):
+        after = _after(profile, {**cures, **cure}, models=models)
+        if after and all(one.fits for one in after):
+            return Change({**cures, **cure}, nodes, after[0])
     return None
 
 
-def structural_cures(profile: Profile) -> dict[str, int | float]:
-    """The nearest values that keep the standard's own limits, for each that a profile breaks."""
-    cures: dict[str, int | float] = {}
-    for limit in broken_limits(profile):
-        if limit == "payload":
-            most = profile.bus.max_payload_bytes
-            for key in ("read_bytes", "write_bytes"):
-                if getattr(profile.payload, key) > most:
-                    cures[f"payload.{key}"] = most
-        elif limit == "nodes":
-            cures["bus.nodes"] = int(MAX_NODES)
+def change_for_more(profile: Profile, *, model: TimingModelName) -> Change | None:
+    """Find the cheapest change after which a fitting profile's period carries more nodes.
+
+    Parameters
+    ----------
+    profile
+        A network that fits.
+    model
+        Timing model.
+
+    Returns
+    -------
+    Change
+        None when time is not what limits the nodes, or no single kind of change does.
+    """
+    now = figures(profile, model=model)
+    if now.limited_by != "time":
+        return None
+    best = _largest_by_gap_count(profile, model=model)
+    if best > now.max_nodes:
+        gap_count = safe_gap_count(profile.bus.hops(best))
+        after = _after(profile, {"bus.gap_count": gap_count}, models=[model])
+        if after and after[0].max_nodes >= best:
+            return Change({"bus.gap_count": gap_count}, best, after[0])
+    nodes = now.max_nodes + 1
+    if profile.bus.gap_count_for(nodes) < safe_gap_count(profile.bus.hops(nodes)):
+        # A gap count that is right for fewer nodes must not carry more.
+        return None
+    for cure in _time_cures(profile, nodes, [model]):
+        after = _after(profile, cure, models=[model])
+        if after and after[0].max_nodes >= nodes:
+            return Change(cure, nodes, after[0])
+    return None
+
+
+def structural_cures(profile: Profile) -> dict[str, Value]:
+    """The nearest values that keep the standard's own limits and a safe gap count, for each that a profile breaks."""
+    cures: dict[str, Value] = {}
+    bus, payload = profile.bus, profile.payload
+    limits = broken_limits(profile)
+    if "payload" in limits:
+        largest = max(payload.read_bytes, payload.write_bytes)
+        faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if largest <= limit]
+        if faster:
+            cures["bus.speed"] = faster[0]
         else:
-            cures["bus.max_hops"] = int(MAX_HOPS)
+            most = bus.max_payload_bytes
+            cures |= {f"payload.{key}": most for key in ("read_bytes", "write_bytes") if getattr(payload, key) > most}
+    if "nodes" in limits:
+        cures["bus.nodes"] = int(MAX_NODES)
+    if "hops" in limits:
+        cures["bus.max_hops"] = int(MAX_HOPS)
+    hops = int(cures.get("bus.max_hops", bus.hops(bus.nodes)))
+    if bus.cable_is_standard and bus.gap_count_for(bus.nodes) < safe_gap_count(hops):
+        cures["bus.gap_count"] = safe_gap_count(hops)
     return cures
 
 
-def _time_cures(profile: Profile, nodes: int, model: TimingModelName) -> Iterator[dict[str, int | float]]:
+def _largest_by_gap_count(profile: Profile, *, model: TimingModelName) -> int:
+    """Largest number of nodes with the gap count that is safe for just them; 0 where the table does not hold."""
+    if not profile.bus.cable_is_standard:
+        return 0
+    return largest_nodes(override(profile, {"bus.gap_count": "optimal"}), model=model)[0]
+
+
+def _time_cures(profile: Profile, nodes: int, models: Sequence[TimingModelName]) -> Iterator[dict[str, Value]]:
     """Changes that win time for that many nodes, the cheapest first."""
     bus = profile.bus
+    gap_cure: dict[str, Value] = {}
     safe = safe_gap_count(bus.hops(nodes))
-    if bus.gap_count_for(nodes) > safe:
-        yield {"bus.gap_count": safe}
-    required_us = cycle(profile, model=model, nodes=nodes).required_us
-    ratio = ceil(required_us / profile.cycle.period_us * _RATIO_STEPS) / _RATIO_STEPS
-    if ratio <= 1:
-        yield {"cycle.slice_ratio": ratio}
+    if bus.cable_is_standard and bus.gap_count_for(nodes) > safe:
+        gap_cure = {"bus.gap_count": safe}
+        yield gap_cure
+    # A wider slice alone, then with the gap count: one key is a smaller change than two.
+    for before in ({}, gap_cure) if gap_cure else ({},):
+        required_us = _required_us(override(profile, dict(before)), nodes, models)
+        ratio = ceil(required_us / profile.cycle.period_us * _RATIO_STEPS) / _RATIO_STEPS
+        if ratio <= MAX_ADVISED_RATIO:
+            yield {**before, "cycle.slice_ratio": ratio}
+    required_us = _required_us(profile, nodes, models)
     yield {"cycle.period_us": ceil(required_us / profile.cycle.slice_ratio)}
 
 
-def _after(profile: Profile, changes: dict[str, int | float], *, model: TimingModelName) -> CapacityFigures | None:
-    """Capacity after some changes; None where the profile's schema refuses them."""
+def _required_us(profile: Profile, nodes: int, models: Sequence[TimingModelName]) -> float:
+    return max(cycle(profile, model=model, nodes=nodes).required_us for model in models)
+
+
+def _after(profile: Profile, changes: dict[str, Value], *, models: Sequence[TimingModelName]) -> list[CapacityFigures]:
+    """Capacity after some changes under each model; empty where the profile's schema refuses them."""
     try:
-        return figures(override(profile, dict(changes)), model=model)
+        changed = override(profile, dict(changes))
     except BusplanError:
-        return None
+        return []
+    return [figures(changed, model=model) for model in models]

@@ -71,6 +71,8 @@ class CapacityFigures(NamedTuple):
     gap_count: int
     safe_gap_count: int
     """Smallest safe gap count for the hops."""
+    gap_count_safe: bool
+    """Whether gap_count is at least that."""
     available_us: float
     """alpha T_s."""
     required_us: float
@@ -218,6 +220,7 @@ def figures(profile: Profile, *, model: TimingModelName) -> CapacityFigures:
         hops=bus.hops(nodes),
         gap_count=bus.gap_count_for(nodes),
         safe_gap_count=safe_gap_count(bus.hops(nodes)),
+        gap_count_safe=bus.gap_count_for(nodes) >= safe_gap_count(bus.hops(nodes)),
         available_us=available_us,
         required_us=required_us,
         time_slice_us=equations.time_slice_us(period_us, slice_ratio=profile.cycle.slice_ratio, nodes=nodes),

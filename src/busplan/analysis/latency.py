@@ -74,6 +74,7 @@ def latency(
         if payloads_bytes is None
         else [(kind, size) for size in payloads_bytes for kind in TRANSACTION_KINDS]
     )
+    _require_execution(profile, [size for _, size in wanted])
     return LatencyResult(
         profile.name,
         tuple(
@@ -117,20 +118,30 @@ def phases(
 
     Raises
     ------
-    BusplanError
-        The execution time of that payload is not known.
+    ValueError
+        The execution time of that payload is not known (`latency` and the profile have checked).
     """
-    execution = profile.node.execution
-    if isinstance(execution, TableExecution) and not execution.covers(payload_bytes):
-        raise BusplanError(
-            f"payload {payload_bytes} bytes: outside the execution table of {profile.name}, "
-            f"{execution.range_bytes}; nothing is extrapolated"
-        )
     return transaction(
         kind,
         model=TIMING_MODELS[model],
         link=profile.bus.link(profile.bus.nodes if nodes is None else nodes),
         payload_bytes=payload_bytes,
         overhead_bytes=profile.payload.overhead_bytes,
-        execution_us=execution.execution_us(payload_bytes),
+        execution_us=profile.node.execution.execution_us(payload_bytes),
     )
+
+
+def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
+    """Refuse payloads whose execution time is not known, all of them at once."""
+    execution = profile.node.execution
+    if not isinstance(execution, TableExecution):
+        return
+    unknown = dict.fromkeys(size for size in payloads_bytes if not execution.covers(size))
+    if unknown:
+        raise BusplanError(
+            *(
+                f"payload {size} bytes: outside the execution table of {profile.name}, {execution.range_bytes}; "
+                "nothing is extrapolated"
+                for size in unknown
+            )
+        )

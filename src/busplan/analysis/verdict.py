@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from busplan.analysis.advice import Change, cheapest_change
+from busplan.analysis.advice import Change, change_for_more, change_to_fit
 from busplan.analysis.capacity import Capacity, CapacityFigures
 from busplan.profile.toml import override
 
@@ -15,15 +15,24 @@ class Verdict(NamedTuple):
     """Figures of the timing model that decides."""
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
-    advised: CapacityFigures
-    """The figures that the change is to better: those that do not fit where the models disagree, else the deciding."""
     change: Change | None
-    """The cheapest change for the model of `advised`; see `cheapest_change`."""
+    """The cheapest change: one after which every model that was asked for fits, with a safe gap count; or, where all
+    is well already, one that carries more nodes under the deciding model."""
+
+    @property
+    def all_figures(self) -> tuple[CapacityFigures, ...]:
+        """Figures of all models that were asked for, the deciding first."""
+        return (self.deciding, *self.others)
 
     @property
     def models_agree(self) -> bool:
         """Whether every model says the same of the fit."""
         return all(other.fits == self.deciding.fits for other in self.others)
+
+    @property
+    def all_well(self) -> bool:
+        """Whether every model fits and the gap count is safe."""
+        return all(one.fits for one in self.all_figures) and self.deciding.gap_count_safe
 
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
@@ -37,12 +46,14 @@ def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
 def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
     wanted = capacity.profile.bus.timing_model
     deciding = next((figures for figures in results if figures.timing_model == wanted), results[0])
-    advised = next((figures for figures in (deciding, *results) if not figures.fits), deciding)
     profile = override(capacity.profile, {"cycle.period_us": deciding.period_us})
-    return Verdict(
+    verdict = Verdict(
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(figures for figures in results if figures is not deciding),
-        advised=advised,
-        change=cheapest_change(profile, model=advised.timing_model),
+        change=None,
     )
+    if verdict.all_well:
+        return verdict._replace(change=change_for_more(profile, model=deciding.timing_model))
+    models = [figures.timing_model for figures in verdict.all_figures]
+    return verdict._replace(change=change_to_fit(profile, models=models))

@@ -1,13 +1,16 @@
 """The command line: parse, call, render, exit. One module a command; heavy imports stand inside the commands."""
 
+import os
 import sys
+from io import TextIOWrapper
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from busplan import __version__
 from busplan.cli import capacity, circle_test, init, latency, paper, profiles
-from busplan.cli.output import CANNOT, say
+from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
 from busplan.errors import BusplanError
 
 app = typer.Typer(
@@ -47,16 +50,29 @@ def _options(
 
 def run() -> None:
     """Run the command line and exit: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted."""
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal without UTF-8 gets escapes instead of a failure.
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
+    _mend_streams()
     try:
-        # Typer exits by itself: 0, 2 for usage, 130 for Ctrl-C, and what a command asks for.
         app(prog_name="busplan")
+    except SystemExit as leaving:
+        # Typer exits by itself, with 2 for usage and 130 for Ctrl-C. Its 1 is a closed pipe or worse, and no verdict.
+        sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)
+    except PlanFailsError:
+        sys.exit(PLAN_FAILS)
     except BusplanError as error:
-        say(str(error))
-        sys.exit(CANNOT)
+        say(*error.problems)
+    except OSError as error:
+        say(f"cannot write: {error.strerror}")
     except Exception as error:  # noqa: BLE001 - the last net: Python's own exit code 1 would read as a verdict
         say(f"busplan itself failed ({type(error).__name__}: {error}); please report this")
-        sys.exit(CANNOT)
+    sys.exit(CANNOT)
+
+
+def _mend_streams() -> None:
+    """Make standard streams that can be written to, whatever the caller closed and whatever its encoding."""
+    if sys.stderr is None:
+        # Errors have nowhere to go; they must not go to stdout.
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal without UTF-8 gets escapes instead of a failure.
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")

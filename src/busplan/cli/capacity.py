@@ -12,7 +12,7 @@ from busplan.cli.options import (
     ProfileArgument,
     TimingOption,
     bus_changes,
-    parse_time_us,
+    periods_us,
     timing_models,
 )
 from busplan.cli.output import emit, emit_text
@@ -50,7 +50,7 @@ def capacity_command(
     plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
     result = capacity(
         plan,
-        periods_us=[parse_time_us(text, option="--period") for text in period] if period else None,
+        periods_us=periods_us(period, plan),
         timing_models=timing_models(timing),
     )
     if format_ == "table":
@@ -63,5 +63,5 @@ def capacity_command(
     emit_text(
         text.to_json(documents.capacity_document(result, verdicts(result)))
         if format_ == "json"
-        else text.to_csv(documents.capacity_rows(result))
+        else text.to_csv(documents.with_profile(plan.name, documents.capacity_rows(result)))
     )

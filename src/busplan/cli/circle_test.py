@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
-from busplan.cli.options import FormatOption, ProfileArgument, parse_time_us
-from busplan.cli.output import PLAN_FAILS, emit, emit_text, new_file, say
+from busplan.cli.options import FormatOption, ProfileArgument, periods_us
+from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -91,7 +91,7 @@ def circle_test_command(
         with progress_bar("circle test") as progress:
             test = circle_test(
                 plan,
-                periods_us=[parse_time_us(text, option="--period") for text in period] if period else None,
+                periods_us=periods_us(period, plan),
                 with_contributions=contributions,
                 progress=progress,
             )
@@ -106,7 +106,7 @@ def circle_test_command(
             say(f"wrote {path}")
     _emit(test, format_=format_, contributions=contributions)
     if not test.passed:
-        raise typer.Exit(PLAN_FAILS)
+        raise PlanFailsError
 
 
 def _plot_format(path: Path) -> str:
@@ -139,5 +139,7 @@ def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
     emit_text(
         text.to_json(documents.circle_document(test, with_contributions=contributions))
         if format_ == "json"
-        else text.to_csv(documents.circle_rows(test, with_contributions=contributions))
+        else text.to_csv(
+            documents.with_profile(test.profile.name, documents.circle_rows(test, with_contributions=contributions))
+        )
     )

@@ -1,5 +1,6 @@
 """`busplan init`."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +8,7 @@ import typer
 
 from busplan.cli.options import complete_profile
 from busplan.cli.output import say, write_file
+from busplan.errors import BusplanError
 
 
 def init_command(
@@ -31,6 +33,10 @@ def init_command(
     """
     from busplan.profile.starter import starter_text
 
+    if not Path(name).name.removesuffix(".toml").strip("."):
+        raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     write_file(path, starter_text(source, name=path.stem).encode(), overwrite=force)
-    say(f"wrote {path}; next: busplan capacity {path}")
+    # A name that begins with a dash would be read as an option.
+    shown = f"./{path}" if str(path).startswith("-") else str(path)
+    say(f"wrote {path}; next: busplan capacity {shlex.quote(shown)}")

@@ -54,12 +54,12 @@ def latency_command(
     if format_ == "table":
         from busplan.report.latency import latency_lines
 
-        emit(latency_lines(result, max_payload_bytes=plan.bus.max_payload_bytes))
+        emit(latency_lines(result, plan))
         return
     from busplan.report import documents, text
 
     emit_text(
         text.to_json(documents.latency_document(result))
         if format_ == "json"
-        else text.to_csv(documents.latency_rows(result))
+        else text.to_csv(documents.with_profile(plan.name, documents.latency_rows(result)))
     )

@@ -2,16 +2,21 @@
 
 import re
 from decimal import Decimal
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
 from busplan.errors import BusplanError
 
+if TYPE_CHECKING:
+    from busplan.profile.model import Profile
+
 Timing = Literal["paper", "standard", "both"]
 Format = Literal["table", "json", "csv"]
 
-_TIME: Final = re.compile(r"(?P<value>\d+(?:\.\d*)?(?:[eE][+-]?\d+)?|\.\d+)\s*(?P<unit>us|ms|s)")
+_TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
+MAX_BYTES: Final = 1_000_000
+_MAX_DIGITS: Final = 12
 _EXPONENT: Final = {"us": 0, "ms": 3, "s": 6}
 
 
@@ -65,7 +70,7 @@ def bus_changes(*, nodes: int | None, gap_count: str | None) -> dict[str, object
         changes["bus.nodes"] = nodes
     if gap_count is not None:
         # What is no number goes on as text: the profile knows what is right, and says so.
-        changes["bus.gap_count"] = int(gap_count) if re.fullmatch(r"[+-]?\d{1,9}", gap_count) else gap_count
+        changes["bus.gap_count"] = int(gap_count) if re.fullmatch(r"[+-]?[0-9]{1,9}", gap_count) else gap_count
     return changes
 
 
@@ -73,22 +78,28 @@ BUS_OPTIONS: Final = {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"}
 """What the profile's keys are called on the command line."""
 
 
-def parse_time_us(text: str, *, option: str) -> float:
-    """Read a time with its unit, as 4ms, 250us or 0.001s [us].
+def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | None:
+    """Read what --period asks for, as 4ms, 250us or 0.001s [us]; None where it is not given.
 
     Raises
     ------
     BusplanError
-        No number, no unit, or not above zero.
+        No number, no unit, or out of the profile's range.
     """
-    match = _TIME.fullmatch(text.strip())
-    if match is None:
-        raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
-    # Decimal keeps 0.0003 s the float nearest to 300 us.
-    value_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
-    if not 0 < value_us < float("inf"):
-        raise BusplanError(f"{option} {text}: must be greater than 0")
-    return value_us
+    if not texts:
+        return None
+    from busplan.profile.toml import override
+
+    found = []
+    for text in texts:
+        match = _TIME.fullmatch(text.strip())
+        if match is None:
+            raise BusplanError(f"--period {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
+        # Decimal keeps 0.0003 s the float nearest to 300 us.
+        period_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+        override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": f"--period {text}, in us"})
+        found.append(period_us)
+    return found
 
 
 def parse_sizes(text: str, *, option: str) -> list[int]:
@@ -101,8 +112,10 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
     """
     sizes = []
     for part in text.split(","):
-        if not re.fullmatch(r"\s*\d{1,6}\s*", part) or int(part) == 0:
-            raise BusplanError(f"{option} {text}: expected payloads in bytes between commas, as 4,16,32")
+        if not re.fullmatch(r"\s*[0-9]+\s*", part) or not 1 <= int(part[:_MAX_DIGITS]) <= MAX_BYTES:
+            raise BusplanError(
+                f"{option} {text}: expected payloads of 1 to {MAX_BYTES:,} bytes between commas, as 4,16,32"
+            )
         sizes.append(int(part))
     return sizes
 

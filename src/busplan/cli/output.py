@@ -1,8 +1,10 @@
 """The one place that writes: the document to stdout, the rest to stderr, files atomically."""
 
+import io
 import os
+import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from errno import EISDIR
 from pathlib import Path
@@ -20,50 +22,67 @@ PLAN_FAILS: int = 1
 CANNOT: int = 2
 """Exit code of a run that could not do its job."""
 
+_NARROWEST = 40
 _STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "heading": "bold", "plain": "", "table": ""}
 
 
-def say(message: str) -> None:
-    """Write a summary or an error to stderr; a closed stderr is no reason to fail."""
+class PlanFailsError(Exception):
+    """The answer is out, and it is that the plan does not hold: exit with `PLAN_FAILS`."""
+
+
+def say(*messages: str) -> None:
+    """Write a summary or errors to stderr, a line each; a closed stderr is no reason to fail."""
     with suppress(OSError):
-        print(message, file=sys.stderr, flush=True)  # noqa: T201 - this is the place that prints
+        for message in messages:
+            # What a user typed or a file is called may hold anything: nothing of it commands the terminal.
+            shown = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in message)
+            print(shown, file=sys.stderr, flush=True)  # noqa: T201 - this is the place that prints
 
 
 def emit_text(text: str) -> None:
-    """Write the document to stdout."""
-    _to_stdout(lambda: sys.stdout.write(text))
+    """Write the document to stdout.
 
-
-def emit(lines: Iterable["Line"]) -> None:
-    """Write a report to stdout: with colours on a terminal, and none under NO_COLOR."""
-    # A pipe gets plain lines, and does not wait for the renderer to load.
-    if sys.stdout.isatty() or os.environ.get("FORCE_COLOR"):
-        _to_stdout(lambda: _print_styled(lines))
-    else:
-        emit_text("".join(f"{line.text}\n" for line in lines))
-
-
-def _print_styled(lines: Iterable["Line"]) -> None:
-    from rich.console import Console
-    from rich.text import Text
-
-    console = Console(highlight=False, markup=False, emoji=False)
-    for line in lines:
-        # On a narrow terminal the terminal breaks the lines of a table: no figure is ever cut.
-        console.print(Text(line.text, style=_STYLES[line.tone]), soft_wrap=line.tone in ("table", "heading"))
-
-
-def _to_stdout(write: Callable[[], object]) -> None:
+    Raises
+    ------
+    BusplanError
+        stdout is closed, or cannot take it all.
+    """
+    if sys.stdout is None:
+        raise BusplanError("standard output is closed")
     try:
-        write()
+        sys.stdout.write(text)
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader has seen enough; Python's own flush at exit must not complain either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _abandon_stdout()
         raise typer.Exit(CANNOT) from None
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _abandon_stdout()
         raise BusplanError(f"standard output cannot be written: {error.strerror}") from None
+
+
+def _abandon_stdout() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def emit(lines: Iterable["Line"]) -> None:
+    """Write a report to stdout: with colours on a terminal only, and none under NO_COLOR."""
+    # A pipe gets plain lines, and does not wait for the renderer to load.
+    styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or (sys.stdout is not None and sys.stdout.isatty())
+    emit_text(_styled(lines) if styled else "".join(f"{line.text}\n" for line in lines))
+
+
+def _styled(lines: Iterable["Line"]) -> str:
+    from rich.console import Console
+    from rich.text import Text
+
+    buffer = io.StringIO()
+    console = Console(file=buffer, force_terminal=True, highlight=False, markup=False, emoji=False)
+    # On a terminal too narrow for a sentence, and for the lines of a table, the terminal breaks: no figure is ever cut.
+    console.width = max(console.width, _NARROWEST)
+    for line in lines:
+        console.print(Text(line.text, style=_STYLES[line.tone]), soft_wrap=line.tone in ("table", "heading"))
+    return buffer.getvalue()
 
 
 def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
@@ -93,18 +112,22 @@ def new_file(path: Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     try:
-        _refuse_target(target, overwrite=overwrite)
+        mode = _mode_of(target, overwrite=overwrite)
         # "x" gives the file the permissions that any new file of the user has.
         with temporary.open("xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
+        if mode is not None:
+            temporary.chmod(mode)
         if overwrite:
             temporary.replace(target)
         else:
             _rename_new(temporary, target)
     except FileExistsError:
         raise BusplanError(f"{path}: already there; give another name, or --force to overwrite it") from None
+    except FileNotFoundError:
+        raise BusplanError(f"{path}: cannot be written: there is no folder {target.parent}") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise BusplanError(f"{path}: cannot be written: {reason}") from None
@@ -113,12 +136,18 @@ def new_file(path: Path, *, overwrite: bool) -> Iterator[BinaryIO]:
             temporary.unlink()
 
 
-def _refuse_target(target: Path, *, overwrite: bool) -> None:
-    """Say before the work what renaming would say after it."""
-    if target.is_dir():
-        raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
-    if not overwrite and os.path.lexists(target):
+def _mode_of(target: Path, *, overwrite: bool) -> int | None:
+    """Permissions of the file that is to be replaced; what may not be replaced is said before the work for it."""
+    if not os.path.lexists(target):
+        return None
+    if not overwrite:
         raise FileExistsError
+    status = target.stat()
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
+    if not stat.S_ISREG(status.st_mode):
+        raise ValueError("is no regular file")
+    return stat.S_IMODE(status.st_mode)
 
 
 def _rename_new(temporary: Path, target: Path) -> None:

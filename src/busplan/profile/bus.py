@@ -18,7 +18,7 @@ from busplan.ieee1394 import (
     Speed,
     safe_gap_count,
 )
-from busplan.profile.sections import MAX_TIME_US, Bytes, Count, Problem, Section, TimeUs, refused
+from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.timing import Link, TimingModelName
 
 
@@ -59,7 +59,7 @@ class Ieee1394Bus(Section):
     nodes: Count = Field(description="Distributed nodes N, host not counted", examples=[2])
     max_hops: Count | None = Field(
         default=None,
-        description="Most cable hops from the host to a node, in a tree; "
+        description="Most cable hops between any two nodes of a tree, the host counted among them; "
         "without it the bus is a chain with the host at its end",
         examples=[3],
     )
@@ -74,7 +74,7 @@ class Ieee1394Bus(Section):
 
     @model_validator(mode="after")
     def _table_holds_for_the_cable(self) -> Self:
-        if self.gap_count == "optimal" and self.cable_length_m > REFERENCE_CABLE_M:
+        if self.gap_count == "optimal" and not self.cable_is_standard:
             raise refused(
                 Problem(
                     f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
@@ -84,8 +84,17 @@ class Ieee1394Bus(Section):
             )
         return self
 
+    @property
+    def cable_is_standard(self) -> bool:
+        """Whether the cable is no longer than those that the gap-count table holds for."""
+        return self.cable_length_m <= REFERENCE_CABLE_M
+
     def hops(self, nodes: int) -> int:
-        """Cable hops from the host to the farthest of that many nodes [1]."""
+        """Most cable hops with that many nodes on the bus [1].
+
+        In a chain they lie between the host and the farthest node. In a tree they are `max_hops`, which the host's own
+        way to a node never exceeds.
+        """
         return nodes if self.max_hops is None else self.max_hops
 
     def gap_count_for(self, nodes: int) -> int:
@@ -123,10 +132,10 @@ class Sync(Section):
 class Cycle(Section):
     """Section [cycle]: the communication period and what of it is for communication."""
 
-    period_us: Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
+    period_us: Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
         description="Communication period T_s [us]", examples=[4000]
     )
-    slice_ratio: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = Field(
+    slice_ratio: Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)] = Field(
         default=0.5, description="Share alpha of the period that is for communication, 0..1", examples=[0.5]
     )
     nonperiodic_us: TimeUs = Field(

@@ -15,6 +15,12 @@ if TYPE_CHECKING:
 _TOMLLIB_MESSAGE: Final = r"(?s)(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)\Z"
 _LONG_INTEGER: Final = r"[0-9_]{4000,}"
 _MAX_NESTING: Final = 100
+_MAX_KEY_PARTS: Final = 20
+_LONG_KEY: Final = (
+    r"""(?<![A-Za-z0-9_"'-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    f"{{{_MAX_KEY_PARTS}}}"
+)
+"""A dotted key of very many parts, which costs the standard library's parser the square of their number."""
 
 
 class Lines:
@@ -64,6 +70,11 @@ class Document:
         BusplanError
             The text is no TOML; with the place where it stops being so.
         """
+        long_key = re.search(_LONG_KEY, self.text)
+        if long_key:
+            raise BusplanError(
+                f"{self.at(long_key.start())}: a key of more than {_MAX_KEY_PARTS} parts is no profile's"
+            )
         try:
             return tomllib.loads(self.text)
         except RecursionError:

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, create_model
 
-from busplan.profile.sections import MAX_TIME_US, Problem, Section, TimeUs, refused
+from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US, Problem, Section, TimeUs, refused
 
 _MAX_LENGTH_MM: Final = 1e6
 _MAX_SPEED_MM_S: Final = 1e6
 _MAX_GAIN: Final = 1e9
 
-PositiveTimeUs = Annotated[float, Field(gt=0, le=MAX_TIME_US, allow_inf_nan=False)]
+PositiveTimeUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
 LengthMm = Annotated[float, Field(ge=0, le=_MAX_LENGTH_MM, allow_inf_nan=False)]
 SpeedMmS = Annotated[float, Field(ge=0, le=_MAX_SPEED_MM_S, allow_inf_nan=False)]
-PositiveSpeedMmS = Annotated[float, Field(gt=0, le=_MAX_SPEED_MM_S, allow_inf_nan=False)]
+PositiveSpeedMmS = Annotated[float, Field(ge=1e-6, le=_MAX_SPEED_MM_S, allow_inf_nan=False)]
 SignedSpeedMmS = Annotated[float, Field(ge=-_MAX_SPEED_MM_S, le=_MAX_SPEED_MM_S, allow_inf_nan=False)]
 Gain = Annotated[float, Field(ge=0, le=_MAX_GAIN, allow_inf_nan=False)]
 SignedGain = Annotated[float, Field(ge=-_MAX_GAIN, le=_MAX_GAIN, allow_inf_nan=False)]
@@ -150,10 +150,10 @@ class Delivery(Section):
 class Circle(Section):
     """Section [circle]: the circle of the test."""
 
-    radius_mm: Annotated[float, Field(gt=0, le=_MAX_LENGTH_MM, allow_inf_nan=False)] = Field(
+    radius_mm: Annotated[float, Field(ge=1e-3, le=_MAX_LENGTH_MM, allow_inf_nan=False)] = Field(
         default=100.0, description="Radius [mm]", examples=[320]
     )
-    feed_mm_per_min: Annotated[float, Field(gt=0, le=60 * _MAX_SPEED_MM_S, allow_inf_nan=False)] = Field(
+    feed_mm_per_min: Annotated[float, Field(ge=1e-3, le=60 * _MAX_SPEED_MM_S, allow_inf_nan=False)] = Field(
         default=1000.0, description="Speed along the circle [mm/min]", examples=[2500]
     )
     direction: Literal["ccw", "cw"] = Field(

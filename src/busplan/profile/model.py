@@ -7,7 +7,7 @@ for a float.
 from collections.abc import Callable
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from busplan.profile.bus import Cycle, Ieee1394Bus, Node, Payload, TableExecution
 from busplan.profile.machine import Circle, Delivery, Mechanics, Servo, Tolerance
@@ -25,13 +25,22 @@ def _without_control_characters(allowed: str) -> Callable[[str], str]:
     return check
 
 
+def _whole(value: object) -> object:
+    # A literal compares: true and 1.0 would pass for 1.
+    if type(value) is not int:
+        raise refused(Problem(f"expected {SCHEMA_VERSION}"))
+    return value
+
+
 class Profile(Section):
     """A whole profile: one motion network and its cycle."""
 
-    schema_version: Literal[1] = Field(description="Version of this file's schema", examples=[SCHEMA_VERSION])
-    name: Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_without_control_characters(""))] = Field(
-        description="Name in reports", examples=["my-machine"]
+    schema_version: Annotated[Literal[1], BeforeValidator(_whole)] = Field(
+        description="Version of this file's schema", examples=[SCHEMA_VERSION]
     )
+    name: Annotated[
+        str, Field(min_length=1, max_length=100, pattern=r"\S"), AfterValidator(_without_control_characters(""))
+    ] = Field(description="Name in reports", examples=["my-machine"])
     description: Annotated[str, Field(max_length=2000), AfterValidator(_without_control_characters("\n\t"))] = Field(
         default="", description="What the profile stands for, in words", examples=["Two nodes at 4 ms"]
     )

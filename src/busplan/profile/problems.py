@@ -16,6 +16,7 @@ from busplan.profile.positions import KeyPath, Place
 _EXECUTION: Final[KeyPath] = ("node", "execution")
 """The one union of tables: in pydantic's locations its tag follows this path."""
 
+_MOST_SHOWN: Final = 50
 _WRONG_TYPE: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -28,12 +29,13 @@ _WRONG_TYPE: Final = {
 }
 
 _OUT_OF_RANGE: Final = {
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be {ge:g} or more",
-    "less_than_equal": "must be {le:g} or less",
+    "greater_than": "must be greater than {gt:,.12g}",
+    "greater_than_equal": "must be {ge:,.12g} or more",
+    "less_than_equal": "must be {le:,.12g} or less",
     "finite_number": "must be finite",
     "string_too_short": "must not be empty",
     "too_short": "must not be empty",
+    "string_pattern_mismatch": "must not be blank",
     "string_too_long": "must be no longer than {max_length} characters",
 }
 
@@ -84,8 +86,10 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:
             yield Finding(path, _missing(path, data), shows_value=False)
         elif details["type"] == "extra_forbidden":
             yield Finding(path, _unknown(path, data), shows_value=False)
-        elif details["type"] in ("union_tag_invalid", "union_tag_not_found"):
-            yield Finding((*path, "kind"), 'expected kind = "table" or kind = "linear"')
+        elif details["type"] == "union_tag_not_found":
+            yield Finding((*path, "kind"), 'missing key; expected kind = "table" or kind = "linear"', shows_value=False)
+        elif details["type"] == "union_tag_invalid":
+            yield Finding((*path, "kind"), 'expected "table" or "linear"')
         else:
             yield Finding(path, _expected(details))
 
@@ -105,6 +109,8 @@ def _parsed(key: str) -> KeyPath:
 def _expected(details: ErrorDetails) -> str:
     """Say what would be right for an error of one value."""
     kind, context = details["type"], details.get("ctx", {})
+    if kind == "float_type" and type(details["input"]) is int:
+        return "is a number too large for any quantity"
     if kind in _WRONG_TYPE:
         return f"expected {_WRONG_TYPE[kind]}"
     if kind == "literal_error":
@@ -117,8 +123,8 @@ def _expected(details: ErrorDetails) -> str:
 def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
     """The model of the table that holds `path`."""
     if path[:-1] == _EXECUTION:
-        kind = data["node"]["execution"]["kind"]
-        return TableExecution if kind == "table" else LinearExecution
+        execution = data["node"].get("execution", {})
+        return LinearExecution if execution.get("kind") == "linear" else TableExecution
     section: type[BaseModel] = Profile
     for part in path[:-1]:
         annotation = section.model_fields[str(part)].annotation
@@ -131,7 +137,8 @@ def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
 def _missing(path: KeyPath, data: dict[str, Any]) -> str:
     field = _section(path, data).model_fields[str(path[-1])]
     if not field.examples:
-        return f"missing section [{'.'.join(map(str, path))}]. {field.description}"
+        needed = [name for name, one in _section((*path, ""), data).model_fields.items() if one.is_required()]
+        return f"missing section [{'.'.join(map(str, path))}]; it needs {', '.join(needed)}"
     example = str(field.examples[0]) if not isinstance(field.examples[0], str) else f'"{field.examples[0]}"'
     return f"missing key. {field.description}; for example {path[-1]} = {example}"
 
@@ -149,7 +156,10 @@ def refusal(error: ValidationError, data: dict[str, Any], document: Document) ->
     placed = sorted(
         ((_place(document, found.path), found) for found in findings(error, data)), key=lambda pair: pair[0].key_start
     )
-    return BusplanError(*(_message(document, place, found) for place, found in placed))
+    messages = [_message(document, place, found) for place, found in placed[:_MOST_SHOWN]]
+    if len(placed) > _MOST_SHOWN:
+        messages.append(f"{document.name}: and {len(placed) - _MOST_SHOWN} more problems")
+    return BusplanError(*messages)
 
 
 def _place(document: Document, path: KeyPath) -> Place:
@@ -162,9 +172,16 @@ def _place(document: Document, path: KeyPath) -> Place:
 
 
 def _message(document: Document, place: Place, found: Finding) -> str:
-    written = document.text[place.value_start : place.value_end] if found.shows_value else ""
-    subject = f"{found.key} = {_shortened(written)}" if written else found.key
+    # A table that is spread over the file has no value to show.
+    has_value = found.shows_value and place.value_start != place.key_start
+    written = document.text[place.value_start : place.value_end] if has_value or _is_element(found) else ""
+    key = _shortened(found.key, limit=100)
+    subject = f"{key} = {_shortened(written)}" if written else key
     return f"{document.at(place.key_start)}: {subject}: {found.message}"
+
+
+def _is_element(found: Finding) -> bool:
+    return found.shows_value and isinstance(found.path[-1], int)
 
 
 def _shortened(written: str, limit: int = 40) -> str:

@@ -7,6 +7,7 @@ from pydantic_core import PydanticCustomError
 
 # Bounds that no machine comes near; they keep every product of two quantities finite.
 MAX_TIME_US: Final = 1e9
+MIN_STEP_US: Final = 1e-3
 MAX_COUNT: Final = 1_000_000
 
 TimeUs = Annotated[float, Field(ge=0, le=MAX_TIME_US, allow_inf_nan=False)]

@@ -1,5 +1,6 @@
 """The profiles that come with busplan."""
 
+import os
 from pathlib import Path
 
 from busplan.errors import BusplanError
@@ -41,13 +42,10 @@ def locate(argument: str) -> tuple[Path, str]:
         path = shipped_folder() / f"{argument}.toml"
         return path, path.name
     path = Path(argument)
-    try:
-        exists = path.exists()
-    except (OSError, ValueError):  # a name too long, a NUL in it: reading will say so
-        exists = True
-    if not exists:
+    if not argument or not os.path.lexists(path):
+        shown = argument or repr(argument)
         raise BusplanError(
-            f"{argument}: no such file, and no shipped profile of that name; shipped are {', '.join(names)}"
+            f"{shown}: no such file, and no shipped profile of that name; shipped are {', '.join(names)}"
         )
     return path, argument
 

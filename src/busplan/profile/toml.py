@@ -14,7 +14,7 @@ from busplan.errors import BusplanError
 from busplan.profile.document import Document, Lines
 from busplan.profile.model import Profile
 
-MAX_FILE_BYTES: Final = 1_000_000
+MAX_FILE_BYTES: Final = 100_000
 """A profile is a page of text. More is some other file, and reading it whole would only delay saying so."""
 
 
@@ -65,6 +65,8 @@ def read_bytes(path: Path, *, name: str) -> bytes:
     """
     try:
         if str(path) == "-":
+            if sys.stdin is None:
+                raise BusplanError(f"{name}: standard input is closed")
             return sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
         with path.open("rb") as file:
             return file.read(MAX_FILE_BYTES + 1)

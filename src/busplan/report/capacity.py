@@ -30,6 +30,7 @@ _CAPACITY_ROWS: Final = (
     GridRow("nodes N as published", "(11)", "nodes", "nodes_eq11", lambda value: f"{value:.2f}"),
     GridRow("most nodes", "(1) (2)", "nodes", "max_nodes", count),
     GridRow("most axes", "(1) (2)", "axes", "max_axes", count),
+    GridRow("smallest safe gap count", "table", "1", "safe_gap_count", count),
     GridRow("limited by", "", "", "limited_by", str),
     GridRow("fits", "", "", "fits", yes),
 )
@@ -47,7 +48,6 @@ def capacity_lines(result: Capacity, verdicts: Sequence[Verdict]) -> list[Line]:
 
 def _grid(figures: Sequence[CapacityFigures]) -> list[Line]:
     first = figures[0]
-    heading = (
-        f"{plural(first.nodes, 'node')}, {first.axes} axes\n{plural(first.hops, 'hop')}, gap count {first.gap_count}"
-    )
+    nodes = f"{plural(first.nodes, 'node')}, {plural(first.axes, 'axis')}"
+    heading = f"{nodes}\n{plural(first.hops, 'hop')}, gap count {first.gap_count}"
     return grid(heading, [(one.timing_model, one) for one in figures], _CAPACITY_ROWS)

@@ -10,7 +10,7 @@ from busplan.analysis.capacity import Capacity, CapacityFigures
 from busplan.analysis.latency import LatencyResult, Transaction
 from busplan.analysis.verdict import Verdict
 from busplan.profile.model import Profile
-from busplan.report.words import verdict_lines
+from busplan.report.words import verdict_lines, warnings
 
 if TYPE_CHECKING:
     from busplan.analysis.circle_test import CircleTest
@@ -53,6 +53,11 @@ def latency_document(result: LatencyResult) -> Document:
     return document("latency", profile=result.profile, transactions=latency_rows(result))
 
 
+def with_profile(name: str, rows: Sequence[Row]) -> list[Row]:
+    """Rows for CSV: the profile's name in front, so that the tables of several runs can be joined."""
+    return [{"profile": name, **row} for row in rows]
+
+
 def capacity_rows(result: Capacity) -> list[Row]:
     """One row a period and timing model."""
     return [_figures_row(figures) for figures in result.results]
@@ -79,14 +84,15 @@ def _verdict(verdict: Verdict, result: Capacity) -> Document:
         "timing_model": verdict.deciding.timing_model,
         "fits": verdict.deciding.fits,
         "models_agree": verdict.models_agree,
+        "gap_count_safe": verdict.deciding.gap_count_safe,
         "cheapest_change": change
         and {
-            "timing_model": verdict.advised.timing_model,
             "changes": change.changes,
+            "nodes": change.nodes,
             "fits": change.figures.fits,
             "margin_us": change.figures.margin_us,
-            "max_nodes": change.figures.max_nodes,
         },
+        "warnings": warnings(result.profile, nodes=verdict.deciding.nodes, most=verdict.deciding.max_nodes),
         "text": " ".join(line.text for line in verdict_lines(verdict, result.profile)),
     }
 

@@ -4,7 +4,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from busplan.analysis.latency import LatencyResult, Transaction
+from busplan.ieee1394 import MAX_HOPS
+from busplan.profile.model import Profile
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
+from busplan.report.words import warnings
 
 _LATENCY_ROWS: Final = (
     GridRow("request packet, bytes", "", "", "request_bytes", count),
@@ -26,7 +29,7 @@ _LATENCY_ROWS: Final = (
 )
 
 
-def latency_lines(result: LatencyResult, *, max_payload_bytes: int) -> list[Line]:
+def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
     """Phases of each transaction, read and write and the models side by side; one table for each payload."""
     models = len({one.timing_model for one in result.transactions})
     size = 2 * models
@@ -40,10 +43,15 @@ def latency_lines(result: LatencyResult, *, max_payload_bytes: int) -> list[Line
             f"gap count {first.gap_count}."
         )
     )
-    over = sorted({one.payload_bytes for one in result.transactions if one.payload_bytes > max_payload_bytes})
+    over = sorted(
+        {one.payload_bytes for one in result.transactions if one.payload_bytes > profile.bus.max_payload_bytes}
+    )
     if over:
-        sizes = ", ".join(map(str, over))
-        lines.append(Line(f"Warning: over the speed's limit of {max_payload_bytes} bytes: {sizes}.", "warning"))
+        limit = f"{profile.bus.max_payload_bytes} bytes of {profile.bus.speed}"
+        lines.append(Line(f"Warning: over the {limit}: {', '.join(map(str, over))}.", "warning"))
+    if first.hops > MAX_HOPS:
+        lines.append(Line(f"Warning: {first.hops} hops are over the {MAX_HOPS:g} of one bus.", "warning"))
+    lines.extend(Line(warning, "warning") for warning in warnings(profile, nodes=first.nodes, most=0))
     return lines
 
 

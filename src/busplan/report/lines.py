@@ -61,10 +61,12 @@ def plural(number: int, noun: str) -> str:
 
     Examples
     --------
-    >>> plural(1, "node"), plural(2, "node")
-    ('1 node', '2 nodes')
+    >>> plural(1, "node"), plural(2, "node"), plural(8, "axis")
+    ('1 node', '2 nodes', '8 axes')
     """
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    if number == 1:
+        return f"1 {noun}"
+    return f"{number} {noun.removesuffix('is')}es" if noun.endswith("is") else f"{number} {noun}s"
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) -> list[Line]:

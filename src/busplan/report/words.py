@@ -1,12 +1,20 @@
 """Verdicts in words that a person can act on."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from busplan.analysis.capacity import CapacityFigures, Limit
 from busplan.analysis.verdict import Verdict
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
 from busplan.profile.model import Profile
 from busplan.report.lines import Line, plural, us
+
+_MEANING: Final = {
+    "bus.max_hops": "rewired as a tree",
+    "bus.nodes": "the others on a second bus",
+    "bus.speed": "if all nodes can",
+}
+"""What a change means on the machine, where its key does not say so."""
 
 
 def period(value_us: float) -> str:
@@ -14,10 +22,13 @@ def period(value_us: float) -> str:
 
     Examples
     --------
-    >>> period(4000.0), period(250.0), period(1234.5)
-    ('4 ms', '250 us', '1.2345 ms')
+    >>> period(4000.0), period(250.0), period(1234.5), period(2e6)
+    ('4 ms', '250 us', '1.2345 ms', '2 s')
     """
-    return f"{value_us / 1000:g} ms" if value_us >= 1000 else f"{value_us:g} us"  # noqa: PLR2004
+    for unit, size in (("s", 1e6), ("ms", 1e3)):
+        if value_us >= size:
+            return f"{value_us / size:.12g} {unit}"
+    return f"{value_us:.12g} us"
 
 
 def verdict_lines(verdict: Verdict, profile: Profile) -> Iterator[Line]:
@@ -27,12 +38,10 @@ def verdict_lines(verdict: Verdict, profile: Profile) -> Iterator[Line]:
         yield Line(f"The {verdict.deciding.timing_model} model decides.")
     figures = verdict.deciding
     yield Line(f"Largest term: {figures.binding_term}, {us(binding_us(figures))} us of {us(figures.required_us)} us.")
-    yield Line(
-        f"The bus carries {_nodes(figures.max_nodes, figures.max_axes)} at this period, "
-        f"limited by {figures.limited_by}."
-    )
-    yield _advice(verdict)
-    yield from _warnings(figures, profile)
+    yield Line(_carries(verdict))
+    yield _advice(verdict, profile)
+    for warning in warnings(profile, nodes=figures.nodes, most=figures.max_nodes):
+        yield Line(warning, "warning")
 
 
 def binding_us(figures: CapacityFigures) -> float:
@@ -42,24 +51,56 @@ def binding_us(figures: CapacityFigures) -> float:
     return float(getattr(figures, own_key))
 
 
+def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
+    """What to beware of, whatever the verdict: gap count, cable, hops.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    nodes
+        Nodes on the bus [1].
+    most
+        Largest number of nodes that the report speaks of [1].
+    """
+    bus = profile.bus
+    found = []
+    for number in (nodes, most):
+        hops = bus.hops(number)
+        if number and bus.gap_count_for(number) < safe_gap_count(hops):
+            found.append(
+                f"Warning: gap count {bus.gap_count_for(number)} is unsafe for {plural(hops, 'hop')} "
+                f"({plural(number, 'node')}); the smallest safe one is {safe_gap_count(hops)}."
+            )
+            break
+    if not bus.cable_is_standard:
+        found.append(
+            f"Warning: cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
+            "gap-count table holds for."
+        )
+    return found
+
+
 def _headline(verdict: Verdict, profile: Profile) -> Line:
     subject = f"{profile.name} at {period(verdict.period_us)}"
     figures = verdict.deciding
-    if not verdict.models_agree:
-        stories = "; ".join(f"{one.timing_model}: {_story(one, profile)}" for one in (figures, *verdict.others))
-        return Line(f"{subject}: THE MODELS DISAGREE. {stories}.", "bad")
-    others = "".join(f"; {other.timing_model} agrees" for other in verdict.others)
-    return Line(
-        f"{subject}: {_story(figures, profile)} ({figures.timing_model} model{others}).",
-        "good" if figures.fits else "bad",
-    )
+    same = all(other.exceeded == figures.exceeded for other in verdict.others)
+    if verdict.models_agree and same:
+        others = "".join(f"; {other.timing_model} agrees" for other in verdict.others)
+        text = f"{subject}: {_story(figures, profile)} ({figures.timing_model} model{others})."
+    else:
+        loud = "" if verdict.models_agree else " THE MODELS DISAGREE."
+        stories = "; ".join(f"{one.timing_model}: {_story(one, profile)}" for one in verdict.all_figures)
+        text = f"{subject}:{loud} {stories}."
+    return Line(text, "good" if verdict.all_well else "bad")
 
 
 def _story(figures: CapacityFigures, profile: Profile) -> str:
     if figures.fits:
+        safe = "" if figures.gap_count_safe else ", but only with an unsafe gap count"
         return (
-            f"fits, {us(figures.margin_us)} us to spare, "
-            f"{figures.utilisation:.1%} of {us(figures.available_us)} us used"
+            f"fits, {us(figures.margin_us)} us to spare, {figures.utilisation:.1%} of "
+            f"{us(figures.available_us)} us used{safe}"
         )
     reasons = ", and ".join(_reason(limit, figures, profile) for limit in figures.exceeded)
     return f"does not fit, {reasons}"
@@ -80,36 +121,42 @@ def _reason(limit: Limit, figures: CapacityFigures, profile: Profile) -> str:
             return f"{figures.hops} hops are over the {MAX_HOPS:g} of one bus"
 
 
+def _carries(verdict: Verdict) -> str:
+    answers = dict.fromkeys((one.max_nodes, one.max_axes, one.limited_by) for one in verdict.all_figures)
+    if len(answers) == 1:
+        ((nodes, axes, limit),) = answers
+        return f"The bus carries {_nodes(nodes, axes)}, limited by {limit}."
+    stories = (
+        f"{_nodes(one.max_nodes, one.max_axes)} by the {one.timing_model} model, limited by {one.limited_by}"
+        for one in verdict.all_figures
+    )
+    return f"The bus carries {'; '.join(stories)}."
+
+
 def _nodes(nodes: int, axes: int) -> str:
-    return f"{plural(nodes, 'node')} ({axes} axes)"
+    return f"{plural(nodes, 'node')} ({plural(axes, 'axis')})"
 
 
-def _advice(verdict: Verdict) -> Line:
-    change, figures = verdict.change, verdict.advised
-    if change is not None:
-        settings = ", ".join(f"{key} = {value}" for key, value in change.changes.items())
-        most = _nodes(change.figures.max_nodes, change.figures.max_axes)
-        if figures.fits:
-            more = plural(change.figures.max_nodes - figures.max_nodes, "more node")
-            return Line(f"Cheapest way to {more}: {settings}, which carries {most}.")
-        which = "" if verdict.models_agree else f" the {figures.timing_model} model"
-        spare = f"{us(change.figures.margin_us)} us to spare"
-        return Line(f"Cheapest way to make it fit{which}: {settings}, which gives {spare} and {most} at most.")
-    if figures.fits:
-        return Line(f"No setting of the cycle carries more nodes: the standard's {figures.limited_by} end here.")
-    return Line("No single kind of change makes it fit.", "bad")
+def _advice(verdict: Verdict, profile: Profile) -> Line:
+    change, figures = verdict.change, verdict.deciding
+    if change is None:
+        if not verdict.all_well:
+            return Line("No change of gap count, slice ratio, period, speed or wiring alone makes it fit.", "bad")
+        if figures.limited_by == "time":
+            return Line("No change of gap count, slice ratio or period alone carries more nodes.")
+        limit = f"{MAX_HOPS:g} hops" if figures.limited_by == "hops" else f"{MAX_NODES:g} nodes"
+        return Line(f"No setting carries more nodes: {limit} are the standard's limit.")
+    settings = ", ".join(_setting(key, value) for key, value in change.changes.items())
+    spare = f"{us(change.figures.margin_us)} us to spare"
+    if verdict.all_well:
+        more = plural(change.nodes - figures.max_nodes, "more node")
+        carried = _nodes(change.nodes, change.nodes * profile.node.axes)
+        return Line(f"Cheapest way to {more} ({figures.timing_model} model): {settings}, which carries {carried}.")
+    models = " and ".join(one.timing_model for one in verdict.all_figures)
+    purpose = "make it safe" if all(one.fits for one in verdict.all_figures) else "make it fit"
+    return Line(f"Cheapest way to {purpose} ({models}): {settings}, which leaves {spare}.")
 
 
-def _warnings(figures: CapacityFigures, profile: Profile) -> Iterator[Line]:
-    if figures.gap_count < figures.safe_gap_count:
-        yield Line(
-            f"Warning: gap count {figures.gap_count} is unsafe for {figures.hops} hops; "
-            f"the smallest safe one is {figures.safe_gap_count}.",
-            "warning",
-        )
-    if profile.bus.cable_length_m > REFERENCE_CABLE_M:
-        yield Line(
-            f"Warning: cables of {profile.bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m "
-            "that the gap-count table holds for.",
-            "warning",
-        )
+def _setting(key: str, value: object) -> str:
+    meaning = f" ({_MEANING[key]})" if key in _MEANING else ""
+    return f"{key} = {value}{meaning}"

@@ -1,0 +1,242 @@
+"""`busplan circle-test` as a process: exit codes, documents, files."""
+
+import csv
+import json
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+QUICK = """
+schema_version = 1
+name = "quick"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+nodes = 2
+[cycle]
+period_us = 2000
+[payload]
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+[node.execution]
+kind = "linear"
+base_us = 30
+per_byte_us = 0.35
+[servo]
+position_gain_per_s = 50
+velocity_feedforward = 0
+[circle]
+radius_mm = 25
+feed_mm_per_min = 3000
+ramp_periods = 20
+"""
+
+
+@pytest.fixture
+def profile(tmp_path: Path) -> Path:
+    path = tmp_path / "quick.toml"
+    path.write_text(QUICK, encoding="utf-8")
+    return path
+
+
+def busplan(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "busplan", "circle-test", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+        timeout=60,
+    )
+
+
+def test_json_holds_the_contract(profile: Path) -> None:
+    run = busplan(
+        profile, "--format", "json", "--contributions", "--period", "2ms", "--period", "4ms", cwd=profile.parent
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    document = json.loads(run.stdout)
+    assert (document["schema"], document["command"], document["profile"]) == (1, "circle-test", "quick")
+    assert [result["period_us"] for result in document["results"]] == [2000, 4000]
+    for result in document["results"]:
+        numbers = (
+            "period_us",
+            "feed_mm_per_min",
+            "radius_mm",
+            "duration_s",
+            "setpoints",
+            "steps",
+            "step_us",
+            "mean_contour_error_mm",
+            "max_contour_error_mm",
+            "radial_deviation_min_mm",
+            "radial_deviation_max_mm",
+            "circular_deviation_mm",
+            "phase_margin_deg",
+            "gain_margin_db",
+            "crossover_hz",
+        )
+        assert all(math.isfinite(result[key]) for key in numbers)
+        assert len(result["centre_offset_mm"]) == 2
+        assert (result["bus_fits"], result["passed"], result["failures"]) == (True, True, [])
+        assert [set(one) for one in result["contributions"]] == [{"source", "max_contour_error_mm", "removed_mm"}]
+
+
+def test_without_contributions_the_key_is_not_there(profile: Path) -> None:
+    run = busplan(profile, "--format", "json", cwd=profile.parent)
+    assert "contributions" not in json.loads(run.stdout)["results"][0]
+
+
+def test_csv_has_the_same_figures_as_json(profile: Path) -> None:
+    rows = list(csv.DictReader(busplan(profile, "--format", "csv", cwd=profile.parent).stdout.splitlines()))
+    (result,) = json.loads(busplan(profile, "--format", "json", cwd=profile.parent).stdout)["results"]
+    assert len(rows) == 1
+    assert float(rows[0]["max_contour_error_mm"]) == result["max_contour_error_mm"]
+    assert float(rows[0]["centre_offset_x_mm"]) == result["centre_offset_mm"][0]
+    assert rows[0]["passed"] == "true"
+
+
+def test_a_missed_tolerance_is_exit_1_with_its_size_and_what_to_attack(profile: Path) -> None:
+    profile.write_text(QUICK + "[tolerance]\nmax_contour_error_mm = 0.001\n", encoding="utf-8")
+    run = busplan(profile, cwd=profile.parent)
+    assert run.returncode == 1
+    assert "FAILED, the largest contour error of " in run.stdout
+    assert " um over its 1 um" in run.stdout
+    assert "Attack velocity_feedforward first" in run.stdout
+
+
+def test_a_cycle_that_does_not_fit_is_exit_1_without_figures(profile: Path) -> None:
+    run = busplan(profile, "--period", "100us", "--format", "json", cwd=profile.parent)
+    assert run.returncode == 1
+    (result,) = json.loads(run.stdout)["results"]
+    assert [failure["name"] for failure in result["failures"]] == ["required_us"]
+    assert result["max_contour_error_mm"] is None
+    table = busplan(profile, "--period", "100us", cwd=profile.parent)
+    assert table.returncode == 1
+    assert "the cycle does not fit the bus" in table.stdout
+
+
+def test_an_unstable_loop_is_exit_1_and_never_nan(profile: Path) -> None:
+    profile.write_text(QUICK.replace("position_gain_per_s = 50", "position_gain_per_s = 30000"), encoding="utf-8")
+    run = busplan(profile, "--format", "json", cwd=profile.parent)
+    assert run.returncode == 1
+    assert "NaN" not in run.stdout
+    assert "Infinity" not in run.stdout
+    (result,) = json.loads(run.stdout)["results"]
+    assert (result["stable"], result["failures"][0]["name"]) == (False, "stability")
+    assert "the position loop is unstable" in busplan(profile, cwd=profile.parent).stdout
+
+
+def test_trace_has_every_nth_step_of_each_period(profile: Path) -> None:
+    run = busplan(
+        profile, "--period", "2ms", "--period", "4ms", "--trace", "t.csv", "--every", "100", cwd=profile.parent
+    )
+    assert (run.returncode, run.stderr) == (0, "wrote t.csv\n")
+    with (profile.parent / "t.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == [
+        "period_us",
+        "time_us",
+        "command_x_mm",
+        "command_y_mm",
+        "x_mm",
+        "y_mm",
+        "contour_error_mm",
+    ]
+    assert {row["period_us"] for row in rows} == {"2000.0", "4000.0"}
+    for row in rows:
+        error_mm = math.hypot(float(row["x_mm"]), float(row["y_mm"])) - 25
+        assert float(row["contour_error_mm"]) == pytest.approx(error_mm, abs=1e-12)
+        assert float(row["time_us"]) % 10_000 == 0
+
+
+@pytest.mark.parametrize(("name", "magic"), [("c.png", b"\x89PNG"), ("c.svg", b"<?xml"), ("c.pdf", b"%PDF")])
+def test_plots_in_three_formats(profile: Path, name: str, magic: bytes) -> None:
+    run = busplan(profile, "--plot", name, cwd=profile.parent)
+    assert (run.returncode, run.stderr) == (0, f"wrote {name}\n")
+    assert (profile.parent / name).read_bytes().startswith(magic)
+
+
+def test_the_same_test_draws_the_same_svg(profile: Path) -> None:
+    for name in ("a.svg", "b.svg"):
+        busplan(profile, "--plot", name, cwd=profile.parent)
+    assert (profile.parent / "a.svg").read_bytes() == (profile.parent / "b.svg").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--plot", "c.gif"], "expected a name ending in .png, .svg or .pdf"),
+        (["--plot", "no/where/c.png"], "cannot be written"),
+        (["--trace", "no/where/t.csv"], "cannot be written"),
+        (["--trace", "."], "cannot be written"),
+        (["--every", "5"], "goes with --trace"),
+        (["--every", "0", "--trace", "t.csv"], "must be 1 or more"),
+        (["--radius", "0"], "--radius 0.0: must be 0.001 or more"),
+        (["--radius", "nan"], "--radius nan: "),
+        (["--feed", "inf"], "--feed inf: "),
+        (["--feed", "1e6"], "feed_mm_per_min"),
+        (["--feed", "-1"], "--feed -1.0: must be 0.001 or more"),
+        (["--seed", "-1"], "--seed -1: must be 0 or more"),
+        (["--period", "50us"], "step_us = 100"),
+        (["--period", "2050us"], "step_us = 100"),
+    ],
+)
+def test_bad_input_is_exit_2_with_one_message_and_no_file(profile: Path, arguments: list[str], message: str) -> None:
+    run = busplan(profile, *arguments, cwd=profile.parent)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert message in run.stderr
+    assert "Traceback" not in run.stderr
+    assert [path.name for path in profile.parent.iterdir()] == ["quick.toml"]
+
+
+def test_a_failing_plot_leaves_the_old_file(profile: Path) -> None:
+    old = profile.parent / "c.png"
+    old.write_bytes(b"old")
+    run = busplan(profile, "--plot", "c.png", "--period", "100us", cwd=profile.parent)
+    assert run.returncode == 2
+    assert "nothing to draw" in run.stderr
+    assert old.read_bytes() == b"old"
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_said_before_the_simulation(profile: Path) -> None:
+    profile.parent.chmod(0o500)
+    run = busplan(profile, "--plot", "c.png", cwd=profile.parent)
+    profile.parent.chmod(0o700)
+    assert run.returncode == 2
+    assert "cannot be written" in run.stderr
+
+
+def test_options_override_the_profile(profile: Path) -> None:
+    run = busplan(profile, "--feed", "1500", "--radius", "50", "--format", "json", cwd=profile.parent)
+    (result,) = json.loads(run.stdout)["results"]
+    assert (result["feed_mm_per_min"], result["radius_mm"]) == (1500, 50)
+
+
+def test_plain_python_without_numba_gives_the_same_answer(profile: Path) -> None:
+    code = """
+import importlib.util, sys
+sys.modules["numba"] = None
+find = importlib.util.find_spec
+importlib.util.find_spec = lambda name, *rest: None if name == "numba" else find(name, *rest)
+from busplan.__main__ import main
+main()
+"""
+    plain = subprocess.run(
+        [sys.executable, "-c", code, "circle-test", str(profile), "--format", "json"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert plain.stderr == ""
+    fast = busplan(profile, "--format", "json", cwd=profile.parent)
+    first, second = (json.loads(run.stdout)["results"][0] for run in (plain, fast))
+    assert first["max_contour_error_mm"] == pytest.approx(second["max_contour_error_mm"], abs=1e-9)
