@@ -1,4 +1,6 @@
-"""The one exception that stops a run."""
+"""The one exception that stops a run, and its form for what stands at a place of a file."""
+
+from typing import Literal, NamedTuple
 
 
 class BusplanError(Exception):
@@ -14,3 +16,39 @@ class BusplanError(Exception):
     def __init__(self, *problems: str) -> None:
         super().__init__("\n".join(problems))
         self.problems = problems
+
+
+ProblemKind = Literal[
+    "syntax", "unknown-key", "missing-key", "wrong-type", "out-of-range", "inconsistent", "execution-unknown"
+]
+"""What is wrong with a file, in the terms of its gate."""
+
+
+class PlacedProblem(NamedTuple):
+    """One thing that is wrong at one place of a file; lines and columns count from 1."""
+
+    line: int
+    column: int
+    kind: ProblemKind
+    message: str
+    key: str = ""
+    """Dotted key, where the problem has one."""
+
+
+class PlacedError(BusplanError):
+    """A file that is no profile, with the place of everything that is wrong in it.
+
+    Parameters
+    ----------
+    name
+        What the file is called.
+    problems
+        At least one, in the order of their places.
+    hidden
+        How many further problems are not listed.
+    """
+
+    def __init__(self, name: str, problems: tuple[PlacedProblem, ...], *, hidden: int = 0) -> None:
+        more = [f"{name}: and {hidden} more problems"] if hidden else []
+        super().__init__(*(f"{name}:{one.line}:{one.column}: {one.message}" for one in problems), *more)
+        self.placed = problems

@@ -32,7 +32,7 @@ class Change(NamedTuple):
     nodes: int
     """Nodes that the change is made for."""
     figures: CapacityFigures
-    """The capacity after it, under the first of the models it is made for."""
+    """The capacity after it, under the model it is made for that leaves the least."""
 
 
 def change_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> Change | None:
@@ -43,7 +43,7 @@ def change_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> Cha
     profile
         A network that does not fit under one of them, or whose gap count is unsafe.
     models
-        Timing models; the first gives the figures of the answer.
+        Timing models.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def change_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> Cha
     for cure in ({}, *_time_cures(cured, nodes, models)):
         after = _after(profile, {**cures, **cure}, models=models)
         if after and all(one.fits for one in after):
-            return Change({**cures, **cure}, nodes, after[0])
+            return Change({**cures, **cure}, nodes, min(after, key=lambda one: one.margin_us))
     return None
 
 

@@ -80,6 +80,7 @@ class Ieee1394Bus(Section):
                     f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
                     f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number",
                     key="bus.gap_count",
+                    kind="inconsistent",
                 )
             )
         return self
@@ -183,13 +184,19 @@ class TableExecution(Section):
     @model_validator(mode="after")
     def _is_a_table(self) -> Self:
         problems = [
-            Problem(f"payloads must ascend, and this follows {one}", key=f"node.execution.payload_bytes.{index}")
+            Problem(
+                f"payloads must ascend, and this follows {one}",
+                key=f"node.execution.payload_bytes.{index}",
+                kind="inconsistent",
+            )
             for index, (one, other) in enumerate(pairwise(self.payload_bytes), start=1)
             if one >= other
         ]
         if len(self.payload_bytes) != len(self.time_us):
             values = f"has {len(self.time_us)} values and payload_bytes has {len(self.payload_bytes)}"
-            problems.append(Problem(f"{values}: the two must be of one length", key="node.execution.time_us"))
+            problems.append(
+                Problem(f"{values}: the two must be of one length", key="node.execution.time_us", kind="inconsistent")
+            )
         if problems:
             raise refused(*problems)
         return self

@@ -5,9 +5,9 @@ import tomllib
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final
 
-from busplan.errors import BusplanError
+from busplan.errors import PlacedError, PlacedProblem
 
 if TYPE_CHECKING:
     from busplan.profile.positions import KeyPath, Place
@@ -30,6 +30,10 @@ class Lines:
         self._text = text
         self._starts = [0, *(at + 1 for at, character in enumerate(text) if character == "\n")]
 
+    def offset(self, line: int, column: int) -> int:
+        """Offset of a line and column."""
+        return self._starts[line - 1] + column - 1
+
     def line_and_column(self, offset: int) -> tuple[int, int]:
         """Line and column of an offset; one past the end belongs to the last line that has text."""
         if offset >= len(self._text):
@@ -50,54 +54,56 @@ class Document:
         """Line and column of every offset."""
         return Lines(self.text)
 
-    @cached_property
+    @property
     def places(self) -> "dict[KeyPath, Place]":
         """Place of every key; the text must be one that tomllib accepts."""
+        return self._scanned[0]
+
+    @property
+    def comments(self) -> list[int]:
+        """Offset of every comment, its hash included; the text must be one that tomllib accepts."""
+        return self._scanned[1]
+
+    @cached_property
+    def _scanned(self) -> "tuple[dict[KeyPath, Place], list[int]]":
         from busplan.profile.positions import scan  # only who asks for places pays for the scanner
 
         return scan(self.text)
 
-    def at(self, offset: int) -> str:
-        """Make file:line:column of an offset."""
+    def syntax_error(self, offset: int, message: str) -> PlacedError:
+        """Make the error for a text that is no TOML, at an offset."""
         line, column = self.lines.line_and_column(offset)
-        return f"{self.name}:{line}:{column}"
+        return PlacedError(self.name, (PlacedProblem(line, column, "syntax", message),))
 
     def data(self) -> dict[str, Any]:
         """Parse the text.
 
         Raises
         ------
-        BusplanError
+        PlacedError
             The text is no TOML; with the place where it stops being so.
         """
         long_key = re.search(_LONG_KEY, self.text)
         if long_key:
-            raise BusplanError(
-                f"{self.at(long_key.start())}: a key of more than {_MAX_KEY_PARTS} parts is no profile's"
-            )
+            raise self.syntax_error(long_key.start(), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
         try:
             return tomllib.loads(self.text)
         except RecursionError:
-            raise BusplanError(
-                f"{self.at(_first_deep_bracket(self.text))}: nested too deeply; "
-                "a profile needs no more than two brackets inside each other"
-            ) from None
+            message = "nested too deeply; a profile needs no more than two brackets inside each other"
+            raise self.syntax_error(_first_deep_bracket(self.text), message) from None
         except ValueError as error:
-            self._refuse(error)
+            raise self._refusal(error) from None
 
-    def _refuse(self, error: ValueError) -> NoReturn:
+    def _refusal(self, error: ValueError) -> PlacedError:
         match = re.match(_TOMLLIB_MESSAGE, str(error))
         if match is None:  # the one error that is Python's own and not TOML's
             long_integer = re.search(_LONG_INTEGER, self.text)
-            place = self.at(long_integer.start() if long_integer else 0)
-            raise BusplanError(f"{place}: not valid TOML: a number with too many digits") from None
-        what = match["what"][:1].lower() + match["what"][1:]
-        if match["line"]:
-            place = f"{self.name}:{match['line']}:{match['column']}"
-        else:
-            place = self.at(len(self.text))
-            what += ", and the file ends"
-        raise BusplanError(f"{place}: not valid TOML: {what}") from None
+            offset = long_integer.start() if long_integer else 0
+            return self.syntax_error(offset, "not valid TOML: a number with too many digits")
+        what = f"not valid TOML: {match['what'][:1].lower()}{match['what'][1:]}"
+        if not match["line"]:
+            return self.syntax_error(len(self.text), f"{what}, and the file ends")
+        return self.syntax_error(self.lines.offset(int(match["line"]), int(match["column"])), what)
 
 
 def _first_deep_bracket(text: str) -> int:

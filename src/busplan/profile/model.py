@@ -63,6 +63,7 @@ class Profile(Section):
                     f"is outside the execution table, {execution.range_bytes}: measure it and add it to "
                     'node.execution, or use kind = "linear"',
                     key=f"payload.{key}",
+                    kind="execution-unknown",
                 )
                 for key, size in (
                     ("read_bytes", self.payload.read_bytes),

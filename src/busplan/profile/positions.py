@@ -29,6 +29,7 @@ class Place(NamedTuple):
 
 _SPACE: Final = re.compile(r"[ \t]*")
 _SPACE_AND_LINES: Final = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
+_COMMENT: Final = re.compile(r"#[^\n]*")
 _KEY_PART: Final = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'""")
 # A multi-line string may end in one or two quotes of its own before the closing three.
 _STRING: Final = re.compile(
@@ -53,6 +54,7 @@ class _Scanner:
         self.text = text
         self.at = 0
         self.places: dict[KeyPath, Place] = {}
+        self.comments: list[int] = []
         self.last_element: dict[KeyPath, int] = {}
         """Index of the newest table of each array of tables."""
 
@@ -61,15 +63,21 @@ class _Scanner:
         if match:
             self.at = match.end()
 
+    def skip_lines(self) -> None:
+        """Skip space, line ends and comments, and remember where the comments begin."""
+        start = self.at
+        self.skip(_SPACE_AND_LINES)
+        self.comments.extend(match.start() for match in _COMMENT.finditer(self.text, start, self.at))
+
     def document(self) -> dict[KeyPath, Place]:
         table: KeyPath = ()
-        self.skip(_SPACE_AND_LINES)
+        self.skip_lines()
         while self.at < len(self.text):
             if self.text[self.at] == "[":
                 table = self.header()
             else:
                 self.key_and_value(table)
-            self.skip(_SPACE_AND_LINES)
+            self.skip_lines()
         return self.places
 
     def header(self) -> KeyPath:
@@ -157,10 +165,10 @@ class _Scanner:
         """Close what ends here; the path of the next value, or None after the last."""
         while open_containers:
             container = open_containers[-1]
-            self.skip(_SPACE_AND_LINES)
+            self.skip_lines()
             if self.text[self.at] == ",":
                 self.at += 1
-                self.skip(_SPACE_AND_LINES)
+                self.skip_lines()
             if self.text[self.at] in "]}":
                 self.at += 1
                 self.close(container.path, container.start)
@@ -180,8 +188,8 @@ def _key_value(written: str) -> str:
     return written
 
 
-def scan(text: str) -> dict[KeyPath, Place]:
-    r"""Find the place of every key and array element.
+def scan(text: str) -> tuple[dict[KeyPath, Place], list[int]]:
+    r"""Find the place of every key and array element, and of every comment.
 
     Parameters
     ----------
@@ -190,8 +198,10 @@ def scan(text: str) -> dict[KeyPath, Place]:
 
     Returns
     -------
-    dict
+    places
         Key paths in the order they first stand, with their places as offsets into `text`.
+    comments
+        Offsets of the hashes that begin a comment.
 
     References
     ----------
@@ -200,8 +210,12 @@ def scan(text: str) -> dict[KeyPath, Place]:
     Examples
     --------
     >>> text = "[bus]\nnodes = 2  # two\n"
-    >>> place = scan(text)["bus", "nodes"]
+    >>> places, comments = scan(text)
+    >>> place = places["bus", "nodes"]
     >>> text[place.key_start : place.key_end], text[place.value_start : place.value_end]
     ('nodes', '2')
+    >>> [text[at:] for at in comments]
+    ['# two\n']
     """
-    return _Scanner(text).document()
+    scanner = _Scanner(text)
+    return scanner.document(), scanner.comments

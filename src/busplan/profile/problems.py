@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from busplan.errors import BusplanError
+from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.document import Document
 from busplan.profile.model import Profile
@@ -45,6 +45,7 @@ class Finding(NamedTuple):
 
     path: KeyPath
     message: str
+    kind: ProblemKind
     shows_value: bool = True
     """Whether the value as written belongs into the message."""
 
@@ -81,17 +82,19 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:
         path = _path(details)
         if details["type"] == "busplan":
             for problem in details["ctx"]["problems"]:
-                yield Finding(_parsed(problem.key) if problem.key else path, problem.message)
+                yield Finding(_parsed(problem.key) if problem.key else path, problem.message, problem.kind)
         elif details["type"] == "missing":
-            yield Finding(path, _missing(path, data), shows_value=False)
+            yield Finding(path, _missing(path, data), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
-            yield Finding(path, _unknown(path, data), shows_value=False)
+            yield Finding(path, _unknown(path, data), "unknown-key", shows_value=False)
         elif details["type"] == "union_tag_not_found":
-            yield Finding((*path, "kind"), 'missing key; expected kind = "table" or kind = "linear"', shows_value=False)
+            message = 'missing key; expected kind = "table" or kind = "linear"'
+            yield Finding((*path, "kind"), message, "missing-key", shows_value=False)
         elif details["type"] == "union_tag_invalid":
-            yield Finding((*path, "kind"), 'expected "table" or "linear"')
+            yield Finding((*path, "kind"), 'expected "table" or "linear"', "out-of-range")
         else:
-            yield Finding(path, _expected(details))
+            kind: ProblemKind = "wrong-type" if details["type"] in _WRONG_TYPE else "out-of-range"
+            yield Finding(path, _expected(details), kind)
 
 
 def _path(details: ErrorDetails) -> KeyPath:
@@ -151,15 +154,13 @@ def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
     return f"unknown key; known here: {', '.join(known)}"
 
 
-def refusal(error: ValidationError, data: dict[str, Any], document: Document) -> BusplanError:
+def refusal(error: ValidationError, data: dict[str, Any], document: Document) -> PlacedError:
     """Make the error for a document: every problem at its place, in the order of places."""
     placed = sorted(
         ((_place(document, found.path), found) for found in findings(error, data)), key=lambda pair: pair[0].key_start
     )
-    messages = [_message(document, place, found) for place, found in placed[:_MOST_SHOWN]]
-    if len(placed) > _MOST_SHOWN:
-        messages.append(f"{document.name}: and {len(placed) - _MOST_SHOWN} more problems")
-    return BusplanError(*messages)
+    problems = tuple(_problem(document, place, found) for place, found in placed[:_MOST_SHOWN])
+    return PlacedError(document.name, problems, hidden=max(0, len(placed) - _MOST_SHOWN))
 
 
 def _place(document: Document, path: KeyPath) -> Place:
@@ -171,13 +172,14 @@ def _place(document: Document, path: KeyPath) -> Place:
     return Place(0, 0, 0, 0)
 
 
-def _message(document: Document, place: Place, found: Finding) -> str:
+def _problem(document: Document, place: Place, found: Finding) -> PlacedProblem:
     # A table that is spread over the file has no value to show.
     has_value = found.shows_value and place.value_start != place.key_start
     written = document.text[place.value_start : place.value_end] if has_value or _is_element(found) else ""
     key = _shortened(found.key, limit=100)
     subject = f"{key} = {_shortened(written)}" if written else key
-    return f"{document.at(place.key_start)}: {subject}: {found.message}"
+    line, column = document.lines.line_and_column(place.key_start)
+    return PlacedProblem(line, column, found.kind, f"{subject}: {found.message}", found.key)
 
 
 def _is_element(found: Finding) -> bool:

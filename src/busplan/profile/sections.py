@@ -5,6 +5,8 @@ from typing import Annotated, Final, NamedTuple
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from busplan.errors import ProblemKind
+
 # Bounds that no machine comes near; they keep every product of two quantities finite.
 MAX_TIME_US: Final = 1e9
 MIN_STEP_US: Final = 1e-3
@@ -21,6 +23,7 @@ class Problem(NamedTuple):
     message: str
     key: str | None = None
     """Dotted key it belongs to, where that is not the validator's own."""
+    kind: ProblemKind = "out-of-range"
 
 
 def refused(*problems: Problem) -> PydanticCustomError:

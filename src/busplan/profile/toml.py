@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from pydantic import ValidationError
 
-from busplan.errors import BusplanError
+from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.profile.document import Document, Lines
 from busplan.profile.model import Profile
 
@@ -37,20 +37,19 @@ def decode(content: bytes, *, name: str) -> Document:
 
     Raises
     ------
-    BusplanError
+    PlacedError
         Too large, or not UTF-8; the latter with its place.
     """
     if len(content) > MAX_FILE_BYTES:
-        raise BusplanError(f"{name}:1:1: the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML")
+        message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML"
+        raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = content[: error.start].decode("utf-8-sig")
         line, column = Lines(before + "?").line_and_column(len(before))
-        raise BusplanError(
-            f"{name}:{line}:{column}: not a text file: byte 0x{content[error.start]:02x} is not UTF-8; "
-            "a profile is TOML in UTF-8"
-        ) from None
+        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
+        raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
     # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
     return Document(name, text.replace("\r\n", "\n"))
 
@@ -84,7 +83,7 @@ def validate(document: Document) -> Profile:
 
     Raises
     ------
-    BusplanError
+    PlacedError
         No TOML, or no profile; one message for every problem of the file, in the order of their places.
     """
     data = document.data()
