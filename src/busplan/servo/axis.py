@@ -1,0 +1,205 @@
+"""One axis from its set-points to its position, by a fixed-step simulation of loop and drive."""
+
+from collections.abc import Callable, MutableSequence
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.errors import BusplanError
+from busplan.servo.delivery import Arrivals
+from busplan.servo.engine import Engine, compiled, is_compiled
+from busplan.servo.kernel import ROUND, Constants, run_rows
+from busplan.servo.parameters import Axis, LoopTiming
+from busplan.servo.plan import Plan, plans, stored_targets_mm
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int], None]
+
+MAX_STEPS = 50_000_000
+"""Two axes of that many positions take 800 MB."""
+
+_US_PER_S = 1e6
+_LARGEST_COUNT = 2.0**51
+"""Where `busplan.servo.kernel.ROUND` ends to be exact."""
+
+_SIGNATURE = (
+    "int64(float64[::1], UniTuple(float64, 13), float64[::1], int64[::1], float64[::1], float64[::1], float64[::1], "
+    "int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])"
+)
+_CHUNK_STEPS = {False: 30_000, True: 250_000}
+"""Steps between two reports of progress: some 40 ms of plain Python, some 6 ms compiled."""
+
+
+def simulate_axis(
+    setpoints_mm: Floats,
+    *,
+    axis: Axis,
+    timing: LoopTiming,
+    arrivals: Arrivals | None = None,
+    progress: Progress | None = None,
+    engine: Engine = "auto",
+) -> Floats:
+    """Simulate one axis over all cycles of a move.
+
+    Parameters
+    ----------
+    setpoints_mm
+        One set-point a cycle, the start at rest included, shape (cycles + 1,) [mm].
+    axis
+        Controller, drive and encoder.
+    timing
+        Where the loop is closed, and how often.
+    arrivals
+        When and whether the packets arrive (`busplan.servo.delivery.arrivals`); all of them on time by default.
+        A loop on the host loses a velocity command instead of a set-point, and the last one stands whatever
+        `on_loss` says: to hold a velocity is to extrapolate a position.
+    progress
+        Called with the number of steps done, now and then.
+    engine
+        "auto" (numba when it is installed), "numba" or "python"; the result is the same.
+
+    Returns
+    -------
+    ndarray
+        Position at the end of every step, shape (cycles * steps per period,) [mm]; always finite: the velocity
+        command is clipped, so even an unstable loop stays within `max_velocity_mm_s` times the duration.
+
+    Raises
+    ------
+    BusplanError
+        Too many steps, an encoder too fine for the travel, or "numba" without numba.
+
+    Notes
+    -----
+    With the error e = target - encoder(position), sampled each control period h (the step on a node, the period on
+    a host), the command is ``u = kp e + ki h sum(e) + kd (e - e before) / h + feed-forward``, clipped to the range
+    of the DAC (and then not integrated any further into the limit) and rounded to its levels.
+    The feed-forward takes the velocity and acceleration of the target from the set-points.
+
+    A node moves its target on the line between the last two set-points and reaches the newest one period late;
+    holding, it takes each set-point over one period late. A loop on the host samples at each synchronous packet;
+    its command takes effect `delay_us` later, but not later than the next such packet.
+
+    The drive follows command plus offset as a first-order lag. Coulomb friction, ``-reversal tanh(v / smoothing)``
+    with the drive velocity v, disturbs the velocity, and the drive takes the disturbance back with the time
+    constant of its recovery.
+
+    References
+    ----------
+    G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems.
+    B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, "A survey of models, analysis tools and compensation methods
+    for the control of machines with friction", Automatica 30 (7), 1994.
+
+    Examples
+    --------
+    An ideal drive with velocity feed-forward stands on its target, one period late:
+
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0, velocity_feedforward=1.0)
+    >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
+    >>> simulate_axis(np.array([0.0, 0.1, 0.2]), axis=axis, timing=timing).round(6).tolist()
+    [0.0, 0.0, 0.05, 0.1]
+    """
+    cycles = len(setpoints_mm) - 1
+    arrivals = Arrivals.punctual(cycles) if arrivals is None else arrivals
+    position_mm = np.empty(_checked_steps(setpoints_mm, axis=axis, timing=timing))
+    run = compiled(run_rows, _SIGNATURE) if is_compiled(engine) else None
+    chunk_steps = _CHUNK_STEPS[run is not None]
+    state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
+    for plan in plans(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
+        out = position_mm[done:]
+        # Plain Python handles its own floats twice as fast as numpy's.
+        done += run(state, constants, out, *plan) if run else _run_plain(state, constants, plan, out)
+        if progress is not None:
+            progress(done)
+    return position_mm
+
+
+def axis_targets(
+    setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals | None = None, every: int = 1
+) -> Floats:
+    """Give the target that `simulate_axis` follows, at the end of every step or of every n-th.
+
+    Parameters
+    ----------
+    setpoints_mm, axis, timing, arrivals
+        As for `simulate_axis`.
+    every
+        Steps from one value to the next [1].
+
+    Returns
+    -------
+    ndarray
+        The targets that belong to ``simulate_axis(...)[every - 1 :: every]`` [mm].
+
+    Examples
+    --------
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
+    >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
+    >>> axis_targets(np.array([0.0, 0.1, 0.2]), axis=axis, timing=timing, every=2).round(6).tolist()
+    [0.0, 0.1]
+    """
+    arrivals = Arrivals.punctual(len(setpoints_mm) - 1) if arrivals is None else arrivals
+    kept, passed = [np.empty(0)], 0
+    for plan in plans(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=_CHUNK_STEPS[False]):
+        targets = stored_targets_mm(plan)
+        kept.append(targets[(-1 - passed) % every :: every])
+        passed += len(targets)
+    return np.concatenate(kept)
+
+
+def _run_plain(state: Floats, constants: Constants, plan: Plan, out: Floats) -> int:
+    floats = state.tolist()
+    stored = run_rows(
+        floats, constants, cast("MutableSequence[float]", out.data), *(column.tolist() for column in plan)
+    )
+    state[:] = floats
+    return stored
+
+
+def _at_rest(position_mm: float, axis: Axis) -> Floats:
+    """State of the kernel for an axis that stands on its target."""
+    resolution = axis.encoder_resolution_mm
+    error = position_mm - (position_mm * (1 / resolution) + ROUND - ROUND) * resolution if resolution else 0.0
+    return np.array([position_mm, 0.0, 0.0, 0.0, 0.0, error, 0.0, 0.0])
+
+
+def _constants(axis: Axis, timing: LoopTiming) -> Constants:
+    """Constants of the kernel, as `Constants` lists them."""
+    period_s = timing.control_period_us / _US_PER_S
+    limit = axis.max_velocity_mm_s
+    # Two's complement, as DACs have it: one level more below zero than above.
+    level = 2 * limit / 2**axis.dac_bits if axis.dac_bits else 0.0
+    return (
+        axis.position_gain_per_s,
+        axis.integral_gain_per_s2,
+        axis.derivative_gain / period_s,
+        period_s,
+        1 / axis.encoder_resolution_mm if axis.encoder_resolution_mm else 0.0,
+        axis.encoder_resolution_mm,
+        -limit,
+        limit - level,
+        1 / level if level else 0.0,
+        level,
+        axis.drive_offset_mm_s,
+        axis.reversal_mm_s,
+        1 / axis.reversal_smoothing_mm_s if axis.reversal_mm_s else 0.0,
+    )
+
+
+def _checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> int:
+    """Count the steps of the move; refuse more than memory and arithmetic bear."""
+    cycles = len(setpoints_mm) - 1
+    steps = cycles * timing.steps_per_period
+    if steps > MAX_STEPS:
+        raise BusplanError(
+            f"step_us = {timing.step_us}: the move takes {steps} steps, more than {MAX_STEPS}; "
+            f"choose a longer step or a shorter move"
+        )
+    travel_mm = float(np.abs(setpoints_mm).max()) + axis.max_velocity_mm_s * cycles * timing.period_us / _US_PER_S
+    if travel_mm > _LARGEST_COUNT * axis.encoder_resolution_mm > 0:
+        raise BusplanError(
+            f"encoder_resolution_mm = {axis.encoder_resolution_mm}: too fine for {travel_mm:.3g} mm of travel; "
+            f"choose at least {travel_mm / _LARGEST_COUNT:.3g} mm, or 0 (ideal)"
+        )
+    return steps

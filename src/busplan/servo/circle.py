@@ -1,0 +1,229 @@
+"""The circle test: path, bus, both axes, mechanics and measures, joined."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.errors import BusplanError
+from busplan.servo.axis import axis_targets, simulate_axis
+from busplan.servo.contour import Contour, contour_error, measure_contour
+from busplan.servo.delivery import Arrivals, arrivals
+from busplan.servo.engine import Engine
+from busplan.servo.margins import LoopMargins, loop_margins
+from busplan.servo.mechanics import table_position
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.path import CirclePath
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+_IDEAL_DELIVERY = Delivery()
+_IDEAL_MECHANICS = Mechanics()
+_SETTLING_SHARE = 0.25
+"""The measures at constant speed leave out at most this share of it for the loop to settle."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trace:
+    """What happened over time, all of shape (n,)."""
+
+    time_us: Floats
+    command_x_mm: Floats
+    command_y_mm: Floats
+    x_mm: Floats
+    y_mm: Floats
+    contour_error_mm: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CircleRun:
+    """One simulated circle test.
+
+    Parameters
+    ----------
+    path, x, y, timing
+        What was simulated.
+    arrivals_x, arrivals_y
+        When and whether the packets arrived.
+    x_mm, y_mm
+        Position of the table at the end of every step, shape (steps,) [mm].
+    contour
+        The measures; finite even when the loop is unstable.
+    constant_speed
+        The steps that the measures at constant speed are taken from.
+    margins_x, margins_y
+        Stability of both position loops.
+    """
+
+    path: CirclePath
+    x: Axis
+    y: Axis
+    timing: LoopTiming
+    arrivals_x: Arrivals
+    arrivals_y: Arrivals
+    x_mm: Floats
+    y_mm: Floats
+    contour: Contour
+    constant_speed: slice
+    margins_x: LoopMargins
+    margins_y: LoopMargins
+
+    @property
+    def steps(self) -> int:
+        """Number of simulated steps [1]."""
+        return len(self.x_mm)
+
+    @property
+    def diverged(self) -> bool:
+        """Whether a loop is unstable, or the table left the circle by more than its radius."""
+        stable = self.margins_x.stable and self.margins_y.stable
+        return not stable or self.contour.max_contour_error_mm > self.path.radius_mm
+
+    def trace(self, *, every: int = 1) -> Trace:
+        """Give time, targets, positions and contour error at every n-th step.
+
+        Parameters
+        ----------
+        every
+            Steps from one entry to the next; the first entry is at the end of step number `every` [1].
+
+        Returns
+        -------
+        Trace
+            The targets are those the loops followed: interpolated, late and lost as they were.
+        """
+        if every < 1:
+            raise BusplanError(f"every = {every}: must be 1 or more")
+        seen = slice(every - 1, None, every)
+        target = partial(axis_targets, timing=self.timing, every=every)
+        x_mm, y_mm = self.x_mm[seen], self.y_mm[seen]
+        return Trace(
+            time_us=np.arange(every, self.steps + 1, every, dtype=np.float64) * self.timing.step_us,
+            command_x_mm=target(self.path.x_mm, axis=self.x, arrivals=self.arrivals_x),
+            command_y_mm=target(self.path.y_mm, axis=self.y, arrivals=self.arrivals_y),
+            x_mm=x_mm,
+            y_mm=y_mm,
+            contour_error_mm=contour_error(x_mm, y_mm=y_mm, radius_mm=self.path.radius_mm),
+        )
+
+
+def simulate_circle(
+    path: CirclePath,
+    *,
+    x: Axis,
+    y: Axis,
+    timing: LoopTiming,
+    delivery: Delivery = _IDEAL_DELIVERY,
+    mechanics: Mechanics = _IDEAL_MECHANICS,
+    progress: Progress | None = None,
+    engine: Engine = "auto",
+) -> CircleRun:
+    """Simulate a circle test on two axes and measure it.
+
+    Parameters
+    ----------
+    path
+        Set-points of the circle (`busplan.servo.path.circle_path`).
+    x, y
+        The axes.
+    timing
+        Where the loops are closed and how often; its period is the path's.
+    delivery
+        How set-points arrive; perfectly by default.
+    mechanics
+        What lies between encoders and table; nothing by default.
+    progress
+        Called with the number of steps done and to be done, over both axes, now and then.
+    engine
+        "auto" (numba when it is installed), "numba" or "python"; the result is the same.
+
+    Returns
+    -------
+    CircleRun
+        Positions, measures and margins.
+
+    Raises
+    ------
+    BusplanError
+        The periods differ, a drive cannot reach the feed, jitter and skew are too large for the period, there are
+        too many steps, or "numba" is not installed.
+
+    Notes
+    -----
+    The measures at constant speed begin when the set-points have reached the feed, one period has passed and the loops
+    have settled to a thousandth, but they leave out no more than a quarter; they end when the set-points slow down.
+
+    References
+    ----------
+    ISO 230-4, Test code for machine tools: circular tests for numerically controlled machine tools.
+
+    Examples
+    --------
+    Two P loops lag behind and cut the circle by r (1 / sqrt(1 + (w / kp)^2) - 1), w = feed / r:
+
+    >>> from busplan.servo.path import circle_path
+    >>> path = circle_path(50.0, feed_mm_per_min=6000.0, period_us=1000.0)
+    >>> axis = Axis(position_gain_per_s=50.0, max_velocity_mm_s=400.0)
+    >>> run = simulate_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))
+    >>> round(run.contour.radius_deviation_mm, 3), round(50 * (1 / (1 + (2 / 50) ** 2) ** 0.5 - 1), 3)
+    (-0.04, -0.04)
+    """
+    _check(path, x=x, y=y, timing=timing)
+    received = partial(arrivals, delivery, cycles=path.setpoints, period_us=path.period_us)
+    arrivals_x, arrivals_y = received(name="x"), received(name="y")
+    total = 2 * path.setpoints * timing.steps_per_period
+
+    def report(done_before: int, done: int) -> None:
+        if progress is not None:
+            progress(done_before + done, total)
+
+    run = partial(simulate_axis, timing=timing, engine=engine)
+    motor_x_mm = run(path.x_mm, axis=x, arrivals=arrivals_x, progress=partial(report, 0))
+    motor_y_mm = run(path.y_mm, axis=y, arrivals=arrivals_y, progress=partial(report, total // 2))
+    x_mm, y_mm = table_position(motor_x_mm, y_mm=motor_y_mm, mechanics=mechanics, engine=engine)
+    margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
+    constant_speed = _constant_speed(path, timing=timing, margins=(margins_x, margins_y))
+    return CircleRun(
+        path=path,
+        x=x,
+        y=y,
+        timing=timing,
+        arrivals_x=arrivals_x,
+        arrivals_y=arrivals_y,
+        x_mm=x_mm,
+        y_mm=y_mm,
+        contour=measure_contour(x_mm, y_mm=y_mm, radius_mm=path.radius_mm, constant_speed=constant_speed),
+        constant_speed=constant_speed,
+        margins_x=margins_x,
+        margins_y=margins_y,
+    )
+
+
+def _check(path: CirclePath, *, x: Axis, y: Axis, timing: LoopTiming) -> None:
+    problems = []
+    if path.period_us != timing.period_us:
+        problems.append(f"period_us = {timing.period_us}: the set-points of the path come every {path.period_us} us")
+    for name, axis in (("x", x), ("y", y)):
+        reachable = axis.max_velocity_mm_s - abs(axis.drive_offset_mm_s)
+        if path.feed_mm_s >= reachable:
+            problems.append(
+                f"feed_mm_per_min = {path.feed_mm_per_min}: axis {name} reaches {reachable * 60:g} mm/min with "
+                f"max_velocity_mm_s = {axis.max_velocity_mm_s}; the feed must stay below it"
+            )
+    if problems:
+        raise BusplanError(*problems)
+
+
+def _constant_speed(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> slice:
+    """Steps at constant speed, without those in which the loops settle; at least one."""
+    start, stop = path.constant_from_us + path.period_us, path.constant_until_us
+    settling = max(0.0 if margin.settling_us is None else margin.settling_us for margin in margins)
+    start += min(settling, _SETTLING_SHARE * max(stop - start, 0.0))
+    # Entry n of the positions is the state at the end of step n + 1.
+    first = math.ceil(start / timing.step_us) - 1
+    last = max(math.floor(stop / timing.step_us), first + 1)
+    return slice(first, last)

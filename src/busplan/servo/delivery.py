@@ -1,0 +1,197 @@
+"""How set-points arrive: the jitter of the synchronous packet, the skew between nodes, lost packets.
+
+The synchronous packet (SP) is one broadcast: when it is late it is late for every node, so its jitter is common
+to all axes. A set-point travels in a packet of its own to its own node, so losses are drawn for each node on
+its own. Each random quantity has its own stream: taking the losses away does not change the jitter.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.servo.checks import refuse
+from busplan.servo.parameters import Delivery, OnLoss
+
+AxisName = Literal["x", "y"]
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_JITTER_STREAM = 0
+_LOSS_STREAM = {"x": 1, "y": 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Arrivals:
+    """When and whether the packets of each cycle reach one node; the first and last entry stand for the rest there.
+
+    Parameters
+    ----------
+    offsets_us
+        How much later than planned the SP of each cycle takes effect, shape (cycles + 1,) [us].
+    lost
+        True where the packet with the set-point (of a loop on the host: with the command) is lost, same shape.
+    on_loss
+        What the node does then.
+    """
+
+    offsets_us: Floats
+    lost: Flags
+    on_loss: OnLoss = "hold"
+
+    @classmethod
+    def punctual(cls, cycles: int) -> Self:
+        """Everything arrives, and on time.
+
+        Examples
+        --------
+        >>> Arrivals.punctual(2).offsets_us.tolist()
+        [0.0, 0.0, 0.0]
+        """
+        return cls(offsets_us=np.zeros(cycles + 1), lost=np.zeros(cycles + 1, dtype=np.bool_))
+
+
+def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Arrivals:
+    """Draw the arrivals at one node for a whole move.
+
+    Parameters
+    ----------
+    delivery
+        Jitter, skew, losses and seed.
+    name
+        The node's axis: skew is added on "y".
+    cycles
+        Number of cycles of the move [1].
+    period_us
+        Communication period [us].
+
+    Returns
+    -------
+    Arrivals
+        The same for the same seed.
+
+    Raises
+    ------
+    BusplanError
+        Jitter and skew together exceed half the period.
+
+    Examples
+    --------
+    >>> arrivals(Delivery(skew_us=3.0), name="y", cycles=3, period_us=1000.0).offsets_us.tolist()
+    [0.0, 3.0, 3.0, 0.0]
+    """
+    return Arrivals(
+        offsets_us=arrival_offsets_us(delivery, name=name, cycles=cycles, period_us=period_us),
+        lost=lost_cycles(delivery, name=name, cycles=cycles),
+        on_loss=delivery.on_loss,
+    )
+
+
+def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:
+    """How much later than planned each SP takes effect on a node.
+
+    Parameters
+    ----------
+    delivery
+        Jitter, skew and seed.
+    name
+        The node's axis: skew is added on "y".
+    cycles
+        Number of cycles of the move [1].
+    period_us
+        Communication period [us].
+
+    Returns
+    -------
+    ndarray
+        Lateness of SP k, shape (cycles + 1,) [us]; uniform within plus or minus the jitter, about the skew. The
+        first and the last are 0: there the axes stand, and the move begins and ends with them.
+
+    Raises
+    ------
+    BusplanError
+        Jitter and skew together exceed half the period: the SPs would lose their order.
+
+    Notes
+    -----
+    Only the spread of the arrival counts. That a real delay has a lower bound and no upper one moves its mean,
+    and a mean delay common to all axes changes no contour.
+
+    Examples
+    --------
+    >>> arrival_offsets_us(Delivery(skew_us=3.0), name="y", cycles=3, period_us=1000.0).tolist()
+    [0.0, 3.0, 3.0, 0.0]
+    """
+    if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
+        refuse(
+            f"jitter_us = {delivery.jitter_us} and skew_us = {delivery.skew_us}: together they must not exceed "
+            f"half the period, {period_us / 2:g} us"
+        )
+    random = np.random.default_rng([delivery.seed, _JITTER_STREAM])
+    offsets = delivery.jitter_us * random.uniform(-1.0, 1.0, cycles + 1)
+    offsets += delivery.skew_us if name == "y" else 0.0
+    offsets[[0, -1]] = 0.0
+    return offsets
+
+
+def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
+    """Tell in which cycles the packet to one node is lost.
+
+    Parameters
+    ----------
+    delivery
+        Loss probability and seed.
+    name
+        The node's axis.
+    cycles
+        Number of cycles of the move [1].
+
+    Returns
+    -------
+    ndarray
+        True where the packet of cycle k is lost, shape (cycles + 1,); never at k = 0, where the axes stand.
+
+    Examples
+    --------
+    >>> lost_cycles(Delivery(loss_probability=1.0), name="x", cycles=2).tolist()
+    [False, True, True]
+    """
+    random = np.random.default_rng([delivery.seed, _LOSS_STREAM[name]])
+    lost = random.random(cycles + 1) < delivery.loss_probability
+    lost[0] = False
+    return lost
+
+
+def received_mm(setpoints_mm: Floats, *, lost: Flags, on_loss: OnLoss) -> Floats:
+    """Set-points as the node has them.
+
+    Parameters
+    ----------
+    setpoints_mm
+        Set-points as sent, shape (cycles + 1,) [mm].
+    lost
+        True where one did not arrive, same shape.
+    on_loss
+        "hold": the last one stands. "extrapolate": the line through the last two goes on.
+
+    Returns
+    -------
+    ndarray
+        Set-points as used, same shape [mm].
+
+    Examples
+    --------
+    >>> lost = np.array([False, False, True, True])
+    >>> received_mm(np.array([0.0, 1.0, 5.0, 7.0]), lost=lost, on_loss="extrapolate").tolist()
+    [0.0, 1.0, 2.0, 3.0]
+    >>> received_mm(np.array([0.0, 1.0, 5.0, 7.0]), lost=lost, on_loss="hold").tolist()
+    [0.0, 1.0, 1.0, 1.0]
+    """
+    received = setpoints_mm.copy()
+    # In order, for a loss may follow a loss.
+    for cycle in np.flatnonzero(lost).tolist():
+        last = received[cycle - 1]
+        before = received[max(cycle - 2, 0)] if on_loss == "extrapolate" else last
+        received[cycle] = last + (last - before)
+    return received

@@ -1,0 +1,123 @@
+"""The fixed-step kernel: one function, plain Python and numba alike.
+
+It runs over the rows of a plan (see `busplan.servo.plan`). A row is a run of sub-steps of equal length;
+its action says what happens in each: sample and control, let the command take effect, store the position.
+
+Only what numba compiles is used, and `x + ROUND - ROUND` instead of `round(x)`, which costs more than the rest of
+the loop in plain Python: adding 1.5 * 2^52 leaves no bit for the fraction, so the float unit itself rounds (half
+to even, exact below 2^51). The order of every operation is fixed, so both engines give the same floats.
+"""
+
+from collections.abc import Iterable, MutableSequence
+from math import tanh
+
+CONTROL = 1
+SWITCH = 2
+STORE = 4
+
+ROUND = 6755399441055744.0
+
+Constants = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float
+]  # fmt: skip
+"""kp [1/s], ki [1/s^2], kd / control period [1/s], control period [s], counts [1/mm], count [mm], lowest and
+highest command [mm/s], levels [s/mm], level [mm/s], drive offset [mm/s], friction [mm/s], 1 / smoothing [s/mm].
+Counts, levels and friction of 0 leave their element out."""
+
+
+def run_rows(  # noqa: C901 - calls would cost plain Python more than the arithmetic
+    state: MutableSequence[float],
+    constants: Constants,
+    out: MutableSequence[float],
+    substeps: Iterable[int],
+    target: Iterable[float],
+    increment: Iterable[float],
+    forward: Iterable[float],
+    action: Iterable[int],
+    length: Iterable[float],
+    drive_keep: Iterable[float],
+    drive_shift: Iterable[float],
+    friction_keep: Iterable[float],
+    friction_shift: Iterable[float],
+) -> int:
+    """Run one axis over the rows of a plan.
+
+    Parameters
+    ----------
+    state
+        Position [mm], drive velocity [mm/s], friction disturbance [mm/s], friction sign [1], integral of the error
+        [mm s], last error [mm], command in effect [mm/s], command on its way [mm/s]; taken up and left up to date.
+    constants
+        See `Constants`.
+    out
+        Takes the position [mm] at the end of every stored sub-step.
+    substeps, target, increment, forward, action, length, drive_keep, drive_shift, friction_keep, friction_shift
+        The columns of `busplan.servo.plan.Plan`.
+
+    Returns
+    -------
+    int
+        Number of positions stored.
+    """
+    kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
+    position, velocity, disturbance, sign, integral, last, command, pending = state
+    stored = 0
+    for n, start, move, feed, act, dt, keep, shift, fade, fade_shift in zip(  # noqa: B905 - numba knows no strict
+        substeps,
+        target,
+        increment,
+        forward,
+        action,
+        length,
+        drive_keep,
+        drive_shift,
+        friction_keep,
+        friction_shift,
+    ):
+        control = act & CONTROL
+        switch = act & SWITCH
+        store = act & STORE
+        aim = start
+        for _ in range(n):
+            if control:
+                error = aim - position
+                if counts > 0.0:
+                    error = aim - (position * counts + ROUND - ROUND) * resolution
+                integral += error * period
+                pending = kp * error + ki * integral + kd * (error - last) + feed
+                last = error
+                # No wind-up: a command that clips does not integrate any further into the limit.
+                if pending > highest:
+                    pending = highest
+                    if error > 0.0:
+                        integral -= error * period
+                elif pending < lowest:
+                    pending = lowest
+                    if error < 0.0:
+                        integral -= error * period
+                if levels > 0.0:
+                    pending = (pending * levels + ROUND - ROUND) * level
+                aim += move
+            if switch:
+                command = pending
+            if friction > 0.0:
+                turned = tanh(velocity * sharpness)
+                disturbance += friction * (sign - turned)
+                sign = turned
+            wanted = command + offset
+            lag = velocity - wanted
+            position += wanted * dt + lag * shift + disturbance * fade_shift
+            velocity = wanted + lag * keep
+            disturbance *= fade
+            if store:
+                out[stored] = position
+                stored += 1
+    state[0] = position
+    state[1] = velocity
+    state[2] = disturbance
+    state[3] = sign
+    state[4] = integral
+    state[5] = last
+    state[6] = command
+    state[7] = pending
+    return stored

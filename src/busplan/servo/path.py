@@ -1,0 +1,173 @@
+"""The circle that the host interpolates: one set-point each period, with speed ramps at both ends."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.errors import BusplanError
+from busplan.servo.checks import negative, not_one_of, not_positive, refuse
+
+Direction = Literal["ccw", "cw"]
+Floats = NDArray[np.float64]
+
+MAX_SETPOINTS = 10_000_000
+"""More than ten million set-points are a slip of the keyboard: 2.8 h at 1 ms."""
+
+_US_PER_S = 1e6
+_S_PER_MIN = 60.0
+_ROUNDING_PERIODS = 1e-9
+"""A move that ends on a period must not gain another one by a rounding error."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CirclePath:
+    """Set-points of one circle about the origin.
+
+    Parameters
+    ----------
+    radius_mm
+        Radius [mm].
+    feed_mm_per_min
+        Speed along the path between the ramps [mm/min].
+    period_us
+        Time from one set-point to the next [us].
+    x_mm, y_mm
+        Set-points, the start at time 0 included, shape (setpoints + 1,) [mm].
+    constant_from_us, constant_until_us
+        Time at which the speed reaches the feed, and leaves it [us].
+    """
+
+    radius_mm: float
+    feed_mm_per_min: float
+    period_us: float
+    x_mm: Floats
+    y_mm: Floats
+    constant_from_us: float
+    constant_until_us: float
+
+    @property
+    def setpoints(self) -> int:
+        """Number of set-points sent, which is the number of periods of the move [1]."""
+        return len(self.x_mm) - 1
+
+    @property
+    def duration_us(self) -> float:
+        """Duration of the move [us]."""
+        return self.setpoints * self.period_us
+
+    @property
+    def feed_mm_s(self) -> float:
+        """Speed along the path between the ramps [mm/s]."""
+        return self.feed_mm_per_min / _S_PER_MIN
+
+
+def circle_path(
+    radius_mm: float,
+    *,
+    feed_mm_per_min: float,
+    period_us: float,
+    ramp_periods: int = 100,
+    direction: Direction = "ccw",
+) -> CirclePath:
+    """Sample one full circle, from (r, 0) back to (r, 0), with trapezoidal speed along the path.
+
+    Parameters
+    ----------
+    radius_mm
+        Radius r [mm].
+    feed_mm_per_min
+        Speed F along the path between the ramps [mm/min].
+    period_us
+        Time T from one set-point to the next [us].
+    ramp_periods
+        Length of the speed ramp at each end, in periods; 0 starts and stops at full feed [1].
+    direction
+        "ccw" (anticlockwise, towards +y first) or "cw".
+
+    Returns
+    -------
+    CirclePath
+        The set-points and the times between which the speed is constant.
+
+    Raises
+    ------
+    BusplanError
+        A value is out of range, the circle is so short that the feed is never reached, or the move takes more
+        than `MAX_SETPOINTS` periods.
+
+    Notes
+    -----
+    With ramps of length R the move takes D = 2 pi r / F + R: each ramp covers half the way that full feed would.
+    The number of set-points is D / T, rounded up; the last period is cut short by the end of the path.
+
+    References
+    ----------
+    The durations of the circle test in G. Gu et al., IEEE Transactions on Industrial Electronics 57 (12), 2010,
+    section IV-B, follow from 100 ramp periods at either period.
+
+    Examples
+    --------
+    >>> slow = circle_path(320.0, feed_mm_per_min=2500.0, period_us=4000.0)
+    >>> slow.setpoints, slow.duration_us / 1e6
+    (12164, 48.656)
+    >>> fast = circle_path(320.0, feed_mm_per_min=10000.0, period_us=1000.0)
+    >>> fast.setpoints, fast.duration_us / 1e6
+    (12164, 12.164)
+    """
+    refuse(
+        *not_positive(radius_mm=radius_mm, feed_mm_per_min=feed_mm_per_min, period_us=period_us),
+        *negative(ramp_periods=ramp_periods),
+        *not_one_of("ccw", "cw", direction=direction),
+    )
+    period_s, feed_mm_s = period_us / _US_PER_S, feed_mm_per_min / _S_PER_MIN
+    length_mm, ramp_s = 2 * math.pi * radius_mm, ramp_periods * period_s
+    if length_mm < feed_mm_s * ramp_s:
+        raise BusplanError(_too_short(radius_mm, feed_mm_per_min=feed_mm_per_min, ramp_s=ramp_s))
+    duration_s = length_mm / feed_mm_s + ramp_s
+    periods = duration_s / period_s
+    if periods > MAX_SETPOINTS:
+        raise BusplanError(
+            f"feed_mm_per_min = {feed_mm_per_min}: the circle takes {periods:.3g} periods of {period_us:g} us, "
+            f"more than {MAX_SETPOINTS}; choose a faster feed, a smaller radius or a longer period"
+        )
+    time_s = np.arange(math.ceil(periods - _ROUNDING_PERIODS) + 1, dtype=np.float64) * period_s
+    way_mm = _trapezoid(time_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s, length_mm=length_mm)
+    angle = way_mm / radius_mm
+    return CirclePath(
+        radius_mm=radius_mm,
+        feed_mm_per_min=feed_mm_per_min,
+        period_us=period_us,
+        x_mm=radius_mm * np.cos(angle),
+        y_mm=radius_mm * np.sin(angle) * (1 if direction == "ccw" else -1),
+        constant_from_us=ramp_s * _US_PER_S,
+        constant_until_us=(duration_s - ramp_s) * _US_PER_S,
+    )
+
+
+def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: float) -> Floats:
+    """Way covered at each time [mm]."""
+    left_s = np.maximum(length_mm / feed_mm_s + ramp_s - time_s, 0.0)
+    if ramp_s == 0.0:
+        return length_mm - feed_mm_s * left_s
+    # Seen from its end the way is the mirror image of the start: one ramp serves both.
+    start_mm = _speeding_up(time_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s)
+    end_mm = length_mm - _speeding_up(left_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s)
+    return np.where(time_s < left_s, start_mm, end_mm)
+
+
+def _speeding_up(time_s: Floats, *, feed_mm_s: float, ramp_s: float) -> Floats:
+    ramp_mm = feed_mm_s * time_s**2 / (2 * ramp_s)
+    return np.where(time_s < ramp_s, ramp_mm, feed_mm_s * (time_s - ramp_s / 2))
+
+
+def _too_short(radius_mm: float, *, feed_mm_per_min: float, ramp_s: float) -> str:
+    length_mm = 2 * math.pi * radius_mm
+    reachable = length_mm / ramp_s * _S_PER_MIN
+    smallest_mm = feed_mm_per_min / _S_PER_MIN * ramp_s / (2 * math.pi)
+    return (
+        f"feed_mm_per_min = {feed_mm_per_min}: never reached on a circle of radius_mm = {radius_mm} with ramps "
+        f"of {ramp_s:g} s; choose at most {reachable:.6g} mm/min, at least {smallest_mm:.6g} mm, or shorter ramps"
+    )

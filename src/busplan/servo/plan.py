@@ -1,0 +1,259 @@
+"""What the kernel runs through: the cycles of a move, cut into rows of equal sub-steps.
+
+A node that closes the loop itself runs one row a cycle: the line between two set-points. A loop on the host is cut
+wherever something happens off the grid of the steps: where it samples and where its command takes effect.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.servo.delivery import Arrivals, received_mm
+from busplan.servo.kernel import CONTROL, STORE, SWITCH
+from busplan.servo.parameters import Axis, LoopTiming
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+_Number = TypeVar("_Number", np.float64, np.int64)
+
+_US_PER_S = 1e6
+
+
+class Plan(NamedTuple):
+    """Columns of the kernel's rows, all of one length.
+
+    Parameters
+    ----------
+    substeps
+        Number of sub-steps in the row [1].
+    target_mm, increment_mm
+        Target at the first control of the row, and what each further one adds [mm].
+    forward_mm_s
+        Feed-forward velocity [mm/s].
+    action
+        Sum of `CONTROL`, `SWITCH` and `STORE`, for each sub-step of the row.
+    length_s
+        Length of a sub-step [s]; 0 for a mere event.
+    drive_keep, drive_shift_s
+        What a sub-step leaves of the drive's lag, and its integral over the sub-step [1], [s].
+    friction_keep, friction_shift_s
+        The same of the friction disturbance [1], [s].
+    """
+
+    substeps: Ints
+    target_mm: Floats
+    increment_mm: Floats
+    forward_mm_s: Floats
+    action: Ints
+    length_s: Floats
+    drive_keep: Floats
+    drive_shift_s: Floats
+    friction_keep: Floats
+    friction_shift_s: Floats
+
+
+def plans(
+    setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, chunk_steps: int
+) -> Iterator[Plan]:
+    """Cut a move into rows, so many steps at a time that memory does not grow with the move.
+
+    Parameters
+    ----------
+    setpoints_mm
+        Set-points as sent, the start at rest included, shape (cycles + 1,) [mm].
+    axis
+        The axis: feed-forward, lag and recovery are needed here.
+    timing
+        Where the loop is closed, and how often.
+    arrivals
+        When and whether the packets of each cycle arrive.
+    chunk_steps
+        Steps in one plan, about [1].
+
+    Yields
+    ------
+    Plan
+        The rows in order of time.
+
+    Notes
+    -----
+    The drive is a first-order lag with a command that is constant over the sub-step, so its response is exact
+    (zero-order hold): with the drive time constant tau, a lag v - u shrinks by exp(-dt / tau) and moves the axis
+    by its integral tau (1 - exp(-dt / tau)).
+
+    References
+    ----------
+    G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems: zero-order-hold equivalents.
+
+    Examples
+    --------
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
+    >>> timing = LoopTiming(period_us=1000.0, step_us=100.0)
+    >>> sent_mm, on_time = np.array([0.0, 1.0, 2.0]), Arrivals.punctual(2)
+    >>> plan, = plans(sent_mm, axis=axis, timing=timing, arrivals=on_time, chunk_steps=1000)
+    >>> plan.substeps.tolist(), plan.target_mm.tolist(), plan.increment_mm.tolist()
+    ([10, 10], [0.0, 0.0], [0.0, 0.1])
+    """
+    make = _host_rows
+    if timing.loop == "node":
+        make = _node_rows
+        setpoints_mm = received_mm(setpoints_mm, lost=arrivals.lost, on_loss=arrivals.on_loss)
+    cycles = len(setpoints_mm) - 1
+    chunk = max(1, chunk_steps // timing.steps_per_period)
+    for first in range(0, cycles, chunk):
+        some = np.arange(first, min(first + chunk, cycles))
+        yield make(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, cycles=some)
+
+
+def stored_targets_mm(plan: Plan) -> Floats:
+    """Target at the end of every stored sub-step of a plan.
+
+    Parameters
+    ----------
+    plan
+        Rows of one axis.
+
+    Returns
+    -------
+    ndarray
+        On the line where there is one, else where the target stands [mm].
+
+    Examples
+    --------
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
+    >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
+    >>> sent_mm, on_time = np.array([0.0, 0.1, 0.2]), Arrivals.punctual(2)
+    >>> plan, = plans(sent_mm, axis=axis, timing=timing, arrivals=on_time, chunk_steps=1000)
+    >>> stored_targets_mm(plan).round(6).tolist()
+    [0.0, 0.0, 0.05, 0.1]
+    """
+    stored = np.where(plan.action & STORE, plan.substeps, 0)
+    within = np.arange(stored.sum()) - np.repeat(np.cumsum(stored) - stored, stored) + 1
+    return np.asarray(np.repeat(plan.target_mm, stored) + np.repeat(plan.increment_mm, stored) * within)
+
+
+def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> Plan:
+    steps = timing.steps_per_period
+    # Held, the previous set-point stands for the cycle; on the line, it is where the line starts.
+    ahead = 0 if timing.interpolation == "linear" else -1
+    start_mm, end_mm, forward_mm_s = _motion(setpoints_mm, axis=axis, timing=timing, cycles=cycles + ahead)
+    offset = arrivals.offsets_us[cycles[0] : cycles[-1] + 2] / timing.step_us
+    taken = np.ceil(offset).astype(np.int64)
+    available = steps + np.diff(taken)
+    if timing.interpolation == "hold":
+        return _fill(axis, timing, substeps=available, target_mm=end_mm, forward_mm_s=forward_mm_s)
+    slope_mm = (end_mm - start_mm) / steps
+    on_line = np.minimum(available, steps)
+    # The next SP is late: the line has ended, and the target stands there.
+    waiting = available - on_line
+    late_mm = slope_mm * (taken - offset)[:-1]
+    if not waiting.any():
+        return _fill(
+            axis,
+            timing,
+            substeps=on_line,
+            target_mm=start_mm + late_mm,
+            increment_mm=slope_mm,
+            forward_mm_s=forward_mm_s,
+        )
+    none = np.zeros_like(slope_mm)
+    return _fill(
+        axis,
+        timing,
+        substeps=_interleave(on_line, waiting),
+        target_mm=_interleave(start_mm + late_mm, end_mm),
+        increment_mm=_interleave(slope_mm, none),
+        forward_mm_s=_interleave(forward_mm_s, none),
+    )
+
+
+def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> Plan:
+    here_mm, _, forward_mm_s = _motion(setpoints_mm, axis=axis, timing=timing, cycles=cycles + 1)
+    edges = np.append(cycles, cycles[-1] + 1)
+    times = edges * timing.steps_per_period + arrivals.offsets_us[edges] / timing.step_us
+    sampled, following = times[:-1], times[1:]
+    # A command waits no longer than for the next SP, which takes over whatever has arrived.
+    switched = np.minimum(sampled + timing.delay_us / timing.step_us, following)
+    once, nothing = np.ones_like(cycles), np.zeros_like(sampled)
+    pieces = [
+        (once, nothing, CONTROL * once),
+        *_pieces(sampled, switched),
+        (np.where(arrivals.lost[cycles], 0, 1), nothing, SWITCH * once),
+        *_pieces(switched, following),
+    ]
+    substeps, length, action = (_interleave(*column) for column in zip(*pieces, strict=True))
+    return _fill(
+        axis,
+        timing,
+        substeps=substeps,
+        target_mm=np.repeat(here_mm, len(pieces)),
+        forward_mm_s=np.repeat(forward_mm_s, len(pieces)),
+        action=action,
+        length_s=length * (timing.step_us / _US_PER_S),
+    )
+
+
+def _pieces(start: Floats, stop: Floats) -> list[tuple[Ints, Floats, Ints]]:
+    """Count, length in steps and action of what lies between two times: to the grid, along it, off it again."""
+    grid, leave = np.ceil(start), np.floor(stop)
+    inside = grid > leave
+    head = np.where(inside, stop, grid) - start
+    tail = np.where(inside, 0.0, stop - leave)
+    body = np.maximum(leave - grid, 0.0)
+    return [
+        ((head > 0).astype(np.int64), head, np.where(inside, 0, STORE)),
+        (body.astype(np.int64), np.ones_like(body), np.full(body.shape, STORE)),
+        ((tail > 0).astype(np.int64), tail, np.zeros(tail.shape, dtype=np.int64)),
+    ]
+
+
+def _motion(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, cycles: Ints) -> tuple[Floats, Floats, Floats]:
+    """Where the line of each cycle starts and ends [mm], and its feed-forward velocity [mm/s]."""
+    before, start, end = (setpoints_mm[np.clip(cycles - back, 0, len(setpoints_mm) - 1)] for back in (2, 1, 0))
+    period_s = timing.period_us / _US_PER_S
+    velocity = (end - start) / period_s
+    acceleration = (end - start - (start - before)) / period_s**2
+    forward = axis.velocity_feedforward * velocity + axis.acceleration_feedforward_s * acceleration
+    return start, end, forward
+
+
+def _fill(
+    axis: Axis,
+    timing: LoopTiming,
+    *,
+    substeps: Ints,
+    target_mm: Floats,
+    forward_mm_s: Floats,
+    increment_mm: Floats | None = None,
+    action: Ints | None = None,
+    length_s: Floats | None = None,
+) -> Plan:
+    """Add what all rows have alike: by default whole steps that control, switch and store, on a standing target."""
+    if length_s is None:
+        length_s = np.full(substeps.shape, timing.step_us / _US_PER_S)
+    return Plan(
+        substeps,
+        target_mm,
+        np.zeros(substeps.shape) if increment_mm is None else increment_mm,
+        forward_mm_s,
+        np.full(substeps.shape, CONTROL | SWITCH | STORE) if action is None else action,
+        length_s,
+        *_decay(length_s, time_constant_s=axis.drive_lag_us / _US_PER_S),
+        *_decay(length_s, time_constant_s=axis.reversal_recovery_us / _US_PER_S),
+    )
+
+
+def _decay(length_s: Floats, *, time_constant_s: float) -> tuple[Floats, Floats]:
+    """What is left of 1 after each length, and its integral until then [1], [s]."""
+    if time_constant_s == 0.0:
+        return np.zeros_like(length_s), np.zeros_like(length_s)
+    # A lag far below the step is gone within it, whatever the size of the exponent.
+    with np.errstate(over="ignore", under="ignore"):
+        lost = -np.expm1(-length_s / time_constant_s)
+    return 1.0 - lost, time_constant_s * lost
+
+
+def _interleave(*columns: NDArray[_Number]) -> NDArray[_Number]:
+    return np.column_stack(columns).ravel()
