@@ -58,7 +58,8 @@ def compiled(function: Callable[..., Any], signature: str) -> Callable[..., Any]
 
     Examples
     --------
-    >>> compiled(abs, "no signature") is None
+    >>> double = compiled(lambda x: 2 * x, "float64(float64)")  # no file to keep a cache for
+    >>> double is None
     True
     """
     try:
@@ -67,5 +68,5 @@ def compiled(function: Callable[..., Any], signature: str) -> Callable[..., Any]
         return None
     try:
         return numba.njit(signature, cache=True)(function)
-    except (RuntimeError, OSError, TypeError):
+    except (RuntimeError, OSError):
         return None

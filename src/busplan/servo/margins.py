@@ -1,13 +1,13 @@
 """How far the position loop is from instability, as the discrete loop it is, its delay included.
 
 All polynomials are in w = z - 1 (the delta operator): position loops have their poles close to z = 1, where
-polynomials in z lose half of their digits. On the unit circle the gain and the phase of a ratio of such polynomials
-are polynomials in y = |w|^2 = 4 sin^2(theta / 2), so all crossovers are roots and none is missed between the points
-of a grid.
+polynomials in z lose half of their digits.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,10 @@ from busplan.servo.parameters import Axis, LoopTiming
 Floats = NDArray[np.float64]
 
 _US_PER_S = 1e6
-_NYQUIST = 4.0
 _SETTLED = 1e-3
 """Share of a disturbance that is left when the loop counts as settled."""
-_REAL = 1e-6
-"""Relative imaginary part up to which a root counts as real: two crossovers about to merge are one."""
+_GRID = 4000
+_BISECTIONS = 60
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,14 +97,15 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
     outside = 2 * poles.real + np.abs(poles) ** 2
     if not np.all(outside < 0):
         return LoopMargins(stable=False)
-    turn, gain_one = _phase_margin(numerator, denominator)
+    angles = _grid(numerator, denominator, poles)
+    turn, gain_one = _phase_margin(angles, numerator, denominator)
     period_s = timing.control_period_us / _US_PER_S
     slowest = float(outside.max())
     settling = 2 * math.log(_SETTLED) / math.log1p(slowest) if slowest > -1 else 1.0
     return LoopMargins(
         stable=True,
         phase_margin_deg=turn,
-        gain_margin_db=_gain_margin(numerator, denominator),
+        gain_margin_db=_gain_margin(angles, numerator, denominator),
         crossover_hz=None if gain_one is None else gain_one / (2 * math.pi * period_s),
         settling_us=settling * timing.control_period_us,
     )
@@ -171,58 +171,43 @@ def _at(angle: Floats, numerator: Floats, denominator: Floats) -> NDArray[np.com
     return np.asarray(np.polyval(numerator, w) / np.polyval(denominator, w))
 
 
-def _phase_margin(numerator: Floats, denominator: Floats) -> tuple[float | None, float | None]:
+def _grid(numerator: Floats, denominator: Floats, poles: NDArray[Any]) -> Floats:
+    """Angles between which to look for crossovers [rad].
+
+    The loop gain is smooth between its corners, so a fine grid over all of them misses nothing, but for a notch
+    of lightly damped zeros: their angles are points of the grid themselves.
+    """
+    zeros = np.roots(numerator)
+    corners = np.abs(np.concatenate([zeros, np.roots(denominator), poles]))
+    lowest = min(0.01 * corners[corners > 0].min(), 0.1)
+    notches = np.abs(np.angle(1 + zeros))
+    return np.union1d(np.geomspace(lowest, math.pi, _GRID), notches[notches > lowest])
+
+
+def _phase_margin(angles: Floats, numerator: Floats, denominator: Floats) -> tuple[float | None, float | None]:
     """Phase margin [deg] and the angle on the unit circle where it is counted [rad]."""
-    angles = _angles(np.polyadd(_squared(numerator), -_squared(denominator)))
-    if not angles.size:
+    crossings = _crossings(angles, lambda angle: np.abs(_at(angle, numerator, denominator)) - 1)
+    if not crossings.size:
         return None, None
-    margins = np.abs(np.degrees(np.angle(-_at(angles, numerator, denominator))))
-    return float(margins.min()), float(angles[margins.argmin()])
+    margins = np.abs(np.degrees(np.angle(-_at(crossings, numerator, denominator))))
+    return float(margins.min()), float(crossings[margins.argmin()])
 
 
-def _gain_margin(numerator: Floats, denominator: Floats) -> float | None:
-    # At half the control rate everything is real, whatever the polynomial says.
-    angles = np.append(_angles(_imaginary(numerator, denominator)), math.pi)
-    response = _at(angles, numerator, denominator).real
+def _gain_margin(angles: Floats, numerator: Floats, denominator: Floats) -> float | None:
+    crossings = _crossings(angles[:-1], lambda angle: _at(angle, numerator, denominator).imag)
+    # At half the control rate everything is real, and no sign need change there.
+    response = _at(np.append(crossings, math.pi), numerator, denominator).real
     opposed = -response[response < 0]
     return float(np.abs(20 * np.log10(opposed)).min()) if opposed.size else None
 
 
-def _angles(polynomial: Floats) -> Floats:
-    """Angles on the upper unit circle at the roots of a polynomial in y [rad]."""
-    roots = np.roots(polynomial)
-    real = roots.real[np.abs(roots.imag) <= _REAL * np.abs(roots)]
-    return np.asarray(2 * np.arcsin(np.sqrt(real[(real > 0) & (real <= _NYQUIST)]) / 2))
-
-
-def _squared(polynomial: Floats) -> Floats:
-    """|P(w)|^2 on the unit circle as a polynomial in y = w conj(w) = -(w + conj(w))."""
-    total = np.zeros(1)
-    for i, a in enumerate(polynomial[::-1]):
-        for j, b in enumerate(polynomial[::-1]):
-            if j >= i:
-                term = _lucas(j - i, (np.array([2.0]), np.array([-1.0, 0.0]))) / (2 if i == j else 1)
-                total = np.polyadd(total, a * b * np.polymul(_power(i), term))
-    return total
-
-
-def _imaginary(numerator: Floats, denominator: Floats) -> Floats:
-    """Im(N conj(D)) / Im(w) on the unit circle as a polynomial in y."""
-    total = np.zeros(1)
-    for i, a in enumerate(numerator[::-1]):
-        for j, b in enumerate(denominator[::-1]):
-            term = _lucas(abs(i - j), (np.array([0.0]), np.array([1.0])))
-            total = np.polyadd(total, np.sign(i - j) * a * b * np.polymul(_power(min(i, j)), term))
-    return total
-
-
-def _lucas(n: int, start: tuple[Floats, Floats]) -> Floats:
-    """w^n + conj(w)^n from (2, -y), (w^n - conj(w)^n) / (w - conj(w)) from (0, 1): one recursion in y for both."""
-    this, following = start
-    for _ in range(n):
-        this, following = following, -np.polymul([1.0, 0.0], np.polyadd(this, following))
-    return this
-
-
-def _power(n: int) -> Floats:
-    return np.array([1.0] + [0.0] * n)
+def _crossings(angles: Floats, measure: Callable[[Floats], Floats]) -> Floats:
+    """Angles at which the measure changes its sign, by bisection [rad]."""
+    positive = measure(angles) > 0
+    before = np.flatnonzero(positive[:-1] != positive[1:])
+    low, high = angles[before], angles[before + 1]
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        crossed = (measure(middle) > 0) != positive[before]
+        low, high = np.where(crossed, low, middle), np.where(crossed, middle, high)
+    return np.asarray((low + high) / 2)

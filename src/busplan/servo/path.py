@@ -149,9 +149,9 @@ def circle_path(
 
 def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: float) -> Floats:
     """Way covered at each time [mm]."""
-    left_s = np.maximum(length_mm / feed_mm_s + ramp_s - time_s, 0.0)
     if ramp_s == 0.0:
-        return length_mm - feed_mm_s * left_s
+        return np.minimum(feed_mm_s * time_s, length_mm)
+    left_s = np.maximum(length_mm / feed_mm_s + ramp_s - time_s, 0.0)
     # Seen from its end the way is the mirror image of the start: one ramp serves both.
     start_mm = _speeding_up(time_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s)
     end_mm = length_mm - _speeding_up(left_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s)

@@ -146,7 +146,8 @@ def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
         return _fill(axis, timing, substeps=available, target_mm=end_mm, forward_mm_s=forward_mm_s)
     slope_mm = (end_mm - start_mm) / steps
     on_line = np.minimum(available, steps)
-    # The next SP is late: the line has ended, and the target stands there.
+    # The next SP is late: the line has ended, and the target stands there. The feed-forward goes on: a step that falls
+    # just before a packet must not tell the drive to stop.
     waiting = available - on_line
     late_mm = slope_mm * (taken - offset)[:-1]
     if not waiting.any():
@@ -158,14 +159,13 @@ def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
             increment_mm=slope_mm,
             forward_mm_s=forward_mm_s,
         )
-    none = np.zeros_like(slope_mm)
     return _fill(
         axis,
         timing,
         substeps=_interleave(on_line, waiting),
         target_mm=_interleave(start_mm + late_mm, end_mm),
-        increment_mm=_interleave(slope_mm, none),
-        forward_mm_s=_interleave(forward_mm_s, none),
+        increment_mm=_interleave(slope_mm, np.zeros_like(slope_mm)),
+        forward_mm_s=np.repeat(forward_mm_s, 2),
     )
 
 

@@ -1,0 +1,361 @@
+"""One axis: every element of the kernel against what it must do, and both engines against each other."""
+
+import importlib.util
+import math
+import tempfile
+import tracemalloc
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from busplan.errors import BusplanError
+from busplan.servo import axis as axis_module
+from busplan.servo import engine
+from busplan.servo.axis import MAX_STEPS, simulate_axis
+from busplan.servo.delivery import Arrivals, arrivals
+from busplan.servo.kernel import run_rows
+from busplan.servo.parameters import Axis, Delivery, LoopTiming
+
+Floats = NDArray[np.float64]
+
+TIMING = LoopTiming(period_us=1000.0, step_us=100.0)
+STEP_S = 1e-4
+
+
+def an_axis(**changes: Any) -> Axis:
+    values: dict[str, Any] = {"position_gain_per_s": 100.0, "max_velocity_mm_s": 400.0}
+    return Axis(**(values | changes))
+
+
+def ramp(speed_mm_s: float, *, cycles: int, period_s: float = 1e-3) -> Floats:
+    return speed_mm_s * period_s * np.arange(cycles + 1, dtype=np.float64)
+
+
+# --- closed forms ------------------------------------------------------------------------------------------
+
+
+def test_with_feed_forward_an_ideal_drive_stands_on_its_target() -> None:
+    setpoints = 10 * np.sin(np.linspace(0, 3, 300))
+    found = simulate_axis(setpoints, axis=an_axis(velocity_feedforward=1.0), timing=TIMING)
+    line = np.interp(np.arange(1, len(found) + 1) / 10 - 1, np.arange(300), setpoints)
+    np.testing.assert_allclose(found, line, rtol=0, atol=1e-12)
+
+
+def test_acceleration_feed_forward_makes_up_for_the_drive_lag() -> None:
+    """A drive with lag tau follows a velocity ramp exactly when it is told v + tau a."""
+    time_s = np.arange(400, dtype=np.float64) * 1e-3
+    setpoints = 0.5 * 300.0 * time_s**2
+    lag_us = 5000.0
+    plain, helped = (
+        simulate_axis(
+            setpoints,
+            axis=an_axis(velocity_feedforward=1.0, acceleration_feedforward_s=share, drive_lag_us=lag_us),
+            timing=TIMING,
+        )
+        for share in (0.0, lag_us / 1e6)
+    )
+    line = np.interp(np.arange(1, len(plain) + 1) / 10 - 1, np.arange(400), setpoints)
+    # tau a / kp behind without, the curve between set-points and the loop's own step with it.
+    assert (line - plain)[-1] == pytest.approx(300 * 5e-3 / 100, rel=1e-2)
+    assert abs((line - helped)[-1]) < 0.02 * abs((line - plain)[-1])
+
+
+def test_a_p_loop_lags_by_speed_over_gain_and_creeps_by_offset_over_gain() -> None:
+    speed = 50.0
+    moving = simulate_axis(ramp(speed, cycles=400), axis=an_axis(drive_lag_us=2000.0), timing=TIMING)
+    target = speed * (np.arange(1, len(moving) + 1) * STEP_S - 1e-3)
+    assert (target - moving)[-1] == pytest.approx(speed / 100, rel=1e-9)
+    standing = simulate_axis(np.zeros(400), axis=an_axis(drive_offset_mm_s=0.56), timing=TIMING)
+    assert standing[-1] == pytest.approx(0.56 / 100, rel=1e-9)
+
+
+def test_an_integral_takes_the_offset_away() -> None:
+    axis = an_axis(drive_offset_mm_s=0.56, integral_gain_per_s2=1000.0, drive_lag_us=2000.0)
+    assert abs(simulate_axis(np.zeros(2000), axis=axis, timing=TIMING)[-1]) < 1e-9
+
+
+def test_a_drive_told_a_velocity_approaches_it_exponentially() -> None:
+    """No gain, feed-forward only: the step response of the lag, exact at every step size."""
+    lag_s, speed = 5e-3, 20.0
+    for step_us in (50.0, 100.0, 500.0):
+        timing = LoopTiming(period_us=1000.0, step_us=step_us)
+        axis = an_axis(position_gain_per_s=0.0, velocity_feedforward=1.0, drive_lag_us=lag_s * 1e6)
+        found = simulate_axis(ramp(speed, cycles=50), axis=axis, timing=timing)
+        time_s = np.arange(1, len(found) + 1) * step_us / 1e6 - 1e-3
+        exact = np.where(time_s > 0, speed * (time_s - lag_s * -np.expm1(-np.maximum(time_s, 0) / lag_s)), 0.0)
+        np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12)
+
+
+def test_halving_the_step_halves_the_distance_to_the_continuous_loop() -> None:
+    """The loop on the node is a zero-order hold of half a step: first order."""
+    gain, lag_s, cycles = 80.0, 4e-3, 60
+    poles = np.roots([lag_s, 1.0, gain])
+    end_s = (cycles - 1) * 1e-3
+    # Error of the continuous loop on a ramp of 1 mm/s that starts at rest: tau e" + e' + kp e = 1, e(0) = 0, e'(0) = 1.
+    weights = np.linalg.solve(np.array([[1, 1], poles]), np.array([-1 / gain, 1.0]))
+    exact = end_s - (1 / gain + (weights * np.exp(poles * end_s)).sum().real)
+    errors = []
+    for step_us in (50.0, 25.0, 12.5, 6.25):
+        axis = an_axis(position_gain_per_s=gain, drive_lag_us=lag_s * 1e6)
+        timing = LoopTiming(period_us=1000.0, step_us=step_us)
+        errors.append(simulate_axis(ramp(1.0, cycles=cycles), axis=axis, timing=timing)[-1] - exact)
+    ratios = np.array(errors[:-1]) / np.array(errors[1:])
+    np.testing.assert_allclose(ratios, 2.0, rtol=0.05)
+
+
+def test_a_start_from_rest_costs_the_friction_times_its_recovery_and_a_reversal_twice_that() -> None:
+    axis = an_axis(
+        position_gain_per_s=0.0,
+        velocity_feedforward=1.0,
+        reversal_mm_s=1.6,
+        reversal_recovery_us=10_000.0,
+        reversal_smoothing_mm_s=0.5,
+    )
+    there_and_back = 50e-3 * np.concatenate([np.arange(200), np.arange(199, -1, -1)])
+    found = simulate_axis(there_and_back, axis=axis, timing=LoopTiming(period_us=1000.0, step_us=10.0))
+    at_turn = found[200 * 100] - 199 * 50e-3
+    at_end = found[-1] - 50e-3
+    assert at_turn == pytest.approx(-1.6 * 10e-3, rel=2e-3)
+    assert at_end - at_turn == pytest.approx(2 * 1.6 * 10e-3, rel=2e-3)
+
+
+# --- resolution and saturation -----------------------------------------------------------------------------
+
+
+def test_the_loop_does_not_see_below_half_an_encoder_count() -> None:
+    axis = an_axis(encoder_resolution_mm=0.01)
+    start = 5.0
+    for shift, moves in ((0.0, False), (0.01, True)):
+        setpoints = np.full(100, start + shift)
+        setpoints[0] = start
+        assert (np.abs(np.diff(simulate_axis(setpoints, axis=axis, timing=TIMING))) > 0).any() == moves
+    found = simulate_axis(np.append(start, np.full(200, start + 1.0)), axis=axis, timing=TIMING)
+    assert found[-1] == pytest.approx(start + 1.0, abs=0.5001 * 0.01)
+    assert found[-1] != start + 1.0
+
+
+def test_the_dac_has_exactly_its_levels_between_its_limits() -> None:
+    axis = an_axis(position_gain_per_s=50.0, max_velocity_mm_s=8.0, dac_bits=4)
+    far = simulate_axis(np.append(0.0, np.full(3000, 3.0)), axis=axis, timing=TIMING)
+    back = simulate_axis(np.append(0.0, np.full(3000, -3.0)), axis=axis, timing=TIMING)
+    speeds = np.concatenate([np.diff(far), np.diff(back)]) / STEP_S
+    levels = np.unique(speeds.round(6))
+    np.testing.assert_array_equal(levels, np.arange(-8.0, 8.0))
+
+
+def test_a_velocity_beyond_the_limit_is_clipped() -> None:
+    found = simulate_axis(np.append(0.0, np.full(1000, 500.0)), axis=an_axis(max_velocity_mm_s=10.0), timing=TIMING)
+    assert np.diff(found).max() == pytest.approx(10.0 * STEP_S)
+
+
+def test_the_integral_does_not_wind_up() -> None:
+    """Half a second at the limit with an integral of 8 mm s would overshoot by far more than the step."""
+    axis = an_axis(position_gain_per_s=50.0, integral_gain_per_s2=600.0, max_velocity_mm_s=100.0)
+    found = simulate_axis(np.append(0.0, np.full(2000, 50.0)), axis=axis, timing=TIMING)
+    assert found.max() < 50 * 1.02
+    assert found[-1] == pytest.approx(50.0, abs=1e-6)
+    back = simulate_axis(np.append(0.0, np.full(2000, -50.0)), axis=axis, timing=TIMING)
+    np.testing.assert_allclose(back, -found, rtol=0, atol=1e-12)
+
+
+# --- engines -----------------------------------------------------------------------------------------------
+
+FULL = {
+    "velocity_feedforward": 0.97,
+    "acceleration_feedforward_s": 0.004,
+    "integral_gain_per_s2": 300.0,
+    "derivative_gain": 0.01,
+    "drive_lag_us": 6000.0,
+    "drive_offset_mm_s": -0.4,
+    "dac_bits": 14,
+    "encoder_resolution_mm": 0.0005,
+    "reversal_mm_s": 1.1,
+    "reversal_recovery_us": 8000.0,
+    "reversal_smoothing_mm_s": 0.3,
+}
+
+
+@pytest.mark.skipif(importlib.util.find_spec("numba") is None, reason="numba (the extra `fast`) is not installed")
+@pytest.mark.parametrize("timing", [
+    TIMING,
+    LoopTiming(period_us=1000.0, interpolation="hold"),
+    LoopTiming(period_us=1000.0, loop="host", delay_us=437.0),
+])  # fmt: skip
+@pytest.mark.parametrize("changes", [FULL, {}, {"max_velocity_mm_s": 5.0, "integral_gain_per_s2": 400.0}])
+def test_both_engines_give_the_same_positions(timing: LoopTiming, changes: dict[str, Any]) -> None:
+    setpoints = 20 * np.sin(np.linspace(0, 20, 2001))
+    delivery = Delivery(jitter_us=30.0, skew_us=11.0, loss_probability=0.02, on_loss="extrapolate")
+    arriving = arrivals(delivery, name="y", cycles=2000, period_us=1000.0)
+    plain, compiled = (
+        simulate_axis(setpoints, axis=an_axis(**changes), timing=timing, arrivals=arriving, engine=name)
+        for name in ("python", "numba")
+    )
+    assert np.ptp(plain) > 1
+    np.testing.assert_allclose(compiled, plain, rtol=0, atol=1e-9)
+
+
+def test_without_numba_plain_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = simulate_axis(ramp(10.0, cycles=20), axis=an_axis(), timing=TIMING, engine="python")
+    monkeypatch.setattr(engine, "find_spec", lambda _: None)
+    found = simulate_axis(ramp(10.0, cycles=20), axis=an_axis(), timing=TIMING)
+    np.testing.assert_array_equal(found, expected)
+    with pytest.raises(BusplanError, match=r"busplan\[fast\]"):
+        simulate_axis(ramp(10.0, cycles=20), axis=an_axis(), timing=TIMING, engine="numba")
+
+
+def test_where_no_cache_can_be_written_plain_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError("read-only file system")
+
+    # The question numba asks of every place it could keep a cache in.
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    assert engine.compiled.__wrapped__(run_rows, axis_module._SIGNATURE) is None  # noqa: SLF001
+    monkeypatch.setattr(axis_module, "compiled", engine.compiled.__wrapped__)
+    assert simulate_axis(ramp(10.0, cycles=20), axis=an_axis(), timing=TIMING)[-1] > 0
+
+
+@pytest.mark.parametrize("loop", ["node", "host"])
+def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch, loop: str) -> None:
+    timing = LoopTiming(period_us=1000.0, loop=loop, delay_us=770.0)  # type: ignore[arg-type]
+    arriving = arrivals(Delivery(jitter_us=90.0), name="x", cycles=300, period_us=1000.0)
+    setpoints = 20 * np.sin(np.linspace(0, 3, 301))
+    kwargs = {"axis": an_axis(**FULL), "timing": timing, "arrivals": arriving, "engine": "python"}
+    whole = simulate_axis(setpoints, **kwargs)  # type: ignore[arg-type]
+    monkeypatch.setattr(axis_module, "_CHUNK_STEPS", {False: 70, True: 70})
+    done: list[int] = []
+    np.testing.assert_array_equal(simulate_axis(setpoints, **kwargs, progress=done.append), whole)  # type: ignore[arg-type]
+    assert len(done) == math.ceil(300 / 7)
+    assert done == sorted(done)
+    assert done[-1] == len(whole) == 3000
+
+
+def test_memory_grows_by_no_more_than_16_bytes_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(axis_module, "_CHUNK_STEPS", {False: 1000, True: 1000})
+
+    def peak(cycles: int) -> int:
+        setpoints = ramp(10.0, cycles=cycles)
+        tracemalloc.start()
+        simulate_axis(setpoints, axis=an_axis(), timing=TIMING)
+        _, highest = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return highest
+
+    peak(100)
+    short, long = peak(2000), peak(6000)
+    assert (long - short) / (4000 * TIMING.steps_per_period) <= 16
+
+
+# --- bad input ---------------------------------------------------------------------------------------------
+
+
+@settings(suppress_health_check=[HealthCheck.too_slow])
+@given(
+    gains=st.tuples(st.floats(0, 1e9), st.floats(0, 1e9), st.floats(0, 1e9)),
+    lag_us=st.floats(0, 1e9),
+    offset=st.floats(-1e9, 1e9),
+    resolution_mm=st.sampled_from([0.0, 1e-6, 0.001, 10.0]),
+    bits=st.sampled_from([0, 2, 16, 32]),
+    friction=st.floats(0, 1e9),
+    recovery_us=st.floats(0, 1e9),
+    loop=st.sampled_from(["node", "host"]),
+)
+def test_no_axis_however_unstable_leaves_the_numbers(
+    gains: tuple[float, float, float],
+    lag_us: float,
+    offset: float,
+    resolution_mm: float,
+    bits: int,
+    friction: float,
+    recovery_us: float,
+    loop: str,
+) -> None:
+    kp, ki, kd = gains
+    axis = an_axis(
+        position_gain_per_s=kp,
+        integral_gain_per_s2=ki,
+        derivative_gain=kd,
+        drive_lag_us=lag_us,
+        drive_offset_mm_s=offset,
+        encoder_resolution_mm=resolution_mm,
+        dac_bits=bits,
+        reversal_mm_s=friction,
+        reversal_recovery_us=recovery_us,
+        reversal_smoothing_mm_s=1e-9,
+    )
+    timing = LoopTiming(period_us=1000.0, loop=loop, delay_us=500.0)  # type: ignore[arg-type]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isfinite(simulate_axis(np.sin(np.arange(60.0)), axis=axis, timing=timing)).all()
+
+
+@pytest.mark.parametrize(
+    ("bad", "name"),
+    [
+        ({"position_gain_per_s": math.nan}, "position_gain_per_s"),
+        ({"position_gain_per_s": -1.0}, "position_gain_per_s"),
+        ({"integral_gain_per_s2": math.inf}, "integral_gain_per_s2"),
+        ({"derivative_gain": -0.1}, "derivative_gain"),
+        ({"velocity_feedforward": math.nan}, "velocity_feedforward"),
+        ({"acceleration_feedforward_s": math.inf}, "acceleration_feedforward_s"),
+        ({"drive_lag_us": -1.0}, "drive_lag_us"),
+        ({"drive_offset_mm_s": math.nan}, "drive_offset_mm_s"),
+        ({"max_velocity_mm_s": 0.0}, "max_velocity_mm_s"),
+        ({"dac_bits": 1}, "dac_bits"),
+        ({"dac_bits": 33}, "dac_bits"),
+        ({"encoder_resolution_mm": 1e-12}, "encoder_resolution_mm"),
+        ({"reversal_mm_s": 1.0}, "reversal_smoothing_mm_s"),
+    ],
+)
+def test_bad_values_are_named(bad: dict[str, float], name: str) -> None:
+    with pytest.raises(BusplanError, match=f"^{name} = "):
+        an_axis(**bad)
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"step_us": 2000.0}, "step_us = 2000.0: longer than the period of 1000 us"),
+        (
+            {"step_us": 300.0},
+            "step_us = 300.0: the period of 1000 us is no multiple of it; 333.333 or 250 us would fit",
+        ),
+        ({"step_us": 0.0}, "step_us = 0.0: must be above 0"),
+        ({"period_us": math.nan}, "period_us = nan: must be above 0"),
+        ({"delay_us": 1001.0}, "delay_us = 1001.0: must be between 0 and the period of 1000 us"),
+        ({"delay_us": math.nan}, "delay_us = nan: must be between 0"),
+        ({"loop": "cloud"}, "loop = 'cloud': must be one of 'node', 'host'"),
+        ({"interpolation": "cubic"}, "interpolation = 'cubic': must be one of 'linear', 'hold'"),
+    ],
+)
+def test_a_timing_that_cannot_be_simulated_says_what_would_do(bad: dict[str, Any], message: str) -> None:
+    values: dict[str, Any] = {"period_us": 1000.0}
+    with pytest.raises(BusplanError) as caught:
+        LoopTiming(**(values | bad))
+    assert str(caught.value).startswith(message)
+
+
+def test_a_third_of_a_millisecond_divides_it() -> None:
+    assert LoopTiming(period_us=1000.0, step_us=1000 / 3).steps_per_period == 3
+    assert LoopTiming(period_us=1000.0, step_us=0.1).steps_per_period == 10_000
+
+
+def test_too_many_steps_are_refused() -> None:
+    with pytest.raises(BusplanError, match=str(MAX_STEPS)):
+        simulate_axis(np.zeros(100_000), axis=an_axis(), timing=LoopTiming(period_us=1000.0, step_us=1.0))
+
+
+def test_an_encoder_too_fine_for_the_travel_is_refused() -> None:
+    setpoints = np.full(10, 1e7)
+    with pytest.raises(BusplanError, match=r"too fine for 1e\+07 mm of travel; choose at least 4\.44e-09 mm"):
+        simulate_axis(setpoints, axis=an_axis(encoder_resolution_mm=1e-9), timing=TIMING)
+
+
+def test_on_time_is_the_default() -> None:
+    setpoints = ramp(10.0, cycles=30)
+    expected = simulate_axis(setpoints, axis=an_axis(), timing=TIMING, arrivals=Arrivals.punctual(30))
+    np.testing.assert_array_equal(simulate_axis(setpoints, axis=an_axis(), timing=TIMING), expected)

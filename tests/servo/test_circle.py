@@ -1,0 +1,350 @@
+"""The circle test as a whole: what theory says of circles, and what must never happen."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from busplan.errors import BusplanError
+from busplan.servo.axis import simulate_axis
+from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.contour import contour_error
+from busplan.servo.delivery import Arrivals
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.path import CirclePath, circle_path
+
+Floats = NDArray[np.float64]
+
+RADIUS_MM = 50.0
+FEED_MM_PER_MIN = 6000.0
+FEED_MM_S = FEED_MM_PER_MIN / 60
+TURN_PER_S = FEED_MM_S / RADIUS_MM
+"""Angular speed w [rad/s]."""
+
+
+def an_axis(**changes: Any) -> Axis:
+    values: dict[str, Any] = {"position_gain_per_s": 50.0, "max_velocity_mm_s": 400.0}
+    return Axis(**(values | changes))
+
+
+def a_path(period_us: float = 1000.0, **changes: Any) -> CirclePath:
+    values: dict[str, Any] = {"feed_mm_per_min": FEED_MM_PER_MIN, "ramp_periods": 100}
+    return circle_path(RADIUS_MM, period_us=period_us, **(values | changes))
+
+
+def a_run(axis: Axis, y: Axis | None = None, *, timing: LoopTiming | None = None, **changes: Any) -> CircleRun:
+    timing = timing or LoopTiming(period_us=1000.0)
+    return simulate_circle(a_path(timing.period_us), x=axis, y=axis if y is None else y, timing=timing, **changes)
+
+
+def deadbeat(step_us: float, **changes: Any) -> Axis:
+    """An axis that stands on its target one step later: kp times the step is 1."""
+    return an_axis(position_gain_per_s=1e6 / step_us, **changes)
+
+
+def settled(run: CircleRun) -> Floats:
+    """Contour error well after the ramp."""
+    part = slice(run.steps // 3, run.constant_speed.stop)
+    return contour_error(run.x_mm[part], y_mm=run.y_mm[part], radius_mm=RADIUS_MM)
+
+
+# --- closed forms ------------------------------------------------------------------------------------------
+
+
+def test_a_p_loop_cuts_the_circle_as_the_continuous_one_does() -> None:
+    run = a_run(an_axis(), timing=LoopTiming(period_us=1000.0, step_us=20.0))
+    expected = RADIUS_MM * (1 / math.sqrt(1 + (TURN_PER_S / 50) ** 2) - 1)
+    assert settled(run).mean() == pytest.approx(expected, rel=5e-3)
+    assert run.contour.radius_deviation_mm == pytest.approx(expected, rel=5e-3)
+    # Matched axes lag, and the lag has no direction: a smaller circle, round and centred.
+    assert run.contour.circular_deviation_mm < 5e-3 * abs(expected)
+    assert run.contour.centre_offset_mm == pytest.approx((0, 0), abs=1e-4 * abs(expected))
+
+
+@pytest.mark.parametrize("lag_us", [0.0, 3000.0])
+def test_a_sampled_p_loop_cuts_the_circle_by_its_own_frequency_response(lag_us: float) -> None:
+    step_s, kp, lag_s = 1e-3, 50.0, lag_us / 1e6
+    run = a_run(an_axis(drive_lag_us=lag_us), timing=LoopTiming(period_us=1000.0, step_us=1000.0))
+    z = np.exp(1j * TURN_PER_S * step_s)
+    plant = step_s / (z - 1) - (
+        lag_s * (1 - math.exp(-step_s / lag_s)) / (z - math.exp(-step_s / lag_s)) if lag_s else 0
+    )
+    expected = RADIUS_MM * (abs(kp * plant / (1 + kp * plant)) - 1)
+    assert settled(run) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("delay_us", [0.0, 400.0, 1000.0])
+def test_a_delay_inside_the_loop_makes_the_circle_larger_and_the_margin_smaller(delay_us: float) -> None:
+    """The command is held for a period: half of one more, on average."""
+    kp, jw = 50.0, 1j * TURN_PER_S
+    timing = LoopTiming(period_us=1000.0, step_us=1000.0, loop="host", delay_us=delay_us)
+    run = a_run(an_axis(), timing=timing)
+    inside_s = delay_us / 1e6 + 0.5e-3
+    expected = RADIUS_MM * (kp / abs(jw + kp * np.exp(-jw * inside_s)) - 1)
+    assert settled(run) == pytest.approx(expected, rel=1e-3)
+    assert run.margins_x.phase_margin_deg == pytest.approx(90 - math.degrees(kp * inside_s), abs=0.01)
+
+
+def test_an_ideal_axis_shows_the_sagitta_of_its_lines() -> None:
+    period_s = 8e-3
+    timing = LoopTiming(period_us=8000.0, step_us=100.0)
+    run = simulate_circle(a_path(8000.0, ramp_periods=10), x=deadbeat(100.0), y=deadbeat(100.0), timing=timing)
+    sagitta = (FEED_MM_S * period_s) ** 2 / (8 * RADIUS_MM)
+    assert run.contour.radial_deviation_min_mm == pytest.approx(-sagitta, rel=1e-3)
+    assert abs(run.contour.radial_deviation_max_mm) < 1e-9
+    assert run.contour.circular_deviation_mm == pytest.approx(sagitta, rel=2e-3)
+
+
+def test_held_setpoints_shrink_the_circle_by_a_sinc_and_lines_by_its_square() -> None:
+    """A loop too slow for the stairs follows their fundamental."""
+    period_us = 10_000.0
+    radius = {}
+    for interpolation in ("hold", "linear"):
+        timing = LoopTiming(period_us=period_us, step_us=100.0, interpolation=interpolation)
+        path = a_path(period_us, ramp_periods=20)
+        axis = an_axis(position_gain_per_s=10.0)
+        run = simulate_circle(path, x=axis, y=axis, timing=timing)
+        part = slice(run.steps * 2 // 3, run.constant_speed.stop)
+        radius[interpolation] = np.hypot(run.x_mm[part], run.y_mm[part]).mean()
+    step_s, kp = 1e-4, 10.0
+    loop = abs(kp * step_s / (np.exp(1j * TURN_PER_S * step_s) - 1 + kp * step_s))
+    sinc = np.sinc(TURN_PER_S * period_us / 1e6 / 2 / math.pi)
+    assert RADIUS_MM * loop - radius["hold"] == pytest.approx(RADIUS_MM * loop * (1 - sinc), rel=0.02)
+    assert RADIUS_MM * loop - radius["linear"] == pytest.approx(RADIUS_MM * loop * (1 - sinc**2), rel=0.02)
+
+
+def test_mismatched_gains_make_an_ellipse() -> None:
+    kx, ky = 52.0, 50.0
+    run = a_run(an_axis(position_gain_per_s=kx), an_axis(position_gain_per_s=ky))
+    assert run.contour.circular_deviation_mm == pytest.approx(FEED_MM_S * abs(1 / kx - 1 / ky), rel=0.02)
+
+
+def test_offsets_of_the_drives_move_the_circle() -> None:
+    run = a_run(an_axis(drive_offset_mm_s=0.5), an_axis(drive_offset_mm_s=-1.0))
+    assert run.contour.centre_offset_mm == pytest.approx((0.5 / 50, -1.0 / 50), rel=1e-3)
+
+
+def test_skew_makes_an_ellipse_of_feed_times_skew() -> None:
+    skew_us = 40.0
+    perfect = deadbeat(100.0)
+    run = a_run(perfect, delivery=Delivery(skew_us=skew_us))
+    assert run.contour.circular_deviation_mm == pytest.approx(FEED_MM_S * skew_us / 1e6, rel=0.02)
+
+
+def test_mechanics_show_in_the_measures() -> None:
+    # Short ramps: an ellipse looks rounder when a part of it is missing.
+    kwargs = {"x": deadbeat(100.0), "y": deadbeat(100.0), "timing": LoopTiming(period_us=1000.0)}
+    short = a_path(ramp_periods=2)
+    scaled = simulate_circle(short, **kwargs, mechanics=Mechanics(scale_x_ppm=80.0, scale_y_ppm=-20.0))  # type: ignore[arg-type]
+    assert scaled.contour.circular_deviation_mm == pytest.approx(RADIUS_MM * 100e-6, rel=0.02)
+    leaning = simulate_circle(short, **kwargs, mechanics=Mechanics(squareness_um_per_m=-150.0))  # type: ignore[arg-type]
+    assert leaning.contour.circular_deviation_mm == pytest.approx(RADIUS_MM * 150e-6, rel=0.02)
+
+
+def test_backlash_steps_at_every_quadrant() -> None:
+    """Half a gap behind on each axis: outwards where it comes from outside, inwards where it comes from inside."""
+    run = a_run(deadbeat(100.0), mechanics=Mechanics(backlash_mm=0.02))
+    part = run.constant_speed
+    angle = np.degrees(np.arctan2(run.y_mm[part], run.x_mm[part]))
+    error = contour_error(run.x_mm[part], y_mm=run.y_mm[part], radius_mm=RADIUS_MM)
+    diagonal = np.abs(angle - 135) < 5
+    # Moving in -x and -y there: the table stays back by half a gap in both, +x costs and +y gains radius.
+    assert error[diagonal].mean() == pytest.approx(0, abs=1e-4)
+    assert run.contour.radial_deviation_max_mm == pytest.approx(0.01, rel=0.05)
+    crossing = np.abs(angle - 90) < 10
+    assert np.ptp(error[crossing]) > 0.9 * 0.01
+
+
+# --- symmetry ----------------------------------------------------------------------------------------------
+
+
+def test_clockwise_is_the_mirror_image() -> None:
+    axis = an_axis(drive_lag_us=3000.0, reversal_mm_s=1.0, reversal_recovery_us=1e4, reversal_smoothing_mm_s=0.5)
+    timing = LoopTiming(period_us=1000.0)
+    ccw, cw = (simulate_circle(a_path(direction=d), x=axis, y=axis, timing=timing) for d in ("ccw", "cw"))
+    np.testing.assert_array_equal(ccw.x_mm, cw.x_mm)
+    np.testing.assert_array_equal(ccw.y_mm, -cw.y_mm)
+
+
+def test_an_equal_delay_outside_the_loops_leaves_the_circle_as_it_is() -> None:
+    axis, timing, path = an_axis(drive_lag_us=3000.0), LoopTiming(period_us=1000.0), a_path()
+    late = Arrivals(offsets_us=np.full(path.setpoints + 1, 300.0), lost=np.zeros(path.setpoints + 1, dtype=bool))
+    late.offsets_us[[0, -1]] = 0.0
+    on_time, delayed = (
+        [simulate_axis(way, axis=axis, timing=timing, arrivals=arriving) for way in (path.x_mm, path.y_mm)]
+        for arriving in (None, late)
+    )
+    errors = [contour_error(x, y_mm=y, radius_mm=RADIUS_MM) for x, y in (on_time, delayed)]
+    np.testing.assert_allclose(errors[1][3:-10], errors[0][:-13], rtol=0, atol=1e-9)
+    assert np.abs(on_time[0] - delayed[0]).max() > 0.01
+
+
+def test_host_and_node_agree_on_a_circle_when_nothing_separates_them() -> None:
+    timing = {"period_us": 500.0, "step_us": 500.0}
+    node, host = (a_run(an_axis(), timing=LoopTiming(**timing, loop=loop)) for loop in ("node", "host"))  # type: ignore[arg-type]
+    errors = [np.hypot(run.x_mm, run.y_mm) - RADIUS_MM for run in (node, host)]
+    np.testing.assert_allclose(errors[0][1:], errors[1][:-1], rtol=0, atol=1e-9)
+
+
+# --- what a bus does ---------------------------------------------------------------------------------------
+
+
+def test_common_jitter_harms_little_and_skew_of_the_same_size_much() -> None:
+    axis = an_axis(position_gain_per_s=200.0)
+    calm, shaken, skewed = (
+        a_run(axis, delivery=delivery).contour.circular_deviation_mm
+        for delivery in (Delivery(), Delivery(jitter_us=50.0), Delivery(skew_us=50.0))
+    )
+    assert calm < shaken < 0.3 * skewed
+
+
+def test_losses_harm_and_extrapolation_heals_most_of_them() -> None:
+    axis = an_axis(position_gain_per_s=150.0, velocity_feedforward=1.0)
+    none, held, extrapolated = (
+        a_run(axis, delivery=delivery).contour.mean_contour_error_mm
+        for delivery in (
+            Delivery(),
+            Delivery(loss_probability=0.02, on_loss="hold"),
+            Delivery(loss_probability=0.02, on_loss="extrapolate"),
+        )
+    )
+    assert held > 5 * none
+    assert extrapolated < 0.2 * held
+
+
+@pytest.mark.parametrize("loop", ["node", "host"])
+def test_the_seed_decides_the_run(loop: str) -> None:
+    timing = LoopTiming(period_us=1000.0, loop=loop, delay_us=300.0)  # type: ignore[arg-type]
+    runs = [
+        a_run(an_axis(), timing=timing, delivery=Delivery(jitter_us=20.0, loss_probability=0.01, seed=seed))
+        for seed in (1, 1, 2)
+    ]
+    assert runs[0].contour == runs[1].contour
+    assert runs[0].contour != runs[2].contour
+
+
+# --- result ------------------------------------------------------------------------------------------------
+
+
+def test_the_trace_tells_times_targets_and_positions() -> None:
+    run = a_run(deadbeat(100.0, velocity_feedforward=1.0), delivery=Delivery(skew_us=30.0))
+    trace = run.trace(every=7)
+    np.testing.assert_allclose(trace.time_us, 700.0 * np.arange(1, run.steps // 7 + 1))
+    np.testing.assert_array_equal(trace.x_mm, run.x_mm[6::7])
+    np.testing.assert_array_equal(trace.y_mm, run.y_mm[6::7])
+    np.testing.assert_allclose(trace.contour_error_mm, np.hypot(trace.x_mm, trace.y_mm) - RADIUS_MM)
+    for command, position in ((trace.command_x_mm, trace.x_mm), (trace.command_y_mm, trace.y_mm)):
+        assert command.shape == position.shape
+        np.testing.assert_allclose(command, position, rtol=0, atol=1e-9)
+    with pytest.raises(BusplanError, match="every = 0"):
+        run.trace(every=0)
+
+
+def test_progress_goes_up_to_the_end() -> None:
+    told: list[tuple[int, int]] = []
+    run = a_run(an_axis(), progress=lambda done, total: told.append((done, total)))
+    assert told[-1] == (2 * run.steps, 2 * run.steps)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_the_part_at_constant_speed_waits_for_the_loop_and_ends_with_the_feed() -> None:
+    path, timing = a_path(), LoopTiming(period_us=1000.0)
+    run = a_run(an_axis())
+    settling_us = run.margins_x.settling_us
+    assert settling_us is not None
+    assert settling_us == pytest.approx(math.log(1000) / 50 * 1e6, rel=5e-3)
+    assert run.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + settling_us, abs=100)
+    assert run.constant_speed.stop * 100 == pytest.approx(path.constant_until_us, abs=100)
+    slow = simulate_circle(path, x=an_axis(position_gain_per_s=0.5), y=an_axis(), timing=timing)
+    whole_us = path.constant_until_us - path.constant_from_us - 1000
+    assert slow.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 4, abs=100)
+
+
+def test_a_circle_of_ramps_only_still_has_measures() -> None:
+    path = circle_path(1.0, feed_mm_per_min=2 * math.pi * 10 * 60, period_us=1000.0, ramp_periods=100)
+    run = simulate_circle(path, x=an_axis(), y=an_axis(), timing=LoopTiming(period_us=1000.0))
+    assert run.contour.circular_deviation_mm >= 0
+
+
+# --- bad input ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("loop", "gain"), [("node", 21_000.0), ("host", 700.0)])
+def test_an_unstable_loop_ends_as_one(loop: str, gain: float) -> None:
+    timing = LoopTiming(period_us=2000.0, loop=loop, delay_us=2000.0)  # type: ignore[arg-type]
+    run = a_run(an_axis(position_gain_per_s=gain), timing=timing)
+    assert run.diverged
+    assert run.margins_x.phase_margin_deg is None
+    assert math.isfinite(run.contour.mean_contour_error_mm)
+    assert run.contour.max_contour_error_mm > 0.01
+    assert not a_run(an_axis(), timing=timing).diverged
+
+
+def test_a_table_that_runs_away_has_diverged() -> None:
+    runaway = an_axis(position_gain_per_s=1.0, drive_offset_mm_s=250.0)
+    assert a_run(runaway).diverged
+
+
+def test_a_feed_beyond_the_drive_is_refused_axis_by_axis() -> None:
+    slow = an_axis(max_velocity_mm_s=90.0)
+    with pytest.raises(BusplanError) as caught:
+        a_run(an_axis(max_velocity_mm_s=101.0, drive_offset_mm_s=-2.0), slow)
+    assert len(caught.value.problems) == 2
+    assert "axis x reaches 5940 mm/min" in caught.value.problems[0]
+    assert "axis y reaches 5400 mm/min" in caught.value.problems[1]
+
+
+def test_a_path_of_another_period_is_refused() -> None:
+    with pytest.raises(BusplanError, match=r"period_us = 2000\.0: .* every 1000\.0 us"):
+        simulate_circle(a_path(), x=an_axis(), y=an_axis(), timing=LoopTiming(period_us=2000.0))
+
+
+@settings(max_examples=60)
+@given(
+    kp=st.floats(0, 5000),
+    ki=st.floats(0, 1e5),
+    kd=st.floats(0, 5),
+    lag_us=st.floats(0, 5e4),
+    loop=st.sampled_from(["node", "host"]),
+    interpolation=st.sampled_from(["linear", "hold"]),
+    on_loss=st.sampled_from(["hold", "extrapolate"]),
+    loss=st.floats(0, 1),
+    jitter_us=st.floats(0, 400),
+    skew_us=st.floats(-100, 100),
+    backlash_mm=st.floats(0, 1),
+)
+def test_whatever_is_set_the_measures_are_finite(**drawn: Any) -> None:
+    path = circle_path(5.0, feed_mm_per_min=6000.0, period_us=1000.0, ramp_periods=20)
+    axis = an_axis(
+        position_gain_per_s=drawn["kp"],
+        integral_gain_per_s2=drawn["ki"],
+        derivative_gain=drawn["kd"],
+        drive_lag_us=drawn["lag_us"],
+    )
+    timing = LoopTiming(
+        period_us=1000.0, step_us=250.0, loop=drawn["loop"], interpolation=drawn["interpolation"], delay_us=321.0
+    )
+    delivery = Delivery(
+        jitter_us=drawn["jitter_us"],
+        skew_us=drawn["skew_us"],
+        loss_probability=drawn["loss"],
+        on_loss=drawn["on_loss"],
+    )
+    mechanics = Mechanics(backlash_mm=drawn["backlash_mm"])
+    contour = simulate_circle(path, x=axis, y=axis, timing=timing, delivery=delivery, mechanics=mechanics).contour
+    numbers = [
+        contour.mean_contour_error_mm,
+        contour.max_contour_error_mm,
+        contour.radial_deviation_min_mm,
+        contour.radial_deviation_max_mm,
+        contour.circular_deviation_mm,
+        contour.radius_deviation_mm,
+        *contour.centre_offset_mm,
+    ]
+    assert np.isfinite(numbers).all()
+    assert contour.radial_deviation_min_mm <= contour.radial_deviation_max_mm
+    assert 0 <= contour.mean_contour_error_mm <= contour.max_contour_error_mm
