@@ -249,17 +249,21 @@ def _fill(
     length_s: Floats | None = None,
 ) -> Plan:
     """Add what all rows have alike: by default whole steps that control, switch and store, on a standing target."""
-    if length_s is None:
-        length_s = np.full(substeps.shape, timing.step_us / _US_PER_S)
+    # One exponential serves all whole steps.
+    lengths_s = np.array([timing.step_us / _US_PER_S]) if length_s is None else length_s
+    shape = substeps.shape
+    timed = (
+        lengths_s,
+        *_decay(lengths_s, time_constant_s=axis.drive_lag_us / _US_PER_S),
+        *_decay(lengths_s, time_constant_s=axis.reversal_recovery_us / _US_PER_S),
+    )
     return Plan(
         substeps,
         target_mm,
-        np.zeros(substeps.shape) if increment_mm is None else increment_mm,
+        np.zeros(shape) if increment_mm is None else increment_mm,
         forward_mm_s,
-        np.full(substeps.shape, CONTROL | SWITCH | STORE) if action is None else action,
-        length_s,
-        *_decay(length_s, time_constant_s=axis.drive_lag_us / _US_PER_S),
-        *_decay(length_s, time_constant_s=axis.reversal_recovery_us / _US_PER_S),
+        np.full(shape, CONTROL | SWITCH | STORE) if action is None else action,
+        *(np.full(shape, column) for column in timed),
     )
 
 
