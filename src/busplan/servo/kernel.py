@@ -20,8 +20,8 @@ ROUND = 6755399441055744.0
 ALL_BUT_ONE = 20.0
 """From here on tanh is 1 to the last bit."""
 
-INTEGRAL = 6
-LAST_ERROR = 7
+INTEGRAL = 5
+LAST_ERROR = 6
 
 Constants = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
@@ -52,7 +52,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     ----------
     state
         Position [mm], drive velocity [mm/s], friction disturbance [mm/s], friction sign [1], command in effect [mm/s],
-        command on its way [mm/s], integral of the error [mm s], last error [mm]; taken up and left up to date.
+        integral of the error [mm s], last error [mm]; taken up and left up to date.
     constants
         See `Constants`.
     out
@@ -66,7 +66,9 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
         Number of positions stored.
     """
     kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
-    position, velocity, disturbance, sign, command, pending, _, _ = state
+    position, velocity, disturbance, sign, command, _, _ = state
+    # Every plan begins with a control, so no command is on its way between two of them.
+    pending = command
     stored = 0
     for n, start, move, feed, act, dt, keep, shift, fade, fade_shift in zip(  # noqa: B905 - numba knows no strict
         substeps,
@@ -134,5 +136,4 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     state[2] = disturbance
     state[3] = sign
     state[4] = command
-    state[5] = pending
     return stored
