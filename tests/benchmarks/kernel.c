@@ -24,21 +24,28 @@ void run_axis(const struct axis *a, const double *setpoints, size_t cycles, size
             double error = aim - position;
             if (a->counts > 0)
                 error = aim - (position * a->counts + ROUND - ROUND) * a->resolution;
-            integral += error * a->period;
-            double command = a->kp * error + a->ki * integral + a->kd * (error - last) + feed;
-            last = error;
+            double command = a->kp * error + feed;
+            if (a->ki > 0) {
+                integral += error * a->period;
+                command += a->ki * integral;
+            }
+            if (a->kd > 0) {
+                command += a->kd * (error - last);
+                last = error;
+            }
             if (command > a->highest) {
                 command = a->highest;
-                if (error > 0) integral -= error * a->period;
+                if (a->ki > 0 && error > 0) integral -= error * a->period;
             } else if (command < a->lowest) {
                 command = a->lowest;
-                if (error < 0) integral -= error * a->period;
+                if (a->ki > 0 && error < 0) integral -= error * a->period;
             }
             if (a->levels > 0)
                 command = (command * a->levels + ROUND - ROUND) * a->level;
             aim += move;
             if (a->friction > 0) {
-                double turned = tanh(velocity * a->sharpness);
+                double turned = velocity * a->sharpness;
+                turned = turned > 20 ? 1 : turned < -20 ? -1 : tanh(turned);
                 disturbance += a->friction * (sign - turned);
                 sign = turned;
             }

@@ -139,6 +139,11 @@ def test_the_loop_does_not_see_below_half_an_encoder_count() -> None:
     assert found[-1] != start + 1.0
 
 
+def test_an_axis_that_starts_between_two_counts_gets_no_kick_from_its_derivative() -> None:
+    axis = an_axis(position_gain_per_s=0.0, derivative_gain=1.0, encoder_resolution_mm=0.01)
+    np.testing.assert_array_equal(simulate_axis(np.full(5, 5.004), axis=axis, timing=TIMING), 5.004)
+
+
 def test_the_dac_has_exactly_its_levels_between_its_limits() -> None:
     axis = an_axis(position_gain_per_s=50.0, max_velocity_mm_s=8.0, dac_bits=4)
     far = simulate_axis(np.append(0.0, np.full(3000, 3.0)), axis=axis, timing=TIMING)
@@ -353,6 +358,22 @@ def test_an_encoder_too_fine_for_the_travel_is_refused() -> None:
     setpoints = np.full(10, 1e7)
     with pytest.raises(BusplanError, match=r"too fine for 1e\+07 mm of travel; choose at least 4\.44e-09 mm"):
         simulate_axis(setpoints, axis=an_axis(encoder_resolution_mm=1e-9), timing=TIMING)
+
+
+@pytest.mark.parametrize(
+    ("setpoints", "offsets_us"),
+    [
+        (np.zeros(1), np.zeros(1)),
+        (np.array([0.0, math.nan]), np.zeros(2)),
+        (np.zeros(5), np.zeros(4)),
+        (np.zeros(3), np.array([1.0, 0.0, 0.0])),
+        (np.zeros(3), np.array([0.0, 501.0, 0.0])),
+    ],
+)
+def test_arrivals_that_do_not_fit_never_reach_the_kernel(setpoints: Floats, offsets_us: Floats) -> None:
+    arriving = Arrivals(offsets_us=offsets_us, lost=np.zeros(len(offsets_us), dtype=bool))
+    with pytest.raises(ValueError, match=r"must|for"):
+        simulate_axis(setpoints, axis=an_axis(), timing=TIMING, arrivals=arriving)
 
 
 def test_on_time_is_the_default() -> None:

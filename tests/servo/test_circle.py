@@ -1,6 +1,7 @@
 """The circle test as a whole: what theory says of circles, and what must never happen."""
 
 import math
+import tracemalloc
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from busplan.errors import BusplanError
+from busplan.servo import axis as axis_module
+from busplan.servo import contour as contour_module
 from busplan.servo.axis import simulate_axis
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.contour import contour_error
@@ -268,6 +271,28 @@ def test_a_circle_of_ramps_only_still_has_measures() -> None:
     path = circle_path(1.0, feed_mm_per_min=2 * math.pi * 10 * 60, period_us=1000.0, ramp_periods=100)
     run = simulate_circle(path, x=an_axis(), y=an_axis(), timing=LoopTiming(period_us=1000.0))
     assert run.contour.circular_deviation_mm >= 0
+
+
+def test_memory_grows_by_no_more_than_16_bytes_a_step_and_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(axis_module, "_CHUNK_STEPS", {False: 1000, True: 1000})
+    monkeypatch.setattr(contour_module, "_BLOCK", 1000)
+    timing = LoopTiming(period_us=1000.0)
+    everything = {
+        "delivery": Delivery(jitter_us=5.0, skew_us=5.0, loss_probability=0.01),
+        "mechanics": Mechanics(backlash_mm=0.01, scale_x_ppm=5.0, scale_y_ppm=-5.0, squareness_um_per_m=10.0),
+    }
+
+    def peak(radius_mm: float) -> tuple[int, int]:
+        path = circle_path(radius_mm, feed_mm_per_min=FEED_MM_PER_MIN, period_us=1000.0)
+        tracemalloc.start()
+        run = simulate_circle(path, x=an_axis(), y=an_axis(), timing=timing, **everything)  # type: ignore[arg-type]
+        _, highest = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return highest, run.steps
+
+    peak(10.0)
+    (short, few), (long, many) = peak(20.0), peak(60.0)
+    assert (long - short) / (2 * (many - few)) <= 16
 
 
 # --- bad input ---------------------------------------------------------------------------------------------

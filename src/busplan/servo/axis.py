@@ -161,7 +161,7 @@ def _at_rest(position_mm: float, axis: Axis) -> Floats:
     """State of the kernel for an axis that stands on its target."""
     resolution = axis.encoder_resolution_mm
     error = position_mm - (position_mm * (1 / resolution) + ROUND - ROUND) * resolution if resolution else 0.0
-    return np.array([position_mm, 0.0, 0.0, 0.0, 0.0, error, 0.0, 0.0])
+    return np.array([position_mm, 0.0, 0.0, 0.0, 0.0, 0.0, error])
 
 
 def _constants(axis: Axis, timing: LoopTiming) -> Constants:

@@ -14,7 +14,7 @@ from busplan.servo.contour import Contour, contour_error, measure_contour
 from busplan.servo.delivery import Arrivals, arrivals
 from busplan.servo.engine import Engine
 from busplan.servo.margins import LoopMargins, loop_margins
-from busplan.servo.mechanics import table_position
+from busplan.servo.mechanics import move_to_table
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath
 
@@ -182,9 +182,9 @@ def simulate_circle(
             progress(done_before + done, total)
 
     run = partial(simulate_axis, timing=timing, engine=engine)
-    motor_x_mm = run(path.x_mm, axis=x, arrivals=arrivals_x, progress=partial(report, 0))
-    motor_y_mm = run(path.y_mm, axis=y, arrivals=arrivals_y, progress=partial(report, total // 2))
-    x_mm, y_mm = table_position(motor_x_mm, y_mm=motor_y_mm, mechanics=mechanics, engine=engine)
+    x_mm = run(path.x_mm, axis=x, arrivals=arrivals_x, progress=partial(report, 0))
+    y_mm = run(path.y_mm, axis=y, arrivals=arrivals_y, progress=partial(report, total // 2))
+    move_to_table(x_mm, y_mm=y_mm, mechanics=mechanics, engine=engine)
     margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
     constant_speed = _constant_speed(path, timing=timing, margins=(margins_x, margins_y))
     return CircleRun(

@@ -3,9 +3,9 @@
 It runs over the rows of a plan (see `busplan.servo.plan`). A row is a run of sub-steps of equal length;
 its action says what happens in each: sample and control, let the command take effect, store the position.
 
-Only what numba compiles is used, and `x + ROUND - ROUND` instead of `round(x)`, which costs more than the rest of
-the loop in plain Python: adding 1.5 * 2^52 leaves no bit for the fraction, so the float unit itself rounds (half
-to even, exact below 2^51). The order of every operation is fixed, so both engines give the same floats.
+Only what numba compiles is used, and `x + ROUND - ROUND` for `round(x)`, a call that plain Python would feel: adding
+1.5 * 2^52 leaves no bit for the fraction, so the float unit itself rounds (half to even, exact below 2^51). The order
+of every operation is fixed, so both engines give the same floats.
 """
 
 from collections.abc import Iterable, MutableSequence
@@ -16,16 +16,22 @@ SWITCH = 2
 STORE = 4
 
 ROUND = 6755399441055744.0
+"""1.5 * 2^52."""
+ALL_BUT_ONE = 20.0
+"""From here on tanh is 1 to the last bit."""
+
+INTEGRAL = 5
+LAST_ERROR = 6
 
 Constants = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
 ]  # fmt: skip
 """kp [1/s], ki [1/s^2], kd / control period [1/s], control period [s], counts [1/mm], count [mm], lowest and
 highest command [mm/s], levels [s/mm], level [mm/s], drive offset [mm/s], friction [mm/s], 1 / smoothing [s/mm].
-Counts, levels and friction of 0 leave their element out."""
+ki, kd, counts, levels and friction of 0 leave their element out."""
 
 
-def run_rows(  # noqa: C901 - calls would cost plain Python more than the arithmetic
+def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the arithmetic
     state: MutableSequence[float],
     constants: Constants,
     out: MutableSequence[float],
@@ -45,8 +51,8 @@ def run_rows(  # noqa: C901 - calls would cost plain Python more than the arithm
     Parameters
     ----------
     state
-        Position [mm], drive velocity [mm/s], friction disturbance [mm/s], friction sign [1], integral of the error
-        [mm s], last error [mm], command in effect [mm/s], command on its way [mm/s]; taken up and left up to date.
+        Position [mm], drive velocity [mm/s], friction disturbance [mm/s], friction sign [1], command in effect [mm/s],
+        integral of the error [mm s], last error [mm]; taken up and left up to date.
     constants
         See `Constants`.
     out
@@ -60,7 +66,9 @@ def run_rows(  # noqa: C901 - calls would cost plain Python more than the arithm
         Number of positions stored.
     """
     kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
-    position, velocity, disturbance, sign, integral, last, command, pending = state
+    position, velocity, disturbance, sign, command, _, _ = state
+    # Every plan begins with a control, so no command is on its way between two of them.
+    pending = command
     stored = 0
     for n, start, move, feed, act, dt, keep, shift, fade, fade_shift in zip(  # noqa: B905 - numba knows no strict
         substeps,
@@ -83,25 +91,36 @@ def run_rows(  # noqa: C901 - calls would cost plain Python more than the arithm
                 error = aim - position
                 if counts > 0.0:
                     error = aim - (position * counts + ROUND - ROUND) * resolution
-                integral += error * period
-                pending = kp * error + ki * integral + kd * (error - last) + feed
-                last = error
+                pending = kp * error + feed
+                # What few loops have stays in the state: a store keeps compiled code from computing it for all.
+                if ki > 0.0:
+                    state[INTEGRAL] += error * period
+                    pending += ki * state[INTEGRAL]
+                if kd > 0.0:
+                    pending += kd * (error - state[LAST_ERROR])
+                    state[LAST_ERROR] = error
                 # No wind-up: a command that clips does not integrate any further into the limit.
                 if pending > highest:
                     pending = highest
-                    if error > 0.0:
-                        integral -= error * period
+                    if ki > 0.0 and error > 0.0:
+                        state[INTEGRAL] -= error * period
                 elif pending < lowest:
                     pending = lowest
-                    if error < 0.0:
-                        integral -= error * period
+                    if ki > 0.0 and error < 0.0:
+                        state[INTEGRAL] -= error * period
                 if levels > 0.0:
                     pending = (pending * levels + ROUND - ROUND) * level
                 aim += move
             if switch:
                 command = pending
             if friction > 0.0:
-                turned = tanh(velocity * sharpness)
+                turned = velocity * sharpness
+                if turned > ALL_BUT_ONE:
+                    turned = 1.0
+                elif turned < -ALL_BUT_ONE:
+                    turned = -1.0
+                else:
+                    turned = tanh(turned)
                 disturbance += friction * (sign - turned)
                 sign = turned
             wanted = command + offset
@@ -116,8 +135,5 @@ def run_rows(  # noqa: C901 - calls would cost plain Python more than the arithm
     state[1] = velocity
     state[2] = disturbance
     state[3] = sign
-    state[4] = integral
-    state[5] = last
-    state[6] = command
-    state[7] = pending
+    state[4] = command
     return stored

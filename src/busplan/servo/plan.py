@@ -72,6 +72,12 @@ def plans(
     chunk_steps
         Steps in one plan, about [1].
 
+    Raises
+    ------
+    ValueError
+        The set-points are not finite or fewer than two, or the arrivals do not fit them: other shapes, offsets at
+        the start or the end, or beyond half a period.
+
     Yields
     ------
     Plan
@@ -96,6 +102,7 @@ def plans(
     >>> plan.substeps.tolist(), plan.target_mm.tolist(), plan.increment_mm.tolist()
     ([10, 10], [0.0, 0.0], [0.0, 0.1])
     """
+    _check(setpoints_mm, arrivals=arrivals, half_us=timing.period_us / 2)
     make = _host_rows
     if timing.loop == "node":
         make = _node_rows
@@ -132,6 +139,17 @@ def stored_targets_mm(plan: Plan) -> Floats:
     stored = np.where(plan.action & STORE, plan.substeps, 0)
     within = np.arange(stored.sum()) - np.repeat(np.cumsum(stored) - stored, stored) + 1
     return np.asarray(np.repeat(plan.target_mm, stored) + np.repeat(plan.increment_mm, stored) * within)
+
+
+def _check(setpoints_mm: Floats, *, arrivals: Arrivals, half_us: float) -> None:
+    """Refuse what would make the rows store more or fewer positions than there are steps."""
+    offsets_us, lost = arrivals.offsets_us, arrivals.lost
+    if setpoints_mm.ndim != 1 or len(setpoints_mm) < 2 or not np.isfinite(setpoints_mm).all():  # noqa: PLR2004
+        raise ValueError("set-points must be at least two finite numbers")
+    if not setpoints_mm.shape == offsets_us.shape == lost.shape:
+        raise ValueError(f"{offsets_us.shape} offsets and {lost.shape} losses for {setpoints_mm.shape} set-points")
+    if offsets_us[0] != 0 or offsets_us[-1] != 0 or not np.abs(offsets_us).max() <= half_us:
+        raise ValueError(f"offsets must begin and end with 0 and stay within {half_us:g} us")
 
 
 def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> Plan:
@@ -231,17 +249,21 @@ def _fill(
     length_s: Floats | None = None,
 ) -> Plan:
     """Add what all rows have alike: by default whole steps that control, switch and store, on a standing target."""
-    if length_s is None:
-        length_s = np.full(substeps.shape, timing.step_us / _US_PER_S)
+    # One exponential serves all whole steps.
+    lengths_s = np.array([timing.step_us / _US_PER_S]) if length_s is None else length_s
+    shape = substeps.shape
+    timed = (
+        lengths_s,
+        *_decay(lengths_s, time_constant_s=axis.drive_lag_us / _US_PER_S),
+        *_decay(lengths_s, time_constant_s=axis.reversal_recovery_us / _US_PER_S),
+    )
     return Plan(
         substeps,
         target_mm,
-        np.zeros(substeps.shape) if increment_mm is None else increment_mm,
+        np.zeros(shape) if increment_mm is None else increment_mm,
         forward_mm_s,
-        np.full(substeps.shape, CONTROL | SWITCH | STORE) if action is None else action,
-        length_s,
-        *_decay(length_s, time_constant_s=axis.drive_lag_us / _US_PER_S),
-        *_decay(length_s, time_constant_s=axis.reversal_recovery_us / _US_PER_S),
+        np.full(shape, CONTROL | SWITCH | STORE) if action is None else action,
+        *(np.full(shape, column) for column in timed),
     )
 
 
