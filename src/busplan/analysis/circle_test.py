@@ -6,7 +6,7 @@ stability: a host loop's delay makes the circle better while it eats the margin,
 
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from busplan.analysis.capacity import CapacityFigures, Limit, figures
 from busplan.analysis.contributions import Contribution, Setup, contributions, sources
@@ -23,12 +23,39 @@ Progress = Callable[[int, int], None]
 """Called with the steps done and the steps to do."""
 
 
+_FAILURES: Final[dict[str, str]] = {
+    "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
+    "hops": "{value:.0f} hops are over the {limit:.0f} of one bus",
+    "nodes": "{value:.0f} nodes are over the {limit:.0f} of one bus",
+    "payload_bytes": "a payload of {value:.0f} bytes is over the limit of {limit:.0f} bytes",
+    "stability": "the position loop is unstable",
+    "min_phase_margin_deg": "the phase margin of {value:.2f} deg is {under:.2f} deg under its {limit:g} deg",
+    "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
+    "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+}
+
+
 class Failure(NamedTuple):
     """One thing that the test does not hold: a tolerance by its key, a limit of the bus, or stability."""
 
     name: str
     value: float | None
     limit: float | None
+
+    @property
+    def text(self) -> str:
+        """What does not hold, and by how much."""
+        value, limit = self.value or 0.0, self.limit or 0.0
+        return _FAILURES[self.name].format(
+            value=value,
+            limit=limit,
+            under=limit - value,
+            um=value * 1e3,
+            limit_um=limit * 1e3,
+            over_um=(value - limit) * 1e3,
+        )
 
 
 class CircleFigures(NamedTuple):

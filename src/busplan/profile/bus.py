@@ -157,7 +157,15 @@ class Payload(Section):
     )
 
 
-class LinearExecution(Section):
+class GradedExecution(Section):
+    """What both forms of the execution time share."""
+
+    grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None, description="How the execution time is known; the gate warns of assumed", examples=["measured"]
+    )
+
+
+class LinearExecution(GradedExecution):
     """Section [node.execution] of kind "linear": base_us + per_byte_us * payload."""
 
     kind: Literal["linear"] = Field(description="Form of the execution time", examples=["linear"])
@@ -169,7 +177,7 @@ class LinearExecution(Section):
         return self.base_us + self.per_byte_us * payload_bytes
 
 
-class TableExecution(Section):
+class TableExecution(GradedExecution):
     """Section [node.execution] of kind "table": measured times, linear between them, nothing beyond them."""
 
     kind: Literal["table"] = Field(description="Form of the execution time", examples=["table"])

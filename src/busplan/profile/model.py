@@ -10,6 +10,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from busplan.profile.bus import Cycle, Ieee1394Bus, Node, Payload, TableExecution
+from busplan.profile.gate import Limits
 from busplan.profile.machine import Circle, Delivery, Mechanics, Servo, Tolerance
 from busplan.profile.sections import Problem, Section, refused
 
@@ -52,6 +53,7 @@ class Profile(Section):
     mechanics: Mechanics = Field(default_factory=Mechanics, description="What lies between encoders and table")
     delivery: Delivery = Field(default_factory=Delivery, description="How set-points arrive at the nodes")
     circle: Circle = Field(default_factory=Circle, description="The circle of the test")
+    limits: Limits = Field(default_factory=Limits, description="What the gate asks for beyond fitting")
     tolerance: Tolerance = Field(default_factory=Tolerance, description="What the circle test must hold")
 
     @model_validator(mode="after")

@@ -27,6 +27,8 @@ def starter_text(source: str, *, name: str) -> str:
     place = document.places["name",]
     quoted = '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
     text = document.text[: place.value_start] + quoted + document.text[place.value_end :]
+    # The line that names the schema is right in the shipped folder alone.
+    text = text.removeprefix("#:schema ./busplan.schema.json\n")
     try:
         validate(decode(text.encode(), name=source))
     except (BusplanError, UnicodeEncodeError):  # the latter: a file name that is no UTF-8

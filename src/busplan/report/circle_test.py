@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.circle_test import CircleFigures, CircleTest, Failure
+from busplan.analysis.circle_test import CircleFigures, CircleTest
 from busplan.analysis.contour_profile import ContourProfile
 from busplan.report.lines import BLANK, Line, table, us
 from busplan.report.words import period
@@ -13,19 +13,6 @@ PLOT_SECTORS: Final = 72
 _PLOT_ROWS: Final = 9
 _SHOWN: Final = 1e-9
 """Largest error, in mm, that still counts as none in a plot."""
-
-_FAILURES: Final[dict[str, str]] = {
-    "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
-    "hops": "{value:.0f} hops are over the {limit:.0f} of one bus",
-    "nodes": "{value:.0f} nodes are over the {limit:.0f} of one bus",
-    "payload_bytes": "a payload of {value:.0f} bytes is over the limit of {limit:.0f} bytes",
-    "stability": "the position loop is unstable",
-    "min_phase_margin_deg": "the phase margin of {value:.2f} deg is {under:.2f} deg under its {limit:g} deg",
-    "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
-    "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
-    "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
-    "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
-}
 
 
 def circle_lines(
@@ -48,25 +35,12 @@ def circle_lines(
     return lines
 
 
-def failure_text(failure: Failure) -> str:
-    """Say what does not hold, and by how much."""
-    value, limit = failure.value or 0.0, failure.limit or 0.0
-    return _FAILURES[failure.name].format(
-        value=value,
-        limit=limit,
-        under=limit - value,
-        um=value * 1e3,
-        limit_um=limit * 1e3,
-        over_um=(value - limit) * 1e3,
-    )
-
-
 def _verdict(name: str, result: CircleFigures) -> Iterator[Line]:
     subject = f"{name} at {period(result.period_us)} and {result.feed_mm_per_min:g} mm/min"
     if result.passed:
         yield Line(f"{subject}: the circle holds every tolerance.", "good")
         return
-    reasons = ", and ".join(failure_text(failure) for failure in result.failures)
+    reasons = ", and ".join(failure.text for failure in result.failures)
     yield Line(f"{subject}: FAILED, {reasons}.", "bad")
     worst = result.contributions[0] if result.contributions else None
     if worst is not None and worst.removed_mm > 0:

@@ -1,0 +1,170 @@
+"""`busplan check`."""
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from busplan.cli.options import complete_profile
+from busplan.cli.output import PlanFailsError, emit_text, say, write_file
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from busplan.profile.collect import Collection, Source
+    from busplan.rules.baseline import Recorded
+    from busplan.rules.gate import FileResult
+    from busplan.rules.report import CheckReport
+
+Recordings = dict[str, dict[str, float]]
+
+
+def check_command(
+    paths: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="PATH...",
+            help="Profile files, folders (every *.toml below that claims a schema_version), shipped names, "
+            "or - for standard input.",
+            autocompletion=complete_profile,
+            show_default=False,
+        ),
+    ],
+    format_: Annotated[
+        Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"],
+        typer.Option("--format", envvar="BUSPLAN_FORMAT", help="Form of the report."),
+    ] = "text",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="Write the report to a file instead of standard output."),
+    ] = None,
+    fail_on: Annotated[
+        Literal["error", "warning"], typer.Option("--fail-on", help="Least severity that fails the check.")
+    ] = "error",
+    exit_zero: Annotated[bool, typer.Option("--exit-zero", help="Exit 0 even with findings.")] = False,
+    circle: Annotated[
+        bool, typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one.")
+    ] = True,
+    baseline: Annotated[
+        Path | None,
+        typer.Option("--baseline", metavar="FILE", help="No profile may lose axes or margin against this record."),
+    ] = None,
+    update_baseline: Annotated[
+        bool, typer.Option("--update-baseline", help="Record what the profiles carry now in the --baseline file.")
+    ] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes to check with.")] = 1,
+    stdin_filename: Annotated[
+        str, typer.Option("--stdin-filename", metavar="NAME", help="What to call standard input in the report.")
+    ] = "<stdin>",
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No summary on standard error.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Name files that are fine and files that are skipped.")
+    ] = False,
+) -> None:
+    """Fail a build when a profile no longer fits its bus or its circle.
+
+    Each finding is a line: path:line:column: CODE message. `busplan rule CODE` explains it. A comment
+    `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. Exits 0 when clean, 1 with
+    findings at or above --fail-on, 2 when it could not do the job; one broken file does not stop the others.
+
+    Example: busplan check profiles/ --format github --baseline busplan-baseline.json
+    """
+    if update_baseline and baseline is None:
+        raise BusplanError("--update-baseline: needs --baseline FILE")
+    from busplan.profile.collect import collect
+
+    collection = collect(paths, stdin_name=stdin_filename)
+    recorded = _read_baseline(baseline, needed=not update_baseline)
+    report = _check(collection.sources, recorded=None if update_baseline else recorded, with_circle=circle, jobs=jobs)
+    if update_baseline and baseline is not None:
+        _update_baseline(baseline, recorded or {}, report)
+    _write(report, format_=format_, output=output)
+    if not quiet:
+        _summarise(report, collection, verbose=verbose)
+    say(*collection.failures)
+    if collection.failures or report.failed:
+        raise typer.Exit(2)
+    if not exit_zero and report.has_findings(fail_on):
+        raise PlanFailsError
+
+
+def _check(sources: "Sequence[Source]", *, recorded: Recordings | None, with_circle: bool, jobs: int) -> "CheckReport":
+    from busplan.rules.report import CheckReport
+
+    one = partial(_check_source, recorded=recorded, with_circle=with_circle)
+    # A process costs more than some files do: each gets a fair number of them.
+    workers = min(jobs, len(sources))
+    if workers <= 1:
+        return CheckReport(tuple(map(one, sources)))
+    from concurrent.futures import ProcessPoolExecutor
+
+    with ProcessPoolExecutor(workers) as pool:
+        return CheckReport(tuple(pool.map(one, sources, chunksize=max(1, len(sources) // (4 * workers)))))
+
+
+def _check_source(source: "Source", *, recorded: Recordings | None, with_circle: bool) -> "FileResult":
+    from busplan.errors import PlacedError
+    from busplan.profile.toml import decode, read_bytes
+    from busplan.rules.gate import FileResult, check_document, unreadable
+
+    try:
+        document = decode(read_bytes(source.path, name=source.name), name=source.name)
+    except PlacedError as error:
+        return unreadable(source.name, error)
+    except BusplanError as error:
+        return FileResult(source.name, None, (), {}, failure=str(error))
+    before: Recorded | None = None if recorded is None else recorded.get(source.name, {})
+    return check_document(document, with_circle=with_circle, baseline=before)
+
+
+def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
+    if path is None or (not needed and not path.exists()):
+        return None
+    from busplan.rules.baseline import read_baseline
+
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "is not UTF-8"
+        raise BusplanError(f"{path}: the baseline cannot be read: {reason}") from None
+    return read_baseline(text, name=str(path))
+
+
+def _update_baseline(path: Path, recorded: Recordings, report: "CheckReport") -> None:
+    """Record what was checked; profiles that were not checked keep their record."""
+    from busplan.rules.baseline import write_baseline
+
+    now = {file.path: file.figures for file in report.files if file.figures}
+    write_file(path, write_baseline({**recorded, **now}).encode(), overwrite=True)
+    say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
+
+
+def _write(
+    report: "CheckReport",
+    *,
+    format_: Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"],
+    output: Path | None,
+) -> None:
+    from busplan.report.gate import render
+
+    text = render(report, file_format=format_)
+    if output is not None:
+        write_file(output, text.encode("utf-8", "backslashreplace"), overwrite=True)
+    else:
+        emit_text(text)
+    if format_ == "github":
+        # GitHub shows ten annotations of a kind a step: the log has them all.
+        say(*render(report, file_format="text").splitlines())
+
+
+def _summarise(report: "CheckReport", collection: "Collection", *, verbose: bool) -> None:
+    if verbose:
+        say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
+        say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
+    say(*(file.failure for file in report.files if file.failure is not None))
+    counts = report.summary
+    words = (("profile", counts.files), ("error", counts.errors), ("warning", counts.warnings))
+    profiles, errors, warnings = (f"{number} {word}{'s' * (number != 1)}" for word, number in words)
+    say(f"checked {profiles}: {errors}, {warnings}")

@@ -1,0 +1,41 @@
+"""`busplan rule`."""
+
+from typing import Annotated, Literal
+
+import typer
+
+from busplan.cli.output import emit_text
+from busplan.errors import BusplanError
+
+
+def complete_code(incomplete: str) -> list[str]:
+    """Codes of rules that begin as typed, for the shell's completion."""
+    from busplan.rules.registry import RULES
+
+    return [code for code in RULES if code.startswith(incomplete.upper())]
+
+
+def rule_command(
+    code: Annotated[
+        str | None,
+        typer.Argument(help="Code of a rule, as BP101; all of them without it.", autocompletion=complete_code),
+    ] = None,
+    format_: Annotated[
+        Literal["text", "json"], typer.Option("--format", help="Form of the document on standard output.")
+    ] = "text",
+) -> None:
+    """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
+
+    Example: busplan rule BP110
+    """
+    from busplan.report import documents, text
+    from busplan.report.rules import rule_page, rule_rows, rule_table
+    from busplan.rules.registry import RULES
+
+    if code is not None and code.upper() not in RULES:
+        raise BusplanError(f"{code}: no such rule; there are {', '.join(RULES)}")
+    chosen = list(RULES.values()) if code is None else [RULES[code.upper()]]
+    if format_ == "json":
+        emit_text(text.to_json(documents.document("rule", rules=rule_rows(chosen))))
+    else:
+        emit_text(rule_table(chosen) if code is None else rule_page(chosen[0]))

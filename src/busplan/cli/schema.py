@@ -1,0 +1,16 @@
+"""`busplan schema`."""
+
+from busplan.cli.output import emit_text
+
+
+def schema_command() -> None:
+    """Print the JSON Schema of profiles (draft 2020-12), with every description and unit.
+
+    Editors that read `#:schema ./busplan.schema.json` at the top of a profile complete and check it.
+
+    Example: busplan schema > busplan.schema.json
+    """
+    from busplan.profile.schema import profile_schema
+    from busplan.report.text import to_json
+
+    emit_text(to_json(profile_schema()))

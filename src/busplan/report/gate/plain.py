@@ -1,0 +1,64 @@
+"""Findings as lines: for people, for editors, and for GitHub's log."""
+
+from collections.abc import Iterator
+
+from busplan.rules.finding import Finding
+from busplan.rules.report import CheckReport
+
+
+def printable(text: str) -> str:
+    """One line that commands no terminal, whatever a file or key is called."""
+    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
+
+
+def finding_line(path: str, finding: Finding) -> str:
+    """Write path:line:column: CODE message."""
+    return printable(f"{path}:{finding.line}:{finding.column}: {finding.code} {finding.message}")
+
+
+def as_text(report: CheckReport) -> str:
+    """One line a finding."""
+    return "".join(f"{finding_line(one.path, one.finding)}\n" for one in report.located)
+
+
+def as_full(report: CheckReport) -> str:
+    """Each finding with its line of the file and a caret below its column."""
+    return "".join(f"{line}\n" for line in _full(report))
+
+
+def _full(report: CheckReport) -> Iterator[str]:
+    for one in report.located:
+        number = str(one.finding.line)
+        margin = " " * len(number)
+        before = one.source[: one.finding.column - 1]
+        # Tabs stay tabs in front of the caret, so that it stands below its column at any tab width.
+        indent = "".join("\t" if character == "\t" else " " for character in before)
+        source = "".join(one if one.isprintable() or one == "\t" else " " for one in one.source)
+        yield f"{finding_line(one.path, one.finding)}"
+        yield f"{margin} |"
+        yield f"{number} | {source}"
+        yield f"{margin} | {indent}^ {one.finding.rule} ({one.finding.severity})"
+        yield ""
+
+
+def as_github(report: CheckReport) -> str:
+    """One workflow command a finding, which GitHub shows beside the line of the file."""
+    return "".join(f"{line}\n" for line in _github(report))
+
+
+def _github(report: CheckReport) -> Iterator[str]:
+    for one in report.located:
+        finding = one.finding
+        properties = {
+            "file": one.path,
+            "line": str(finding.line),
+            "col": str(finding.column),
+            "title": f"{finding.code} {finding.rule}",
+        }
+        said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
+        yield f"::{finding.severity} {said}::{_escaped(printable(finding.message), property_=False)}"
+
+
+def _escaped(text: str, *, property_: bool) -> str:
+    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return text.replace(":", "%3A").replace(",", "%2C") if property_ else text

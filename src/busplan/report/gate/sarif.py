@@ -1,0 +1,86 @@
+"""Findings as SARIF 2.1.0, the form that code scanning services read.
+
+References
+----------
+OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0.
+"""
+
+import json
+from pathlib import Path, PurePath
+from typing import Any, Final
+from urllib.parse import quote
+
+from busplan import __version__
+from busplan.rules.finding import Rule
+from busplan.rules.registry import RULES
+from busplan.rules.report import CheckReport, Located
+
+_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
+_CODES: Final = list(RULES)
+
+
+def as_sarif(report: CheckReport) -> str:
+    """One run, with all rules, the results, and what could not be checked as notifications."""
+    failures = [file for file in report.files if file.failure is not None]
+    run = {
+        "tool": {
+            "driver": {
+                "name": "busplan",
+                "semanticVersion": __version__,
+                "rules": [_rule(rule) for rule in RULES.values()],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "invocations": [
+            {
+                "executionSuccessful": not failures,
+                "toolExecutionNotifications": [
+                    {"level": "error", "message": {"text": file.failure}} for file in failures
+                ],
+            }
+        ],
+        "results": [_result(one) for one in report.located],
+    }
+    document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _rule(rule: Rule) -> dict[str, Any]:
+    return {
+        "id": rule.code,
+        "name": "".join(word.capitalize() for word in rule.name.split("-")),
+        "shortDescription": {"text": rule.summary},
+        "fullDescription": {"text": rule.explanation},
+        "help": {"text": rule.explanation},
+        "defaultConfiguration": {"level": rule.severity},
+    }
+
+
+def _result(one: Located) -> dict[str, Any]:
+    finding = one.finding
+    return {
+        "ruleId": finding.code,
+        "ruleIndex": _CODES.index(finding.code),
+        "level": finding.severity,
+        "message": {"text": finding.message},
+        "locations": [
+            {
+                "physicalLocation": {
+                    "artifactLocation": _artifact(one.path),
+                    "region": {"startLine": finding.line, "startColumn": finding.column},
+                }
+            }
+        ],
+        "partialFingerprints": {"busplanFinding/v1": one.fingerprint},
+    }
+
+
+def _artifact(path: str) -> dict[str, str]:
+    """Place of a file relative to the working folder, wherever it lies below it."""
+    absolute = Path(path).is_absolute()
+    if absolute:
+        try:
+            path = str(Path(path).relative_to(Path.cwd()))
+        except ValueError:
+            return {"uri": Path(path).as_uri()}
+    return {"uri": quote(PurePath(path).as_posix()), "uriBaseId": "%SRCROOT%"}

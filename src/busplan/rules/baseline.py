@@ -1,0 +1,75 @@
+"""The baseline: what each profile could carry when it was recorded, keyed by path and figure, never by line."""
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from busplan.errors import BusplanError
+from busplan.rules.finding import Problem, Subject
+
+_SCHEMA: Final = 1
+_ROUNDING: Final = 1e-9
+"""Relative allowance for a figure that was written and read again, or computed on another machine."""
+
+Recorded = Mapping[str, float]
+"""Figures of one profile by name: "paper.max_axes"."""
+
+
+def figures_of(subject: Subject) -> dict[str, float]:
+    """The figures that no profile may lose, by name."""
+    return {
+        f"{one.timing_model}.{name}": getattr(one, name)
+        for one in sorted((subject.deciding, subject.other), key=lambda one: one.timing_model)
+        for name in ("max_axes", "margin_us")
+    }
+
+
+def regressions(now: Recorded, before: Recorded) -> Iterator[Problem]:
+    """What a profile has lost against its record."""
+    for name, value in now.items():
+        if name not in before:
+            continue
+        lost = before[name] - value
+        if lost > _ROUNDING * max(abs(before[name]), 1.0):
+            model, figure = name.split(".")
+            key = "bus.nodes" if figure == "max_axes" else "cycle.period_us"
+            yield Problem(
+                key,
+                f"{figure} under the {model} timing fell to {value:.12g} from the {before[name]:.12g} of the baseline",
+            )
+
+
+def read_baseline(text: str, *, name: str) -> dict[str, dict[str, float]]:
+    """Read a recorded baseline.
+
+    Raises
+    ------
+    BusplanError
+        It is no baseline of this version.
+    """
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        raise BusplanError(f"{name}: no JSON; record a baseline with --update-baseline") from None
+    if not isinstance(document, dict) or document.get("command") != "baseline" or document.get("schema") != _SCHEMA:
+        raise BusplanError(f"{name}: no baseline of this version; record one with --update-baseline")
+    profiles = document.get("profiles")
+    if not isinstance(profiles, dict) or not all(map(_are_figures, profiles.values())):
+        raise BusplanError(f"{name}: a damaged baseline; record it again with --update-baseline")
+    return profiles
+
+
+def _are_figures(value: Any) -> bool:
+    return isinstance(value, dict) and all(
+        isinstance(one, int | float) and not isinstance(one, bool) and abs(one) < float("inf") for one in value.values()
+    )
+
+
+def write_baseline(recorded: Mapping[str, Recorded]) -> str:
+    """Write a baseline, profiles sorted by path so that a change shows as the lines that changed."""
+    document = {
+        "schema": _SCHEMA,
+        "command": "baseline",
+        "profiles": {path: dict(recorded[path]) for path in sorted(recorded)},
+    }
+    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

@@ -1,0 +1,110 @@
+"""The gate itself: one document in, its findings out."""
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+from busplan.errors import PlacedError
+from busplan.profile.document import Document
+from busplan.profile.toml import LoadedProfile, validate
+from busplan.rules import bus, circle
+from busplan.rules.baseline import Recorded, figures_of, regressions
+from busplan.rules.file import BY_KIND
+from busplan.rules.finding import Finding, Problem, Rule, Subject
+from busplan.rules.registry import BASELINE, RULES
+from busplan.rules.suppression import suppress
+
+Status = Literal["ok", "findings", "error"]
+
+
+class FileResult(NamedTuple):
+    """What the gate says of one file."""
+
+    path: str
+    profile: str | None
+    """The profile's name, where it could be read."""
+    findings: tuple[Finding, ...]
+    """In the order of their places."""
+    figures: dict[str, float]
+    """What a baseline records; empty where the profile could not be read."""
+    source: tuple[str, ...] = ()
+    """The lines that findings stand on, in their order, for reports that show them."""
+    failure: str | None = None
+    """Why the file could not be checked at all."""
+
+    @property
+    def status(self) -> Status:
+        """Whether the file is fine, has findings, or could not be checked."""
+        if self.failure is not None:
+            return "error"
+        return "findings" if self.findings else "ok"
+
+
+def check_document(document: Document, *, with_circle: bool = True, baseline: Recorded | None = None) -> FileResult:
+    """Check one document against all rules.
+
+    Parameters
+    ----------
+    document
+        The text, under the name that findings call it by.
+    with_circle
+        Whether to run the circle test of profiles that ask for one.
+    baseline
+        What the profile may not lose; nothing without it.
+
+    Returns
+    -------
+    FileResult
+        Findings in the order of their places, suppressed ones left out.
+    """
+    try:
+        profile = validate(document)
+    except PlacedError as error:
+        # Not to be suppressed: nothing else of the file has been checked.
+        return _result(document, None, list(_of_file(error)), {})
+    subject = Subject(LoadedProfile(profile, document))
+    found = list(_bus_findings(subject))
+    ran = {rule.code for rule in bus.RULES} | {rule.code for rule in BY_KIND.values()}
+    if with_circle:
+        found += [_placed(subject, RULES[code], problem) for code, problem in circle.circle_problems(subject)]
+        ran |= {rule.code for rule in circle.RULES}
+    if baseline is not None:
+        lost = regressions(figures_of(subject), baseline)
+        found += [_placed(subject, BASELINE, problem) for problem in lost]
+        ran.add(BASELINE.code)
+    return _result(document, profile.name, suppress(found, document, ran=ran), figures_of(subject))
+
+
+def _bus_findings(subject: Subject) -> Iterator[Finding]:
+    for rule in bus.RULES:
+        if rule.check is not None:
+            for problem in rule.check(subject):
+                yield _placed(subject, rule, problem)
+
+
+def unreadable(name: str, error: PlacedError) -> FileResult:
+    """Make the result for a file that is no text."""
+    found = tuple(_of_file(error))
+    return FileResult(name, None, found, {}, ("",) * len(found))
+
+
+def _of_file(error: PlacedError) -> Iterator[Finding]:
+    for one in error.placed:
+        rule = BY_KIND[one.kind]
+        yield Finding(rule.code, rule.name, rule.severity, one.message, one.key, one.line, one.column)
+
+
+def _placed(subject: Subject, rule: Rule, problem: Problem) -> Finding:
+    """Put a problem at the line of its key, or of the table that should have it."""
+    places, path = subject.document.places, tuple(problem.key.split("."))
+    while path and path not in places:
+        path = path[:-1]
+    offset = places[path].key_start if path else 0
+    line, column = subject.document.lines.line_and_column(offset)
+    message = f"{problem.key}: {problem.message}"
+    return Finding(rule.code, rule.name, rule.severity, message, problem.key, line, column)
+
+
+def _result(document: Document, name: str | None, found: list[Finding], figures: dict[str, float]) -> FileResult:
+    ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
+    lines = document.text.split("\n")
+    return FileResult(document.name, name, ordered, figures, tuple(lines[one.line - 1] for one in ordered))

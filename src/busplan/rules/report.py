@@ -1,0 +1,62 @@
+"""All findings of one call of the gate, and what they add up to."""
+
+from functools import cached_property
+from hashlib import sha256
+from typing import NamedTuple
+
+from busplan.rules.finding import Finding, Severity
+from busplan.rules.gate import FileResult
+
+
+class Summary(NamedTuple):
+    """What a call of the gate adds up to."""
+
+    files: int
+    errors: int
+    warnings: int
+
+
+class Located(NamedTuple):
+    """One finding with its file and a fingerprint that lines and other findings do not change."""
+
+    path: str
+    finding: Finding
+    source: str
+    fingerprint: str
+
+
+class CheckReport:
+    """Answer of one call of the gate."""
+
+    def __init__(self, files: tuple[FileResult, ...]) -> None:
+        self.files = files
+
+    @cached_property
+    def summary(self) -> Summary:
+        """Number of files, errors and warnings."""
+        severities = [finding.severity for file in self.files for finding in file.findings]
+        return Summary(len(self.files), severities.count("error"), severities.count("warning"))
+
+    @property
+    def failed(self) -> bool:
+        """Whether a file could not be checked."""
+        return any(file.failure is not None for file in self.files)
+
+    def has_findings(self, least: Severity) -> bool:
+        """Whether there are findings at or above a severity."""
+        return self.summary.errors > 0 or (least == "warning" and self.summary.warnings > 0)
+
+    @cached_property
+    def located(self) -> tuple[Located, ...]:
+        """All findings in the order of files and places."""
+        found = []
+        for file in self.files:
+            seen: dict[tuple[str, str], int] = {}
+            for finding, source in zip(file.findings, file.source, strict=True):
+                same = (finding.code, finding.key)
+                number = seen[same] = seen.get(same, -1) + 1
+                mark = "\0".join((file.path, *same, str(number)))
+                found.append(
+                    Located(file.path, finding, source, sha256(mark.encode("utf-8", "surrogateescape")).hexdigest())
+                )
+        return tuple(found)

@@ -1,0 +1,70 @@
+"""`# busplan: ignore[CODE] reason`: on the line of the finding, or alone on the line above."""
+
+import re
+from collections.abc import Iterable, Iterator
+from typing import Final, NamedTuple
+
+from busplan.profile.document import Document
+from busplan.rules.finding import Finding, Rule
+from busplan.rules.registry import RULES, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON
+
+MARK: Final = "busplan:"
+_COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n]*)\](?P<reason>[^\n]*)")
+
+
+class Suppression(NamedTuple):
+    """One comment, and the line that it speaks of."""
+
+    codes: tuple[str, ...]
+    reason: str
+    line: int
+    column: int
+    of_line: int
+
+
+def suppressions(document: Document) -> Iterator[Suppression]:
+    """Find the suppressions of a text that is TOML."""
+    if MARK not in document.text:
+        return
+    for offset in document.comments:
+        match = _COMMENT.match(document.text, offset)
+        if match is None:
+            continue
+        line, column = document.lines.line_and_column(offset)
+        alone = not document.text[document.lines.offset(line, 1) : offset].strip()
+        codes = tuple(code.strip() for code in match["codes"].split(","))
+        yield Suppression(codes, match["reason"].strip(), line, column, line + 1 if alone else line)
+
+
+def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> list[Finding]:
+    """Take out what is suppressed, and add what is wrong with the suppressions.
+
+    Parameters
+    ----------
+    found
+        All findings of the document.
+    document
+        Its text.
+    ran
+        Codes of the rules that have run: only they can show that a suppression has no effect.
+    """
+    left = list(found)
+    own: list[Finding] = []
+    for one in suppressions(document):
+        if not one.reason:
+            own.append(
+                _finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason; add why behind the bracket")
+            )
+        for code in one.codes:
+            hit = [finding for finding in left if finding.code == code and finding.line == one.of_line]
+            left = [finding for finding in left if finding not in hit]
+            if code not in RULES:
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
+            elif not hit and code in ran:
+                message = f"{code} has nothing to suppress on line {one.of_line}"
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))
+    return left + own
+
+
+def _finding(rule: Rule, one: Suppression, message: str) -> Finding:
+    return Finding(rule.code, rule.name, rule.severity, message, "", one.line, one.column)
