@@ -120,7 +120,7 @@ def payload_not_quadlets(subject: Subject) -> Iterator[Problem]:
             padded = padded_bytes(size)
             yield Problem(
                 f"payload.{key}",
-                f"{size} bytes are no whole number of quadlets; {padded} bytes travel anyway: use them, or say {padded}",
+                f"{size} bytes are no whole number of quadlets; {padded} bytes travel anyway; use or say {padded}",
             )
 
 
@@ -144,7 +144,8 @@ def gap_count_wasteful(subject: Subject) -> Iterator[Problem]:
         yield Problem(
             "bus.gap_count",
             f"gap count {one.gap_count} is above the {one.safe_gap_count} that {one.hops} hops need; "
-            f"it would save {_us(one.required_us - after.required_us)} a cycle and win {won} node{'s' * (won != 1)}",
+            f"the latter would save {_us(one.required_us - after.required_us)} a cycle "
+            f"and win {won} node{'s' * (won != 1)}",
         )
 
 
