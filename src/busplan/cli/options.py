@@ -35,6 +35,16 @@ ProfileArgument = Annotated[
         show_default=False,
     ),
 ]
+PeriodsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--period",
+        metavar="TIME",
+        help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
+        "May be given several times.",
+        show_default=False,
+    ),
+]
 NodesOption = Annotated[
     int | None,
     typer.Option(
