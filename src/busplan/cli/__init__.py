@@ -1,5 +1,6 @@
 """The command line: parse, call, render, exit. One module a command; heavy imports stand inside the commands."""
 
+import codecs
 import os
 import sys
 from io import TextIOWrapper
@@ -75,7 +76,16 @@ def _mend_streams() -> None:
     if sys.stderr is None:
         # Errors have nowhere to go; they must not go to stdout.
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
+    codecs.register_error("busplan", _escaped)
     for stream in (sys.stdout, sys.stderr):
         # A terminal without UTF-8 gets escapes instead of a failure.
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(errors="busplan")
+
+
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    """Escape what an encoding lacks as JSON does: a document is JSON on every stream."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2)), error.end

@@ -16,7 +16,7 @@ Format = Literal["table", "json", "csv"]
 
 _TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
 MAX_BYTES: Final = 1_000_000
-_MAX_DIGITS: Final = 12
+_SIZE: Final = r"\s*[0-9]{1,12}\s*"
 _EXPONENT: Final = {"us": 0, "ms": 3, "s": 6}
 
 
@@ -122,7 +122,7 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
     """
     sizes = []
     for part in text.split(","):
-        if not re.fullmatch(r"\s*[0-9]+\s*", part) or not 1 <= int(part[:_MAX_DIGITS]) <= MAX_BYTES:
+        if not re.fullmatch(_SIZE, part) or not 1 <= int(part) <= MAX_BYTES:
             raise BusplanError(
                 f"{option} {text}: expected payloads of 1 to {MAX_BYTES:,} bytes between commas, as 4,16,32"
             )

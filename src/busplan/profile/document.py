@@ -17,7 +17,7 @@ _LONG_INTEGER: Final = r"[0-9_]{4000,}"
 _MAX_NESTING: Final = 100
 _MAX_KEY_PARTS: Final = 20
 _LONG_KEY: Final = (
-    r"""(?<![A-Za-z0-9_"'-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    r"""(?<![A-Za-z0-9_"'\\-])(?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
     f"{{{_MAX_KEY_PARTS}}}"
 )
 """A dotted key of very many parts, which costs the standard library's parser the square of their number."""

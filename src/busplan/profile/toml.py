@@ -46,9 +46,10 @@ def decode(content: bytes, *, name: str) -> Document:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = content[: error.start].decode("utf-8-sig")
+        # The codec counts without the byte order mark, in bytes of its own.
+        before = error.object[: error.start].decode()
         line, column = Lines(before + "?").line_and_column(len(before))
-        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
+        message = f"not a text file: byte 0x{error.object[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
         raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
     # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
     return Document(name, text.replace("\r\n", "\n"))
