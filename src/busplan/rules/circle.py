@@ -3,14 +3,13 @@
 They share one run of the test, made only for profiles that say something of servo, circle or tolerance.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from busplan.errors import BusplanError
 from busplan.rules.finding import Problem, Rule, Subject
 
 _SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
-_KEYS: Final = {"stability": "servo.position_gain_per_s"}
 
 
 def asks_for_circle(subject: Subject) -> bool:
@@ -37,9 +36,19 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
     attack = f"; attack {worst.source} first" if worst is not None and worst.removed_mm > 0 else ""
     for failure in result.failures:
         stability = failure.name in ("stability", "min_phase_margin_deg", "min_gain_margin_db")
-        key = _KEYS.get(failure.name, f"tolerance.{failure.name}")
+        # Margins have default limits: what is not said in the file cannot be where its finding stands.
+        said = failure.name in subject.profile.tolerance.model_fields_set
+        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
         cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else attack
         yield "BP202" if stability else "BP201", Problem(key, f"{failure.text}{cure}")
+
+
+def answered(subject: Subject, problems: Sequence[tuple[str, Problem]]) -> set[str]:
+    """Codes of the rules that have an answer: none without a test, one alone where the test could not be run."""
+    if asks_for_circle(subject) and not subject.deciding.fits:
+        return set()
+    impossible = {code for code, _ in problems if code == "BP203"}
+    return impossible or {rule.code for rule in RULES}
 
 
 RULES: Final = (
