@@ -7,8 +7,10 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from busplan.errors import BusplanError
+from busplan.profile.model import Profile
 from busplan.rules.finding import Problem, Rule, Subject
 
+_NAMED: Final = ("circle", "servo", "delivery", "cycle")
 _SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
 
 
@@ -30,7 +32,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
         result = circle_test(subject.profile).results[0]
     except BusplanError as error:
         for message in error.problems:
-            yield "BP203", Problem("servo" if "servo" in subject.profile.model_fields_set else "circle", message)
+            yield "BP203", Problem(_key_of(message, subject.profile), message)
         return
     worst = result.contributions[0] if result.contributions else None
     attack = f"; attack {worst.source} first" if worst is not None and worst.removed_mm > 0 else ""
@@ -41,6 +43,15 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
         key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
         cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else attack
         yield "BP202" if stability else "BP201", Problem(key, f"{failure.text}{cure}")
+
+
+def _key_of(message: str, profile: Profile) -> str:
+    """Key of the value that a message of the servo core begins with, where the file says it."""
+    name = message.partition(" = ")[0]
+    for section in _NAMED:
+        if name in getattr(profile, section).model_fields_set:
+            return f"{section}.{name}"
+    return "servo" if "servo" in profile.model_fields_set else "circle"
 
 
 def answered(subject: Subject, problems: Sequence[tuple[str, Problem]]) -> set[str]:
