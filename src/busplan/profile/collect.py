@@ -53,11 +53,12 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
     skipped: list[str] = []
     for argument in arguments:
         for source in _meant(argument, stdin_name=stdin_name, skipped=skipped):
-            key = source.path.absolute().as_posix() if source.failure is None else source.failure
+            key = _place(source.path).as_posix() if source.failure is None else source.failure
             if key in sources:
                 continue
             # A shipped profile and a file can be called alike: the second says where it is.
-            sources[key] = source._replace(name=key) if source.failure is None and source.name in names else source
+            taken = source.failure is None and source.name in names
+            sources[key] = source._replace(name=source.path.absolute().as_posix()) if taken else source
             names.add(source.name)
     return Collection(tuple(sources.values()), tuple(skipped))
 
@@ -71,22 +72,26 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[So
         elif name != argument:  # a shipped name, whatever lies in the working folder
             yield Source(path, name)
         elif path.is_dir():
-            yield from _below(_from_here(path), skipped)
+            yield from _below(path, skipped)
         else:
-            path = _from_here(path)
-            yield Source(path, path.as_posix())
+            yield Source(path, _name(path))
     except (BusplanError, ValueError) as error:  # ValueError: a NUL in the path
         yield Source(Path(argument), argument, str(error))
 
 
-def _from_here(path: Path) -> Path:
-    """Write a path from the working folder where it lies below it, so that one file has one name."""
+def _place(path: Path) -> Path:
+    """The one place of a path: from the working folder where it lies below it, otherwise from the root."""
     if not path.is_absolute() and ".." not in path.parts:
         return path
-    absolute = Path(os.path.realpath(path if path.name == ".." else path.parent))
-    absolute = absolute if path.name == ".." else absolute / path.name
+    real = Path(os.path.realpath(path)) if path.name == ".." else Path(os.path.realpath(path.parent), path.name)
     here = Path.cwd()
-    return absolute.relative_to(here) if absolute.is_relative_to(here) else path
+    return real.relative_to(here) if real.is_relative_to(here) else real
+
+
+def _name(path: Path) -> str:
+    """What a file is called: by its place where that is short, otherwise as it was given."""
+    place = _place(path)
+    return (path if place.is_absolute() else place).as_posix()
 
 
 def _below(folder: Path, skipped: list[str]) -> Iterator[Source]:
@@ -101,14 +106,15 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[Source]:
             path = Path(root) / name
             if _claims(path):
                 found = True
-                yield Source(path, path.as_posix())
+                yield Source(path, _name(path))
             else:
-                skipped.append(path.as_posix())
+                skipped.append(_name(path))
     for error in unreadable:
-        yield Source(Path(error.filename), error.filename, f"{error.filename}: cannot be read: {error.strerror}")
+        name = _name(Path(error.filename))
+        yield Source(Path(error.filename), name, f"{name}: cannot be read: {error.strerror}")
     if not found and not unreadable:
-        message = f"{folder}: no profile below this folder (a *.toml with a schema_version)"
-        yield Source(folder, folder.as_posix(), message)
+        name = _name(folder)
+        yield Source(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
 
 
 def _claims(path: Path) -> bool:
