@@ -68,6 +68,9 @@ def read_bytes(path: Path, *, name: str) -> bytes:
             if sys.stdin is None:
                 raise BusplanError(f"{name}: standard input is closed")
             return sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+        if path.is_fifo() and not path.is_relative_to("/dev"):
+            # Opening it would wait for a writer, for ever; a shell's <(command) is /dev/fd/N and has one.
+            raise BusplanError(f"{name}: is a named pipe; give a profile file, or - for standard input")
         with path.open("rb") as file:
             return file.read(MAX_FILE_BYTES + 1)
     except FileNotFoundError:
