@@ -18,8 +18,8 @@ _LONG_INTEGER: Final = r"[0-9_]{4000,}"
 _MAX_NESTING: Final = 100
 _MAX_KEY_PARTS: Final = 20
 _LONG_KEY: Final = (
-    r"""(?<![A-Za-z0-9_"'\\-])(?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
-    f"{{{_MAX_KEY_PARTS}}}"
+    r"""(?m)(?:^|[\[{,])[ \t]*+((?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    f"{{{_MAX_KEY_PARTS}}})"
 )
 """A dotted key of very many parts, which costs the standard library's parser the square of their number."""
 
@@ -29,7 +29,6 @@ class Lines:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        # Each line begins one past the end of the one before;
         self._starts = [0, *accumulate(len(line) + 1 for line in text.split("\n")[:-1])]
 
     def offset(self, line: int, column: int) -> int:
@@ -87,7 +86,7 @@ class Document:
         """
         long_key = self._long_key()
         if long_key:
-            raise self.syntax_error(long_key.start(), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
+            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
         try:
             return tomllib.loads(self.text)
         except RecursionError:
