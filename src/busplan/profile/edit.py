@@ -12,12 +12,12 @@ from typing import Any
 
 from busplan.errors import BusplanError, PlacedError
 from busplan.profile.document import Document
-from busplan.profile.layout import Layout, Value, canonical
+from busplan.profile.layout import Layout, canonical
 from busplan.profile.positions import KeyPath
 from busplan.profile.toml import decode, validate
 
 
-def edited(document: Document, changes: Mapping[str, Value | None], *, notes: Mapping[str, str] | None = None) -> str:
+def edited(document: Document, changes: Mapping[str, object], *, notes: Mapping[str, str] | None = None) -> str:
     r"""Text of a profile with other values.
 
     Parameters
@@ -25,7 +25,8 @@ def edited(document: Document, changes: Mapping[str, Value | None], *, notes: Ma
     document
         A valid profile; its line ends may be LF or CRLF.
     changes
-        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "bus.max_hops": None}.
+        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "bus.max_hops": None}. A value
+        is a boolean, an int, a float, a text, or a sequence of them; one that is equal already stays as written.
         A key or table that is not there yet is added: keys behind the last one of their table, tables at the end.
     notes
         A comment of one line by dotted table, for the line above it: {"node.execution": "busplan calibrate: ..."}. It
@@ -40,6 +41,8 @@ def edited(document: Document, changes: Mapping[str, Value | None], *, notes: Ma
     ------
     BusplanError
         A change that cannot be made in place, or that makes no valid profile.
+    TypeError, ValueError
+        What is given as a value can be none in TOML, or is not finite: a caller's mistake.
 
     Examples
     --------
@@ -62,7 +65,7 @@ def edited(document: Document, changes: Mapping[str, Value | None], *, notes: Ma
 
 
 def edited_file(
-    content: bytes, changes: Mapping[str, Value | None], *, name: str, notes: Mapping[str, str] | None = None
+    content: bytes, changes: Mapping[str, object], *, name: str, notes: Mapping[str, str] | None = None
 ) -> bytes:
     """Bytes of a profile's file with other values: `edited`, and a byte order mark and CRLF line ends stay.
 
@@ -102,7 +105,7 @@ def _check(name: str, text: str, wanted: dict[str, Any]) -> None:
         raise BusplanError(f"{name}: the layout of the file cannot take the changes; make them by hand")
 
 
-def _change(data: dict[str, Any], path: KeyPath, value: Value | None) -> None:
+def _change(data: dict[str, Any], path: KeyPath, value: object) -> None:
     """Make a change in the data as `Layout.changed` makes it in the text."""
     table: Any = data
     for part in path[:-1]:

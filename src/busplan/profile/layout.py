@@ -10,9 +10,6 @@ from typing import Any, Final
 from busplan.errors import BusplanError
 from busplan.profile.positions import KeyPath, scan
 
-Scalar = bool | int | float | str
-Value = Scalar | Sequence[Scalar]
-
 _BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
 _HEADER_END: Final = re.compile(r"[ \t]*\]")
 _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
@@ -30,7 +27,7 @@ def _pruned(value: Any) -> Any:
     return {key: one for key, one in pruned.items() if one != {}}
 
 
-def written(value: Value) -> str:
+def written(value: object) -> str:
     """Write a value as TOML.
 
     Raises
@@ -109,7 +106,7 @@ class Layout:
         """The text with something else between two offsets."""
         return self.text[:start] + new + self.text[end:]
 
-    def changed(self, path: KeyPath, value: Value | None) -> str:
+    def changed(self, path: KeyPath, value: object) -> str:
         """The text with one change made."""
         holder = self.holder(path)
         if holder is not None and self.text[self.places[holder].value_start] != "{":
@@ -124,7 +121,7 @@ class Layout:
             return self.text
         return self.with_statement(path, value) if holder is None else self.with_member(holder, path, value)
 
-    def replaced(self, path: KeyPath, value: Value) -> str:
+    def replaced(self, path: KeyPath, value: object) -> str:
         """The text with another value; a comment behind it stays in its column."""
         place = self.places[path]
         new = self.value_text(path, value)
@@ -135,7 +132,7 @@ class Layout:
             new, end = f"{new} ".ljust(width), space.end()
         return self.spliced(place.value_start, end, new)
 
-    def value_text(self, path: KeyPath, value: Value) -> str:
+    def value_text(self, path: KeyPath, value: object) -> str:
         """A value as it shall stand: what is equal stays as written, an array of the same length keeps its layout."""
         place = self.places[path]
         start, end = place.value_start, place.value_end
@@ -175,7 +172,7 @@ class Layout:
         inside = (path for path in self.valued if len(path) > len(holder) and self.holder(path) == holder)
         return sorted(inside, key=lambda path: self.places[path].value_start)
 
-    def with_member(self, holder: KeyPath, path: KeyPath, value: Value) -> str:
+    def with_member(self, holder: KeyPath, path: KeyPath, value: object) -> str:
         """The text with one more key in an inline table."""
         new = f"{_key(path[len(holder) :])} = {written(value)}"
         members = self.members(holder)
@@ -185,7 +182,7 @@ class Layout:
         place = self.places[holder]
         return self.spliced(place.value_start, place.value_end, f"{{ {new} }}")
 
-    def with_statement(self, path: KeyPath, value: Value) -> str:
+    def with_statement(self, path: KeyPath, value: object) -> str:
         """The text with one more line: in the table's section, or where its dotted keys stand, or in a new section."""
         table = path[:-1]
         section = table if not table or table in self.headers else None
@@ -210,7 +207,7 @@ class Layout:
         above = ((start, path) for path, start in self.headers.items() if start < at)
         return max(above, default=(0, ()))[1]
 
-    def first_of_section(self, section: KeyPath, path: KeyPath, value: Value) -> str:
+    def first_of_section(self, section: KeyPath, path: KeyPath, value: object) -> str:
         """The text with a line in a section that has none, or above the first header."""
         if section:
             start = self.headers[section]
@@ -218,14 +215,14 @@ class Layout:
         start = min(self.headers.values(), default=len(self.text))
         return self.with_line(start, start, path, value)
 
-    def with_line(self, at: int, like: int, key: KeyPath, value: Value) -> str:
+    def with_line(self, at: int, like: int, key: KeyPath, value: object) -> str:
         """The text with a new line at an offset, indented as the line that starts at another."""
         indent = re.compile(r"[ \t]*").match(self.text, like)
         line = f"{indent.group() if indent else ''}{_key(key)} = {written(value)}{self.line_end}"
         before = self.line_end if at and self.text[at - 1] != "\n" else ""
         return self.spliced(at, at, before + line)
 
-    def with_section(self, path: KeyPath, value: Value) -> str:
+    def with_section(self, path: KeyPath, value: object) -> str:
         """The text with a new table at its end."""
         text = self.text if not self.text or self.text.endswith("\n") else f"{self.text}{self.line_end}"
         blank = self.line_end if text else ""
