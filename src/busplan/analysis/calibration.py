@@ -2,20 +2,18 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from itertools import combinations
-from statistics import fmean, linear_regression, median, stdev
+from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
+from busplan.analysis.execution_fit import METHODS, Form, Groups, Method, fit_execution, middles, theil_sen
 from busplan.errors import BusplanError
 from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.measurements import Measurement
 from busplan.profile.model import Profile
 from busplan.timing import TIMING_MODELS, Phases, TimingModelName, transaction
 
-Form = Literal["table", "linear"]
 Way = Literal["timing-model", "measured-halves"]
 """Where the two halves come from that are taken off a latency."""
-Method = Literal["mean", "median", "least squares", "Theil-Sen"]
 
 OUTLIER_DEVIATIONS: Final = 3.5
 """How many robust standard deviations from the fit make an outlier (Iglewicz and Hoaglin)."""
@@ -25,9 +23,6 @@ _DEVIATION_PER_MAD: Final = 1.4826
 """Standard deviation of a normal distribution whose median absolute deviation is 1."""
 _FEWEST_FOR_OUTLIERS: Final = 3
 
-_TIME_DECIMALS: Final = 3
-_PER_BYTE_DECIMALS: Final = 6
-"""A nanosecond, also over the largest payload."""
 _EXACT_DECIMALS: Final = 6
 """A picosecond: what is less is rounding of the subtraction, and no residual."""
 
@@ -155,13 +150,13 @@ def calibrate(
     for one, packets_us in raw:
         groups[one.payload_bytes].append(one.latency_us - packets_us)
     chosen = form or profile.node.execution.kind
-    fit = _fit(groups, chosen, robust=robust, grade=grade, source=source)
+    fit = fit_execution(groups, chosen, robust=robust, grade=grade, source=source)
     residuals = _residuals(raw, fit)
     return Calibration(
         profile=profile,
         timing_model=model,
         way=way,
-        method=_METHODS[chosen, robust],
+        method=METHODS[chosen, robust],
         execution=fit,
         residuals=residuals,
         payloads=tuple(_payload_fits(residuals, measurements, halves, fit, robust=robust)),
@@ -172,16 +167,7 @@ def calibrate(
     )
 
 
-_METHODS: Final[Mapping[tuple[Form, bool], Method]] = {
-    ("table", False): "mean",
-    ("table", True): "median",
-    ("linear", False): "least squares",
-    ("linear", True): "Theil-Sen",
-}
-
 _Halves = Mapping[tuple[str, int], Phases]
-_Groups = Mapping[int, Sequence[float]]
-"""T_exec of the measurements at each payload [us]."""
 
 
 def _packet_phases(profile: Profile, measurements: Sequence[Measurement], model: TimingModelName) -> _Halves:
@@ -237,46 +223,6 @@ def _more(source: str, hidden: int) -> list[str]:
     return [f"{source}: and {hidden} more problems"] if hidden > 0 else []
 
 
-def _fit(
-    groups: _Groups, form: Form, *, robust: bool, grade: Literal["measured", "derived"], source: str
-) -> LinearExecution | TableExecution:
-    """The execution time of that form that fits T_exec by payload, in whole nanoseconds."""
-    if form == "table":
-        times_us = {size: round(time_us, _TIME_DECIMALS) for size, time_us in _middles(groups, robust=robust).items()}
-        return TableExecution(
-            kind="table", payload_bytes=tuple(times_us), time_us=tuple(times_us.values()), grade=grade
-        )
-    if len(groups) == 1:
-        raise BusplanError(f"{source}: all payloads are {min(groups)} bytes: a line needs two, or use --form table")
-    base_us, per_byte_us = _theil_sen(groups) if robust else _least_squares(groups)
-    base_us, per_byte_us = round(base_us, _TIME_DECIMALS), round(per_byte_us, _PER_BYTE_DECIMALS)
-    if base_us < 0 or per_byte_us < 0:
-        line = f"{base_us:g} us + {per_byte_us:g} us/byte * payload"
-        ways = "--form table" if robust else "--form table, or --robust if there are outliers"
-        raise BusplanError(f"{source}: the line is {line}, and no part of an execution time is negative: use {ways}")
-    return LinearExecution(kind="linear", base_us=base_us, per_byte_us=per_byte_us, grade=grade)
-
-
-def _middles(groups: _Groups, *, robust: bool) -> dict[int, float]:
-    """Mean or median at each payload [us], by payload."""
-    middle = median if robust else fmean
-    return {size: middle(groups[size]) for size in sorted(groups)}
-
-
-def _least_squares(groups: _Groups) -> tuple[float, float]:
-    """Base [us] and slope [us/byte] of the line of least squares over all measurements."""
-    points = [(size, value) for size, values in groups.items() for value in values]
-    slope, base = linear_regression(*zip(*points, strict=True))
-    return base, slope
-
-
-def _theil_sen(groups: _Groups) -> tuple[float, float]:
-    """Base [us] and slope [us/byte] of the line of Theil and Sen through the median at each payload."""
-    points = list(_middles(groups, robust=True).items())
-    slope = median((y2 - y1) / (x2 - x1) for (x1, y1), (x2, y2) in combinations(points, 2))
-    return median(y - slope * x for x, y in points), slope
-
-
 def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> tuple[Residual, ...]:
     fitted_us = {size: fit.execution_us(size) for size in {one.payload_bytes for one, _ in raw}}
     found = []
@@ -296,11 +242,11 @@ def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | 
     return tuple(found)
 
 
-def _outliers(residuals: Sequence[Residual], groups: _Groups, form: Form) -> tuple[Residual, ...]:
+def _outliers(residuals: Sequence[Residual], groups: Groups, form: Form) -> tuple[Residual, ...]:
     """Measurements that stand off the robust fit: of a table payload by payload, of a line over all."""
-    sturdy_us = _middles(groups, robust=True)
+    sturdy_us = middles(groups, robust=True)
     if form == "linear":
-        base_us, per_byte_us = _theil_sen(groups)
+        base_us, per_byte_us = theil_sen(groups)
         sturdy_us = {size: base_us + per_byte_us * size for size in groups}
     pools: defaultdict[int, list[tuple[Residual, float]]] = defaultdict(list)
     for one in residuals:

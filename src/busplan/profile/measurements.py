@@ -79,7 +79,7 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
 
     Examples
     --------
-    >>> parse_measurements(b"payload_bytes,latency_us\\n4,48.7\\n", name="bench.csv")[0].latency_us
+    >>> parse_measurements(b"payload_bytes,latency_us\n4,48.7\n", name="bench.csv")[0].latency_us
     48.7
     """
     rows = list(_rows(_decoded(content, name=name)))
@@ -91,7 +91,7 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
         raise PlacedError(name, tuple(problems))
     columns = [cell.text for cell in header]
     found = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows[1:]]
-    problems = [one for each in found if isinstance(each, list) for one in each]
+    problems = sorted(one for each in found if isinstance(each, list) for one in each)
     if problems:
         raise PlacedError(name, tuple(problems[:_MOST_SHOWN]), hidden=max(0, len(problems) - _MOST_SHOWN))
     measurements = tuple(each for each in found if isinstance(each, Measurement))
