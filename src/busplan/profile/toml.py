@@ -55,8 +55,17 @@ def decode(content: bytes, *, name: str) -> Document:
     return Document(name, text.replace("\r\n", "\n"))
 
 
-def read_bytes(path: Path, *, name: str) -> bytes:
-    """Read a file, or standard input for the path "-", no further than a profile can be long.
+def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
+    """Read a file, or standard input for the path "-", no further than it may be long and one byte more.
+
+    Parameters
+    ----------
+    path
+        The file, or "-".
+    name
+        What to call it in messages.
+    limit
+        How long it may be [bytes]; without it, as a profile.
 
     Raises
     ------
@@ -67,16 +76,16 @@ def read_bytes(path: Path, *, name: str) -> bytes:
         if str(path) == "-":
             if sys.stdin is None:
                 raise BusplanError(f"{name}: standard input is closed")
-            return sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+            return sys.stdin.buffer.read(limit + 1)
         if path.is_fifo() and not path.is_relative_to("/dev"):
             # Opening it would wait for a writer, for ever; a shell's <(command) is /dev/fd/N and has one.
             raise BusplanError(f"{name}: is a named pipe; give a profile file, or - for standard input")
         with path.open("rb") as file:
-            return file.read(MAX_FILE_BYTES + 1)
+            return file.read(limit + 1)
     except FileNotFoundError:
         raise BusplanError(f"{name}: no such file") from None
     except IsADirectoryError:
-        raise BusplanError(f"{name}: is a directory; give a profile file") from None
+        raise BusplanError(f"{name}: is a directory; give a file") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise BusplanError(f"{name}: cannot be read: {reason}") from None
