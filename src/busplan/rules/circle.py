@@ -9,13 +9,7 @@ from typing import Final
 from busplan.errors import BusplanError
 from busplan.rules.finding import Problem, Rule, Subject
 
-_SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
 _KEYS: Final = {"stability": "servo.position_gain_per_s"}
-
-
-def asks_for_circle(subject: Subject) -> bool:
-    """Whether the profile says anything that a circle test is for."""
-    return bool(_SECTIONS & subject.profile.model_fields_set)
 
 
 def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
@@ -25,7 +19,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
     """
     from busplan.analysis.circle_test import circle_test
 
-    if not asks_for_circle(subject) or not subject.deciding.fits:
+    if not subject.profile.asks_for_circle or not subject.deciding.fits:
         return
     try:
         result = circle_test(subject.profile).results[0]
