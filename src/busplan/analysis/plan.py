@@ -128,7 +128,7 @@ def plan(
     >>> from busplan.profile.shipped import load
     >>> found = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
     >>> found.recommended.changes, round(found.recommended.deciding.margin_us, 1)
-    ({'bus.gap_count': 10}, 128.3)
+    ({'bus.gap_count': 10}, 143.1)
     """
     asked = dict(wanted or {})
     goal = override(profile, dict(asked))
@@ -253,7 +253,11 @@ class _Planner:
     def payload(self, title: str) -> Option | Impossible:
         size, bounded_by = largest_payload(self.goal, model=self.model)
         if not size:
-            reason = "the execution table holds no whole quadlets" if bounded_by == "execution" else "none fits"
+            reason = (
+                "the execution table holds no whole quadlets"
+                if bounded_by == "execution"
+                else "not even the smallest fits"
+            )
             return Impossible(title, reason)
         changes: Changes = {"payload.read_bytes": size, "payload.write_bytes": size}
         return self.fitting(title, changes, bounded_by=bounded_by)

@@ -77,7 +77,7 @@ def smallest_period(
     circle
         The circle test; without it no circle is run.
     max_circles
-        How many periods in a row are tested [1].
+        How many periods in a row are tested, 1 or more [1].
     """
     needed_us, ratio = required_us(profile, models=models), profile.cycle.slice_ratio
     step_us = 1.0 if circle is None else profile.servo.step_us
@@ -88,12 +88,12 @@ def smallest_period(
     if _times(first, step_us) > MAX_TIME_US:
         return PeriodSearch(None, "time", proven=True)
     for tried, number in enumerate(_numbers(first, in_a_row=max_circles)):
-        period_us = _times(number, step_us)
+        period_us, proven = _times(number, step_us), tried < max_circles
         if period_us > MAX_TIME_US:
-            break
+            return PeriodSearch(None, "circle", proven=proven)
         if circle is None or not circle(override(profile, {"cycle.period_us": period_us})):
-            return PeriodSearch(period_us, "circle" if tried else "time", proven=tried < max(max_circles, 1))
-    return PeriodSearch(None, "circle", proven=False)
+            return PeriodSearch(period_us, "circle" if tried else "time", proven=proven)
+    raise AssertionError("the numbers never end")
 
 
 def largest_payload(profile: Profile, *, model: TimingModelName) -> Largest:
@@ -137,10 +137,11 @@ def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:
 def _numbers(first: int, *, in_a_row: int) -> Iterator[int]:
     """Some numbers in a row, then in strides that double."""
     yield from range(first, first + in_a_row)
-    number, stride = first + in_a_row, 1
+    number, stride = first + in_a_row - 1, 2
     while True:
+        number += stride
         yield number
-        number, stride = number + 2 * stride, 2 * stride
+        stride *= 2
 
 
 def _times(number: int, step_us: float) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, ProfileArgument, bus_changes, periods_us
-from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
+from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say, write_file
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -35,7 +35,7 @@ def plan_command(
             metavar="N",
             min=1,
             max=_MAX_AXES,
-            help="Goal: so many axes, on as many nodes as they need at the profile's node.axes each; instead of --nodes.",
+            help="Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.",
         ),
     ] = None,
     period: Annotated[
@@ -52,7 +52,7 @@ def plan_command(
         bool,
         typer.Option(
             "--circle/--no-circle",
-            help="Run the circle test, where the profile has a section servo, circle, tolerance, mechanics or delivery.",
+            help="Run the circle test, where the profile has a section for it: servo, circle, tolerance, ...",
         ),
     ] = True,
     max_circles: Annotated[
@@ -166,7 +166,26 @@ def _wanted(
 
 
 def _apply(loaded: "LoadedProfile", result: "Plan", *, path: Path) -> None:
-    raise NotImplementedError
+    """Edit the recommended values into the file, unless it is no longer the one that was planned for."""
+    from busplan.profile.edit import edited_file
+    from busplan.profile.toml import decode, read_bytes
+    from busplan.report.plan import settings
+
+    if result.recommended is None:
+        return
+    changes = result.all_changes(result.recommended)
+    if not changes:
+        say(f"{path}: nothing to change, left as it is")
+        return
+    content = read_bytes(path, name=str(path))
+    if decode(content, name=str(path)) != loaded.document:
+        raise BusplanError(f"--apply {path}: the file was changed while the plan was made; run the command again")
+    # A whole number is written as one.
+    values = {
+        key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
+    }
+    write_file(path, edited_file(content, values, name=str(path)), overwrite=True)
+    say(f"changed {path}: {settings(changes)}")
 
 
 def _emit(result: "Plan", *, format_: str, with_circle: bool) -> None:

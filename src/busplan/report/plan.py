@@ -20,7 +20,7 @@ def plan_lines(plan: Plan, *, with_circle: bool) -> list[Line]:
         lines.append(Line("? not proven: the search for a smaller period was cut short (--max-circles)."))
     for one in plan.impossible:
         proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        lines.append(Line(f"No {one.title}: {one.reason}{proven}."))
+        lines.append(Line(f"{one.title.capitalize()}: none, {one.reason}{proven}."))
     return lines
 
 
@@ -29,12 +29,12 @@ def settings(changes: dict[str, Value]) -> str:
 
     Examples
     --------
-    >>> settings({"bus.gap_count": 16, "bus.max_hops": 16})
-    'bus.gap_count = 16, bus.max_hops = 16 (rewired as a tree)'
+    >>> settings({"bus.nodes": 20, "bus.max_hops": 16})
+    'bus.nodes = 20, bus.max_hops = 16 (rewired as a tree)'
     """
-    return ", ".join(
-        f"{key} = {_value(value)}{f' ({MEANING[key]})' if key in MEANING else ''}" for key, value in changes.items()
-    )
+    # A number of nodes is what was asked for, never what a second bus would leave.
+    meaning = {key: f" ({MEANING[key]})" for key in changes if key in MEANING and key != "bus.nodes"}
+    return ", ".join(f"{key} = {_value(value)}{meaning.get(key, '')}" for key, value in changes.items())
 
 
 def goal_words(profile: Profile) -> str:
@@ -49,12 +49,12 @@ def _headline(plan: Plan, *, with_circle: bool) -> Line:
     if option is None:
         why = _why_none(plan)
         return Line(
-            f"{subject}: NO PLAN. No change of gap count, slice ratio, period, speed or wiring, of those left open, fits "
-            f"both timing models with a safe gap count{circle}{why}.",
+            f"{subject}: NO PLAN. Of gap count, slice ratio, period, speed and wiring, no change of what is left open "
+            f"fits both timing models with a safe gap count{circle}{why}.",
             "bad",
         )
     spare = min(option.deciding.margin_us, option.other.margin_us)
-    result = f"fits both timing models, {us(spare)} us to spare in the tighter{circle}"
+    result = f"fits both timing models with {us(spare)} us to spare in the tighter one{circle}"
     if not option.changes:
         return Line(f"{subject}: nothing to change; it {result}.", "good")
     return Line(f"{subject}: set {settings(option.changes)}; then it {result}.", "good")
@@ -82,7 +82,7 @@ _SHORT: Final = {
     "bus.gap_count": "gap count {}",
     "bus.max_hops": "tree of {} hops",
     "bus.nodes": "{} nodes",
-    "bus.speed": "{}",
+    "bus.speed": "speed {}",
     "cycle.slice_ratio": "ratio {}",
     "payload.read_bytes": "read {} bytes",
     "payload.write_bytes": "write {} bytes",
@@ -101,7 +101,7 @@ def _short(changes: dict[str, Value]) -> str:
 
 
 def _value(value: Value) -> str:
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
+    return f"{value:.12g}" if isinstance(value, float) else f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def _table(options: tuple[Option, ...]) -> list[Line]:
