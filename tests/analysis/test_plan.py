@@ -1,6 +1,6 @@
 """The recommended change is the cheapest of all there are, and every option does what it says."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from itertools import product
 
@@ -38,10 +38,13 @@ def working_kinds(profile: Profile, exact: Exact) -> Iterator[tuple[str, ...]]:
     }
     for kind in KINDS:
         gap_counts = range(64) if "gap" in kind else [bus.gap_count_for(bus.nodes)]
-        ratios = [Fraction(n, 100) for n in range(1, 91)] if "ratio" in kind else [Fraction(cycle.slice_ratio)]
-        periods = [10**9] if "period" in kind else [Fraction(cycle.period_us)]
+        ratios: Sequence[Fraction] = (
+            [Fraction(n, 100) for n in range(1, 91)] if "ratio" in kind else [Fraction(cycle.slice_ratio)]
+        )
+        periods = [Fraction(10**9) if "period" in kind else Fraction(cycle.period_us)]
         safe = [gap_count for gap_count in gap_counts if gap_count >= SAFE[hops - 1]]
-        if any(required[g] <= ratio * period * rounding for g, ratio, period in product(safe, ratios, periods)):
+        slices = [ratio * period * rounding for ratio, period in product(ratios, periods)]
+        if any(required[gap_count] <= slice_us for gap_count, slice_us in product(safe, slices)):
             yield kind
 
 
