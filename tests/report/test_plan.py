@@ -59,6 +59,8 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
     lines = text(paper, circle=circle, max_circles=3).splitlines()
     assert sum(line.startswith("* ") for line in lines if "recommended." not in line) == 1
     assert any(line.startswith("?  smallest period") for line in lines)
+    rough = override(paper, {"cycle.period_us": 800.0})
+    assert any(line.startswith("*?") for line in text(rough, circle=circle, max_circles=3).splitlines())
     assert any("not proven" in line for line in lines)
 
 
