@@ -109,7 +109,7 @@ def validate(document: Document) -> Profile:
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
-    """Make a profile with other values, checked like one that was read.
+    """Make a profile with other values, checked like one that was read; what it leaves out it still leaves out.
 
     Parameters
     ----------
@@ -127,12 +127,12 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     """
     if not changes:
         return profile
-    data = profile.model_dump()
+    data = profile.model_dump(exclude_unset=True)
     for key, value in changes.items():
         *tables, last = key.split(".")
         table = data
         for name in tables:
-            table = table[name]
+            table = table.setdefault(name, {})
         table[last] = value
     try:
         return Profile.model_validate(data)

@@ -9,7 +9,7 @@ from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_co
 from busplan.profile.model import Profile
 from busplan.report.lines import Line, plural, us
 
-_MEANING: Final = {
+MEANING: Final = {
     "bus.max_hops": "rewired as a tree",
     "bus.nodes": "the others on a second bus",
     "bus.speed": "if all nodes can",
@@ -158,5 +158,5 @@ def _advice(verdict: Verdict, profile: Profile) -> Line:
 
 
 def _setting(key: str, value: object) -> str:
-    meaning = f" ({_MEANING[key]})" if key in _MEANING else ""
+    meaning = f" ({MEANING[key]})" if key in MEANING else ""
     return f"{key} = {value}{meaning}"

@@ -11,12 +11,6 @@ from busplan.profile.model import Profile
 from busplan.rules.finding import Problem, Rule, Subject
 
 _NAMED: Final = ("circle", "servo", "delivery", "cycle")
-_SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
-
-
-def asks_for_circle(subject: Subject) -> bool:
-    """Whether the profile says anything that a circle test is for."""
-    return bool(_SECTIONS & subject.profile.model_fields_set)
 
 
 def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
@@ -26,7 +20,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
     """
     from busplan.analysis.circle_test import circle_test
 
-    if not asks_for_circle(subject) or not subject.deciding.fits:
+    if not subject.profile.asks_for_circle or not subject.deciding.fits:
         return
     try:
         result = circle_test(subject.profile).results[0]
@@ -56,7 +50,7 @@ def _key_of(message: str, profile: Profile) -> str:
 
 def answered(subject: Subject, problems: Sequence[tuple[str, Problem]]) -> set[str]:
     """Codes of the rules that have an answer: none without a test, one alone where the test could not be run."""
-    if asks_for_circle(subject) and not subject.deciding.fits:
+    if subject.profile.asks_for_circle and not subject.deciding.fits:
         return set()
     impossible = {code for code, _ in problems if code == "BP203"}
     return impossible or {rule.code for rule in RULES}
