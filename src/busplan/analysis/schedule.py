@@ -178,9 +178,8 @@ def zoom(
         if not own:
             raise BusplanError(f"{transaction[0]}:{transaction[1]}: no such transaction in this cycle")
         start_us, end_us = max(start_us, own[0].start_us), min(end_us, own[-1].end_us)
-        span = (
-            f"the {transaction[0]} of node {transaction[1]} runs from {own[0].start_us:.12g} to {own[-1].end_us:.12g} us"
-        )
+        owner = f"the {transaction[0]} of node {transaction[1]}"
+        span = f"{owner} runs from {own[0].start_us:.12g} to {own[-1].end_us:.12g} us"
     if not start_us < end_us:
         shown = " ".join(
             f"{word} {value:.12g} us" for word, value in (("from", from_us), ("to", to_us)) if value is not None
@@ -226,8 +225,10 @@ def _transaction(kind: TransactionKind, node: int, phases: Phases) -> Iterator[_
 
 
 def _laid_out(parts: Iterable[_Part]) -> Iterator[Event]:
-    """Put parts one behind the other. The sum carries what each addition loses (Neumaier), so that an error cannot grow
-    with the number of events."""
+    """Put parts one behind the other.
+
+    The sum carries what each addition loses (Neumaier), so that an error cannot grow with the number of events.
+    """
     total_us = lost_us = start_us = 0.0
     for kind, node, transaction, packet, duration_us in parts:
         larger_us, smaller_us = max(total_us, duration_us), min(total_us, duration_us)

@@ -109,15 +109,16 @@ def timeline_command(
     """Show one communication cycle as events, node by node and to scale.
 
     The synchronous packet, a read and then a write of every node with each arbitration, packet, acknowledge, execution
-    and gap, the non-periodic window, and what is left of the slice. It is the second way to the time that capacity gives
-    in closed form. A cycle that overruns its slice is drawn whole, and said. Every node is charged the hops of the
-    farthest. Times are in us. A report: it exits 0 whatever the figures are.
+    and gap, the non-periodic window, and what is left of the slice. It is the second way to the time that capacity
+    gives in closed form. A cycle that overruns its slice is drawn whole, and said. Every node is charged the hops of
+    the farthest. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
     chosen = _format(format_, output)
-    window_us = [None if text is None else time_us(text, option=f"--{name}") for name, text in _named(from_, to)]
-    if window_us[0] is not None and window_us[1] is not None and window_us[0] >= window_us[1]:
+    from_us = None if from_ is None else time_us(from_, option="--from")
+    to_us = None if to is None else time_us(to, option="--to")
+    if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
     from busplan.analysis.schedule import schedule, zoom
     from busplan.profile.shipped import load
@@ -128,12 +129,8 @@ def timeline_command(
     if asked_us is not None:
         plan = override(plan, {"cycle.period_us": asked_us[0]})
     one = None if transaction is None else _transaction(transaction, nodes=plan.bus.nodes)
-    shown = zoom(schedule(plan, model=timing), from_us=window_us[0], to_us=window_us[1], transaction=one)
+    shown = zoom(schedule(plan, model=timing), from_us=from_us, to_us=to_us, transaction=one)
     _write(shown, chosen, output)
-
-
-def _named(from_: str | None, to: str | None) -> tuple[tuple[str, str | None], ...]:
-    return ("from", from_), ("to", to)
 
 
 def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineFormat:

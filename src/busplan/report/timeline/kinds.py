@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from busplan.analysis.schedule import Event, EventKind
+from busplan.timing import TransactionKind
 
 
 class KindStyle(NamedTuple):
@@ -36,6 +37,32 @@ KINDS: Final[Mapping[EventKind, KindStyle]] = MappingProxyType(
     }
 )
 """Every kind of event, in the order of the protocol."""
+
+
+class StripStyle(NamedTuple):
+    """How a stretch of the cycle is shown in the strip of the whole slice."""
+
+    label: str
+    mark: str
+    light: str
+    dark: str
+
+
+def _alike(kind: EventKind) -> StripStyle:
+    style = KINDS[kind]
+    return StripStyle(style.label, style.mark, style.light, style.dark)
+
+
+STRIP: Final[Mapping[EventKind | TransactionKind, StripStyle]] = MappingProxyType(
+    {
+        "sync": _alike("sync"),
+        "read": StripStyle("reads", "R", "#4668a8", "#7c9fe0"),
+        "write": StripStyle("writes", "W", "#2a9d8f", "#5cc9bb"),
+        "nonperiodic": _alike("nonperiodic"),
+        "idle": _alike("idle"),
+    }
+)
+"""What the strip is made of: whole transactions, and what belongs to no node."""
 
 
 def event_label(event: Event) -> str:

@@ -6,7 +6,9 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.schedule import Event, EventKind, Schedule
 from busplan.report.lines import plural, us
+from busplan.report.timeline.kinds import event_label, event_title
 from busplan.report.words import period, story
+from busplan.timing import TransactionKind
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events are drawn in a row each; more of them in a row for each node. One node's whole cycle is 20."""
@@ -29,9 +31,7 @@ class Tick(NamedTuple):
 class Stretch(NamedTuple):
     """Neighbouring events that belong together at a coarse look: one transaction of a cycle, or one bus event."""
 
-    label: str
-    kind: EventKind
-    """Its only kind; for a transaction, execution."""
+    kind: EventKind | TransactionKind
     event: Event
     """From its start to its end."""
 
@@ -88,6 +88,19 @@ def node_lanes(plan: Schedule) -> tuple[Lane, ...]:
     return tuple(Lane(label, tuple(lanes[label])) for label in order)
 
 
+def only_owner(plan: Schedule) -> str | None:
+    """Name the transaction that all events of the window belong to, if there is one."""
+    owners = {(event.transaction, event.node) for event in plan.events}
+    ((kind, node), *others) = owners
+    return None if others or node is None else f"{kind} of node {node}"
+
+
+def event_lanes(plan: Schedule) -> tuple[Lane, ...]:
+    """A lane for each event; whose it is, is said where it is not the same for all."""
+    write = event_title if only_owner(plan) is None else event_label
+    return tuple(Lane(write(event), (event,)) for event in plan.events)
+
+
 def stretches(events: Sequence[Event]) -> tuple[Stretch, ...]:
     """Put the events of each transaction together."""
     found: list[Stretch] = []
@@ -98,8 +111,7 @@ def stretches(events: Sequence[Event]) -> tuple[Stretch, ...]:
             found[-1] = found[-1]._replace(event=whole)
             continue
         owner = (event.node, event.transaction)
-        label = event.kind if event.node is None else f"{event.transaction}"
-        found.append(Stretch(label, event.kind if event.node is None else "execution", event))
+        found.append(Stretch(event.transaction or event.kind, event))
     return tuple(found)
 
 
@@ -111,7 +123,7 @@ def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
     from_us, to_us
         The window [us].
     most
-        Most marks, 2 or more.
+        Most marks, 1 or more.
 
     Examples
     --------
@@ -120,13 +132,11 @@ def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
     >>> [tick.label for tick in ticks(0.0, 0.3, most=4)]
     ['0.0', '0.1', '0.2', '0.3']
     """
-    smallest_us = (to_us - from_us) / (most - 1)
+    # A step that is longer than this meets the window no more often than `most`, wherever the window begins.
+    smallest_us = (to_us - from_us) / most * (1 + 1e-6)
     magnitude = floor(log10(smallest_us))
     factor, power = next(
-        (one, magnitude + add)
-        for add in (0, 1)
-        for one in (1, 2, 5)
-        if one * 10.0 ** (magnitude + add) >= smallest_us * (1 - 1e-9)
+        (one, magnitude + add) for add in (0, 1) for one in (1, 2, 5) if one * 10.0 ** (magnitude + add) > smallest_us
     )
     step_us = factor * 10.0**power
     first, last = ceil(from_us / step_us - 1e-9), floor(to_us / step_us + 1e-9)

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.schedule import Event, Schedule
-from busplan.report.timeline.kinds import event_label
-from busplan.report.timeline.lanes import Stretch, headline, stretches
+from busplan.report.timeline.kinds import STRIP, event_label
+from busplan.report.timeline.lanes import Stretch, headline, overruns, stretches
 
 MOST_EVENTS: Final = 40
 """Mermaid gives each task a row: up to this many events are shown each, more of them transaction by transaction."""
@@ -53,37 +53,38 @@ def escaped(text: str) -> str:
 
 def _body(plan: Schedule) -> Iterator[str]:
     events = plan.events
+    single = len(events) <= MOST_EVENTS
     parts = (
-        [Stretch(event_label(event), event.kind, event) for event in events]
-        if len(events) <= MOST_EVENTS
-        else stretches(events)
+        [(event_label(event), event) for event in events]
+        if single
+        else [(_stretch_label(one), one.event) for one in stretches(events)]
     )
     section = ""
-    for part in parts:
-        name = _section(part.event, by_transaction=len(events) <= MOST_EVENTS)
+    for label, event in parts:
+        name = _section(event, by_transaction=single)
         if name != section:
             yield f"    section {name}"
             section = name
-        yield f"    {_name(part)} :{_tag(part, plan)}{_ns(part.event.start_us)}, {_ns(part.event.end_us)}"
+        tag = _tag(event, plan) if single or event.node is None else _over_tag(event, plan)
+        yield f"    {label}, {event.duration_us:.3f} us :{tag}{_ns(event.start_us)}, {_ns(event.end_us)}"
 
 
 def _section(event: Event, *, by_transaction: bool) -> str:
     if event.node is None:
-        return "bus"
+        return "start of the cycle" if event.kind == "sync" else "end of the cycle"
     return f"{event.transaction} of node {event.node}" if by_transaction else f"{event.transaction}s"
 
 
-def _name(part: Stretch) -> str:
-    """Nothing here is the user's."""
-    by_node = part.label in ("read", "write")
-    label = f"node {part.event.node}" if by_node else part.label.replace("_", " ")
-    return f"{label}, {part.event.duration_us:.3f} us"
+def _stretch_label(one: Stretch) -> str:
+    return STRIP[one.kind].label if one.event.node is None else f"node {one.event.node}"
 
 
-def _tag(part: Stretch, plan: Schedule) -> str:
-    if "time" in plan.figures.exceeded and part.event.end_us > plan.figures.available_us:
-        return "crit, "
-    return "" if part.label in ("read", "write") else _TAGS.get(part.kind, "")
+def _tag(event: Event, plan: Schedule) -> str:
+    return _over_tag(event, plan) or _TAGS.get(event.kind, "")
+
+
+def _over_tag(event: Event, plan: Schedule) -> str:
+    return "crit, " if overruns(plan) and event.end_us > plan.figures.available_us else ""
 
 
 def _ns(time_us: float) -> int:

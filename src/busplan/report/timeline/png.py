@@ -11,11 +11,12 @@ from matplotlib.patches import Patch
 
 from busplan.analysis.schedule import Event, Schedule, totals
 from busplan.report.lines import us
-from busplan.report.timeline.kinds import KINDS, event_title
+from busplan.report.timeline.kinds import KINDS, STRIP
 from busplan.report.timeline.lanes import (
     Lane,
     beyond,
     drawn_window,
+    event_lanes,
     has_event_lanes,
     headline,
     node_lanes,
@@ -25,7 +26,6 @@ from busplan.report.timeline.lanes import (
     subject,
 )
 
-_STRIP_COLOURS: Final = {"read": "#4668a8", "write": "#b06a2f"}
 _OVER: Final = "#b3261e"
 _TITLE_CHARACTERS: Final = 110
 _LANE_INCHES: Final = 0.28
@@ -69,27 +69,34 @@ def timeline_png(plan: Schedule) -> bytes:
 def _lanes(window: Schedule) -> tuple[Lane, ...]:
     if not has_event_lanes(window):
         return node_lanes(window)
-    return tuple(Lane(f"{event_title(event)}, {us(event.duration_us)} us", (event,)) for event in window.events)
+    return tuple(
+        lane._replace(label=f"{lane.label}, {us(lane.events[0].duration_us)} us") for lane in event_lanes(window)
+    )
 
 
 def _bar(axes: Any, event: Event, *, lane: float, colour: str, height: float = 0.8) -> None:
-    axes.broken_barh([(event.start_us, event.duration_us)], (lane - height / 2, height), facecolors=colour)
+    # Not moved to whole pixels: bars of a few pixels keep their share.
+    span = (event.start_us, event.duration_us)
+    axes.broken_barh([span], (lane - height / 2, height), facecolors=colour, linewidth=0, snap=False)
 
 
 def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
     """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
     parts = stretches(plan.cycle_events)
     for one in parts:
-        _bar(axes, one.event, lane=0.0, colour=_STRIP_COLOURS.get(one.label, KINDS[one.kind].light))
+        _bar(axes, one.event, lane=0.0, colour=STRIP[one.kind].light)
     if window.from_us > 0 or window.to_us < plan.end_us:
         axes.axvspan(window.from_us, window.to_us, fill=False, linewidth=1.5)
     if overruns(plan):
         _over(axes, plan)
     axes.set_xlim(0.0, plan.end_us)
     axes.set_yticks([])
-    handles = [Patch(color=colour, label=f"{label}s") for label, colour in _STRIP_COLOURS.items()]
-    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8, frameon=False)
-    axes.set_title(f"{strip_title(plan)}, us", fontsize=9, loc="left")
+    kinds = dict.fromkeys(one.kind for one in parts)
+    handles = [Patch(color=STRIP[kind].light, label=STRIP[kind].label) for kind in kinds]
+    axes.legend(
+        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles), fontsize=8, frameon=False
+    )
+    axes.set_title(strip_title(plan), fontsize=9, loc="left")
 
 
 def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
@@ -110,7 +117,7 @@ def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
 def _over(axes: Any, plan: Schedule) -> None:
     """Show where the slice ends, and what lies beyond."""
     part = beyond(plan)
-    axes.axvspan(part.start_us, part.end_us, color=_OVER, alpha=0.16)
+    axes.axvspan(part.start_us, part.end_us, color=_OVER, alpha=0.16, linewidth=0, zorder=0)
     axes.axvline(part.start_us, color=_OVER, linewidth=1.5)
 
 

@@ -7,13 +7,16 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from busplan.analysis.schedule import Event, Schedule, totals
 from busplan.report.lines import us
-from busplan.report.timeline.kinds import KINDS, event_title
+from busplan.report.timeline.kinds import KINDS, STRIP, event_title
 from busplan.report.timeline.lanes import (
+    Stretch,
     beyond,
     drawn_window,
+    event_lanes,
     has_event_lanes,
     headline,
     node_lanes,
+    only_owner,
     overruns,
     stretches,
     strip_title,
@@ -27,7 +30,11 @@ _LINE_CHARACTERS: Final = 46
 _LINE: Final = 20
 _BAR: Final = 18
 _GAP: Final = 14
+_PHONE: Final = 335
+"""Width that a phone shows, margins left away."""
 _TICKS: Final = 5
+_SHORT: Final = 6
+"""Characters of a figure that so many marks leave room for on a phone."""
 _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _STYLE: Final = """
@@ -42,8 +49,6 @@ _STYLE: Final = """
 .busplan-timeline .rule{stroke:#c9d0d8;stroke-width:1}
 .busplan-timeline .edge{stroke:#b3261e;stroke-width:2}
 .busplan-timeline .window{fill:none;stroke:#1c2430;stroke-width:2}
-.busplan-timeline .read{fill:#4668a8}
-.busplan-timeline .write{fill:#b06a2f}
 """
 _DARK_STYLE: Final = """
 .busplan-timeline text{fill:#e6ebf1}
@@ -55,8 +60,6 @@ _DARK_STYLE: Final = """
 .busplan-timeline .rule{stroke:#3a4452}
 .busplan-timeline .edge{stroke:#ff8a80}
 .busplan-timeline .window{stroke:#e6ebf1}
-.busplan-timeline .read{fill:#7c9fe0}
-.busplan-timeline .write{fill:#dd9a5f}
 """
 
 
@@ -88,8 +91,12 @@ def timeline_svg(plan: Schedule) -> str:
 
 
 def _style() -> str:
-    light = "".join(f".busplan-timeline .{kind}{{fill:{style.light}}}\n" for kind, style in KINDS.items())
-    dark = "".join(f".busplan-timeline .{kind}{{fill:{style.dark}}}\n" for kind, style in KINDS.items())
+    colours: dict[str, tuple[str, str]] = {kind: (style.light, style.dark) for kind, style in KINDS.items()}
+    colours |= {kind: (style.light, style.dark) for kind, style in STRIP.items()}
+    light, dark = (
+        "".join(f".busplan-timeline .{kind}{{fill:{pair[side]}}}\n" for kind, pair in colours.items())
+        for side in (0, 1)
+    )
     return f"{_STYLE}{light}@media (prefers-color-scheme:dark){{{_DARK_STYLE}{dark}}}\n"
 
 
@@ -137,7 +144,10 @@ class _Scale:
 
     def marks(self, parent: Element, *, top: int, bottom: int) -> int:
         """Draw round times as lines with their figures below; the height below them."""
-        for tick in ticks(self._from_us, self._to_us, most=_TICKS):
+        marks = ticks(self._from_us, self._to_us, most=_TICKS)
+        if max((len(tick.label) for tick in marks), default=0) > _SHORT:
+            marks = ticks(self._from_us, self._to_us, most=_TICKS // 2)
+        for tick in marks:
             at = self.percent(tick.at_us)
             x = f"{at:.5g}%"
             SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(top), "y2": str(bottom + 4), "class": "rule"})
@@ -148,36 +158,45 @@ class _Scale:
 
 def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
     """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
-    y = _words(body, f"{strip_title(plan)}, us", y=y, css="head")
-    x = 0
-    shown = dict.fromkeys(_strip_class(one.label) for one in stretches(plan.cycle_events))
-    for css in shown:
-        SubElement(body, "rect", {"class": css, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
-        label = {"read": "reads", "write": "writes", "nonperiodic": "non-periodic"}.get(css, css)
-        _text(body, label, x=str(x + 15), y=y + 15, css="small")
-        x += 30 + 7 * len(label)
-    y += _LINE + 4
+    parts = stretches(plan.cycle_events)
+    y = _strip_legend(body, parts, y=_words(body, strip_title(plan), y=y, css="head")) + 4
     scale = _Scale(0.0, plan.end_us)
-    for one in stretches(plan.cycle_events):
-        label = one.label if one.event.node is None else f"{one.label} of node {one.event.node}"
-        scale.rect(body, one.event, y=y, height=_BAR, css=_strip_class(one.label), title=_tip(label, one.event))
     if overruns(plan):
         _over(body, plan, scale, y=y - 3, height=_BAR + 6)
+    for one in parts:
+        owner = STRIP[one.kind].label if one.event.node is None else f"{one.kind} of node {one.event.node}"
+        scale.rect(body, one.event, y=y, height=_BAR, css=one.kind, title=_tip(owner, one.event))
+    if overruns(plan):
+        _edge(body, plan, scale, y=y - 3, height=_BAR + 6)
     if window.from_us > 0 or window.to_us < plan.end_us:
         shown_part = plan.cycle_events[0]._replace(start_us=window.from_us, end_us=window.to_us)
         scale.rect(body, shown_part, y=y - 2, height=_BAR + 4, css="window", title=_tip("drawn below", shown_part))
     return scale.marks(body, top=y + _BAR, bottom=y + _BAR)
 
 
-def _strip_class(label: str) -> str:
-    return label
+def _strip_legend(body: Element, parts: Iterable[Stretch], *, y: int) -> int:
+    """The colours of the strip, as many in a line as a phone shows; the height below them."""
+    x = 0
+    for kind in dict.fromkeys(one.kind for one in parts):
+        label = STRIP[kind].label
+        width = 30 + 7 * len(label)
+        if x + width > _PHONE:
+            x, y = 0, y + _LINE
+        SubElement(body, "rect", {"class": kind, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
+        _text(body, label, x=str(x + 15), y=y + 15, css="small")
+        x += width
+    return y + _LINE
 
 
 def _over(parent: Element, plan: Schedule, scale: _Scale, *, y: int, height: int) -> None:
-    """Show where the slice ends, and what lies beyond."""
+    """Shade what lies beyond the slice, behind the bars."""
     part = beyond(plan)
     scale.rect(parent, part, y=y, height=height, css="over", title=_tip("beyond the slice", part))
-    x = f"{scale.percent(part.start_us):.5g}%"
+
+
+def _edge(parent: Element, plan: Schedule, scale: _Scale, *, y: int, height: int) -> None:
+    """Draw the line where the slice ends, before the bars."""
+    x = f"{scale.percent(plan.figures.available_us):.5g}%"
     SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(y), "y2": str(y + height), "class": "edge"})
 
 
@@ -199,30 +218,40 @@ def _node_lanes(body: Element, window: Schedule, *, y: int) -> int:
     area = _inside(body, x_percent=_GUTTER_PERCENT, width_percent=100 - _GUTTER_PERCENT, y=0)
     bottom = y + pitch * len(lanes)
     below = scale.marks(area, top=y, bottom=bottom)
+    over = overruns(window) and window.to_us > window.figures.available_us
     for number, lane in enumerate(lanes):
         top = y + pitch * number
         _text(body, lane.label, x="0", y=top + pitch - 5, css="small")
         SubElement(area, "rect", {"class": "track", "width": "100%", "y": str(top), "height": str(pitch - 3)})
-        _bars(area, lane.events, scale, y=top, height=pitch - 3)
-    if overruns(window) and window.to_us > window.figures.available_us:
+    if over:
         _over(area, window, scale, y=y - 2, height=bottom - y + 2)
+    for number, lane in enumerate(lanes):
+        _bars(area, lane.events, scale, y=y + pitch * number, height=pitch - 3)
+    if over:
+        _edge(area, window, scale, y=y - 2, height=bottom - y + 2)
     return below
 
 
 def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
     """A lane for each event, its name above it."""
-    y = _words(body, f"{us(window.from_us)} to {us(window.to_us)} us, event by event", y=y, css="head")
+    owner = only_owner(window)
+    title = f"{us(window.from_us)} to {us(window.to_us)} us{'' if owner is None else f', {owner}'}"
+    y = _words(body, title, y=y, css="head")
     scale = _Scale(window.from_us, window.to_us)
     pitch = _LINE + _BAR
+    over = overruns(window) and window.to_us > window.figures.available_us
     bottom = y + pitch * len(window.events)
-    below = scale.marks(body, top=y + _LINE, bottom=bottom)
-    for number, event in enumerate(window.events):
+    below = scale.marks(body, top=bottom - 4, bottom=bottom)
+    for number, lane in enumerate(event_lanes(window)):
         top = y + pitch * number
-        _text(body, f"{event_title(event)}, {us(event.duration_us)} us", x="0", y=top + _LINE - 4, css="small")
+        (event,) = lane.events
+        _text(body, f"{lane.label}, {us(event.duration_us)} us", x="0", y=top + _LINE - 4, css="small")
         SubElement(body, "rect", {"class": "track", "width": "100%", "y": str(top + _LINE), "height": str(_BAR - 4)})
+        if over:
+            _over(body, window, scale, y=top + _LINE, height=_BAR - 4)
         _bars(body, (event,), scale, y=top + _LINE, height=_BAR - 4)
-    if overruns(window) and window.to_us > window.figures.available_us:
-        _over(body, window, scale, y=y + _LINE, height=bottom - y - _LINE)
+        if over:
+            _edge(body, window, scale, y=top + _LINE, height=_BAR - 4)
     return below
 
 

@@ -5,14 +5,16 @@ from typing import Final
 
 from busplan.analysis.schedule import Event, Schedule, totals
 from busplan.report.lines import BLANK, Line, table, us
-from busplan.report.timeline.kinds import KINDS, event_label, event_title
+from busplan.report.timeline.kinds import KINDS, STRIP
 from busplan.report.timeline.lanes import (
     Lane,
     beyond,
     drawn_window,
+    event_lanes,
     has_event_lanes,
     headline,
     node_lanes,
+    only_owner,
     overruns,
     stretches,
     strip_title,
@@ -21,21 +23,11 @@ from busplan.report.timeline.lanes import (
 )
 from busplan.report.words import warnings
 
-NARROWEST: Final = 50
+NARROWEST: Final = 60
 """Columns below which a drawing would show nothing."""
 _TICK_COLUMNS: Final = 9
-_STRIP_MARKS: Final = {"read": "R", "write": "W"}
 _OVER: Final = "!"
 _WINDOW: Final = "^"
-_STRIP_LEGEND: Final = {
-    "S": "synchronous packet",
-    "R": "reads",
-    "W": "writes",
-    "N": "non-periodic window",
-    "~": "idle",
-    _OVER: "beyond the slice",
-    _WINDOW: "shown below",
-}
 
 
 def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
@@ -64,19 +56,22 @@ def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
 
 def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
     """The whole slice in one row, transaction by transaction, and what lies beyond it."""
-    rows = {"cycle": [(_STRIP_MARKS.get(one.label, KINDS[one.kind].mark), one.event) for one in stretches(plan.cycle_events)]}
+    parts = stretches(plan.cycle_events)
+    rows = {"cycle": [(STRIP[one.kind].mark, one.event) for one in parts]}
+    legend = list(dict.fromkeys(f"{STRIP[one.kind].mark} {STRIP[one.kind].label}" for one in parts))
     if overruns(plan):
         rows["over"] = [(_OVER, beyond(plan))]
+        legend.append(f"{_OVER} beyond the slice")
     if not plan.is_whole:
         rows["window"] = [(_WINDOW, plan.cycle_events[0]._replace(start_us=plan.from_us, end_us=plan.to_us))]
+        legend.append(f"{_WINDOW} shown below")
     gutter = max(map(len, rows))
     bar = _Bar(0.0, plan.end_us, width - gutter - 3)
     yield Line(f"{strip_title(plan)}, {bar.per_column}", "heading")
-    for label, parts in rows.items():
-        yield Line(f"{label:<{gutter}} |{bar.cells(parts)}|", "bad" if label == "over" else "table")
+    for label, row in rows.items():
+        yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "bad" if label == "over" else "table")
     yield bar.scale(gutter + 2)
-    marks = {mark for parts in rows.values() for mark, _ in parts}
-    yield from _wrapped("Legend: ", [f"{mark} {word}" for mark, word in _STRIP_LEGEND.items() if mark in marks], width=width)
+    yield from _wrapped("Legend: ", legend, width=width)
 
 
 def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
@@ -101,18 +96,14 @@ def _marked(lane: Lane) -> list[tuple[str, Event]]:
 
 def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     """A row for each event, with how long it takes."""
-    events = window.events
-    owners = dict.fromkeys((event.transaction, event.node) for event in events)
-    alone = len(owners) == 1 and events[0].node is not None
-    labels = [(event_label if alone else event_title)(event) for event in events]
-    figures = [us(event.duration_us) for event in events]
-    gutter, digits = max(map(len, labels)), max(map(len, figures))
+    lanes, owner = event_lanes(window), only_owner(window)
+    figures = [us(event.duration_us) for event in window.events]
+    gutter, digits = max(len(lane.label) for lane in lanes), max(map(len, figures))
     bar = _Bar(window.from_us, window.to_us, max(10, width - gutter - digits - 5))
-    whose = f"The {events[0].transaction} of node {events[0].node}" if alone else "Events"
+    whose = "Events" if owner is None else f"The {owner}"
     yield Line(f"{whose}, {us(window.from_us)} to {us(window.to_us)} us, {bar.per_column}", "heading")
-    for event, label, figure in zip(events, labels, figures, strict=True):
-        cells = bar.cells([(KINDS[event.kind].mark, event)])
-        yield Line(f"{label:<{gutter}}  {figure:>{digits}} |{cells}|", "table")
+    for lane, figure in zip(lanes, figures, strict=True):
+        yield Line(f"{lane.label:<{gutter}}  {figure:>{digits}} |{bar.cells(_marked(lane))}|", "table")
     yield bar.scale(gutter + digits + 4)
 
 
@@ -143,10 +134,12 @@ class _Bar:
         """Fill each column with the mark of what takes most of it; nothing that is there is left out of its column."""
         shares: list[dict[str, float]] = [{} for _ in range(self._columns)]
         for mark, event in parts:
+            # What only touches a column by the rounding of floats is not in it.
+            least_us = min(self._column_us, event.duration_us) * 1e-6
             for column in range(self._column(event.start_us), self._column(event.end_us) + 1):
                 start_us = self._from_us + column * self._column_us
                 inside_us = min(event.end_us, start_us + self._column_us) - max(event.start_us, start_us)
-                if inside_us > self._column_us * 1e-6:
+                if inside_us > least_us:
                     shares[column][mark] = shares[column].get(mark, 0.0) + inside_us
         return "".join(max(share, key=lambda mark: share[mark]) if share else " " for share in shares)
 
@@ -155,6 +148,8 @@ class _Bar:
         text = " " * self._columns
         for tick in ticks(self._from_us, self._to_us, most=max(2, self._columns // _TICK_COLUMNS)):
             at = self._column(tick.at_us)
+            if text[max(0, at - 1) :].strip():
+                continue
             text = f"{text[:at]}{tick.label}{text[at + len(tick.label) :]}"
         return Line(f"{'us':<{indent}}{text.rstrip()}", "table")
 
@@ -189,5 +184,3 @@ def _wrapped(head: str, words: Sequence[str], *, width: int) -> Iterator[Line]:
             line = " " * len(head)
         line += piece
     yield Line(line.rstrip(), "table")
-
-
