@@ -117,9 +117,11 @@ def test_no_rounding_builds_up_over_many_events(make: Maker, nodes: int) -> None
 
 def test_a_slice_that_is_filled_exactly_has_nothing_left(make: Maker) -> None:
     needed_us = figures(make(), model="standard").required_us
-    plan = schedule(make(cycle__period_us=needed_us * 2))
-    assert plan.figures.fits
-    assert plan.events[-1].kind == "arbitration_reset_gap"
+    for rounding in (-5e-13, 0.0, 5e-13):
+        plan = schedule(make(cycle__period_us=needed_us * 2 * (1 + rounding)))
+        assert plan.figures.fits
+        assert plan.cycle_events[-1].kind == "arbitration_reset_gap"
+    assert schedule(make(cycle__period_us=needed_us * 2 * (1 + 5e-12))).events[-1].kind == "idle"
 
 
 def test_what_takes_no_time_is_no_event(make: Maker) -> None:

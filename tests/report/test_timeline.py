@@ -81,6 +81,11 @@ def test_a_drawing_is_to_scale() -> None:
         assert lane.count("=") == pytest.approx(execution_us / column_us, abs=2.01)
 
 
+def test_a_column_shows_what_takes_most_of_it() -> None:
+    # 2.9 us a column: arbitration takes 2.4 us of the first, and execution most of the second behind 1.5 us of others.
+    assert row(drawn(plan()), "node 1").split() == ["a=============a.::", "aa============a.:::"]
+
+
 def test_an_overrun_is_said_and_seen() -> None:
     one = plan(cycle__period_us=300.0)
     lines = drawn(one)
