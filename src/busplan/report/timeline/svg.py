@@ -23,9 +23,10 @@ from busplan.report.timeline.lanes import (
     subject,
     ticks,
 )
+from busplan.report.timeline.svg_style import stylesheet
 
 _NAMESPACE: Final = "http://www.w3.org/2000/svg"
-_LINE_CHARACTERS: Final = 46
+_LINE_CHARACTERS: Final = 44
 """Characters of a line of words: what a phone shows at this size."""
 _LINE: Final = 20
 _BAR: Final = 18
@@ -37,30 +38,6 @@ _SHORT: Final = 6
 """Characters of a figure that so many marks leave room for on a phone."""
 _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
-_STYLE: Final = """
-.busplan-timeline{font:13px system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
-.busplan-timeline text{fill:#1c2430}
-.busplan-timeline .paper{fill:#ffffff}
-.busplan-timeline .head{font-weight:600}
-.busplan-timeline .small{font-size:12px;fill:#526071}
-.busplan-timeline .bad{fill:#b3261e}
-.busplan-timeline .over{fill:#b3261e;fill-opacity:.16}
-.busplan-timeline .track{fill:#f4f6f8}
-.busplan-timeline .rule{stroke:#c9d0d8;stroke-width:1}
-.busplan-timeline .edge{stroke:#b3261e;stroke-width:2}
-.busplan-timeline .window{fill:none;stroke:#1c2430;stroke-width:2}
-"""
-_DARK_STYLE: Final = """
-.busplan-timeline text{fill:#e6ebf1}
-.busplan-timeline .paper{fill:#12161c}
-.busplan-timeline .small{fill:#a3b0bf}
-.busplan-timeline .bad{fill:#ff8a80}
-.busplan-timeline .over{fill:#ff8a80;fill-opacity:.22}
-.busplan-timeline .track{fill:#1a2029}
-.busplan-timeline .rule{stroke:#3a4452}
-.busplan-timeline .edge{stroke:#ff8a80}
-.busplan-timeline .window{stroke:#e6ebf1}
-"""
 
 
 def timeline_svg(plan: Schedule) -> str:
@@ -76,7 +53,7 @@ def timeline_svg(plan: Schedule) -> str:
     root = Element("svg", {"xmlns": _NAMESPACE, "class": "busplan-timeline", "width": "100%", "role": "img"})
     SubElement(root, "title").text = headline(plan)
     SubElement(root, "desc").text = subject(plan)
-    SubElement(root, "style").text = _style()
+    SubElement(root, "style").text = stylesheet()
     SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
     body = _inside(root, x_percent=2.5, width_percent=95.0, y=0)
     window = drawn_window(plan)
@@ -88,16 +65,6 @@ def timeline_svg(plan: Schedule) -> str:
     root.set("height", str(height + _GAP))
     indent(root)
     return tostring(root, encoding="unicode") + "\n"
-
-
-def _style() -> str:
-    colours: dict[str, tuple[str, str]] = {kind: (style.light, style.dark) for kind, style in KINDS.items()}
-    colours |= {kind: (style.light, style.dark) for kind, style in STRIP.items()}
-    light, dark = (
-        "".join(f".busplan-timeline .{kind}{{fill:{pair[side]}}}\n" for kind, pair in colours.items())
-        for side in (0, 1)
-    )
-    return f"{_STYLE}{light}@media (prefers-color-scheme:dark){{{_DARK_STYLE}{dark}}}\n"
 
 
 def _inside(parent: Element, *, x_percent: float, width_percent: float, y: int) -> Element:
