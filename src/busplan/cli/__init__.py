@@ -10,7 +10,20 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
-from busplan.cli import calibrate, capacity, check, circle_test, init, latency, paper, plan, profiles, rule, schema
+from busplan.cli import (
+    calibrate,
+    capacity,
+    check,
+    circle_test,
+    init,
+    latency,
+    paper,
+    plan,
+    profiles,
+    rule,
+    schema,
+    timeline,
+)
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
 from busplan.errors import BusplanError
 
@@ -28,6 +41,7 @@ app.command("capacity")(capacity.capacity_command)
 app.command("circle-test")(circle_test.circle_test_command)
 app.command("calibrate")(calibrate.calibrate_command)
 app.command("plan")(plan.plan_command)
+app.command("timeline")(timeline.timeline_command)
 app.command("check")(check.check_command)
 app.command("rule")(rule.rule_command)
 app.command("schema")(schema.schema_command)

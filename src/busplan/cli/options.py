@@ -102,14 +102,25 @@ def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | Non
 
     found = []
     for text in texts:
-        match = _TIME.fullmatch(text.strip())
-        if match is None:
-            raise BusplanError(f"--period {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
-        # Decimal keeps 0.0003 s the float nearest to 300 us.
-        period_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+        period_us = time_us(text, option="--period")
         override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": f"--period {text}, in us"})
         found.append(period_us)
     return found
+
+
+def time_us(text: str, *, option: str) -> float:
+    """Read a time with its unit, as 4ms, 250us or 0.001s [us].
+
+    Raises
+    ------
+    BusplanError
+        No number, or no unit.
+    """
+    match = _TIME.fullmatch(text.strip())
+    if match is None:
+        raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
+    # Decimal keeps 0.0003 s the float nearest to 300 us.
+    return float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
 
 
 def parse_sizes(text: str, *, option: str) -> list[int]:
