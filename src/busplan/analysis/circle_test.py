@@ -115,6 +115,7 @@ def circle_test(
     *,
     periods_us: Sequence[float] | None = None,
     with_contributions: bool = False,
+    explain: bool = True,
     progress: Progress | None = None,
 ) -> CircleTest:
     """Run the circle test of a profile.
@@ -127,6 +128,8 @@ def circle_test(
         Communication periods T_s [us]; without them the profile's own.
     with_contributions
         Run again without each error source in turn; a contour tolerance that fails asks for it by itself.
+    explain
+        Whether it does; a search for what passes has no use for reasons.
     progress
         Called now and then with the steps simulated so far and those known to be needed.
 
@@ -155,7 +158,7 @@ def circle_test(
     for variant, one in zip(variants, setups, strict=True):
         counter.expect(one, runs=1 + (len(sources(one)) if with_contributions else 0), wanted=bus(variant).fits)
     pairs = [
-        _test(variant, one, with_contributions=with_contributions, counter=counter)
+        _test(variant, one, with_contributions=with_contributions, explain=explain, counter=counter)
         for variant, one in zip(variants, setups, strict=True)
     ]
     return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
@@ -232,7 +235,7 @@ class _Counter:
 
 
 def _test(
-    profile: Profile, one: Setup, *, with_contributions: bool, counter: _Counter
+    profile: Profile, one: Setup, *, with_contributions: bool, explain: bool, counter: _Counter
 ) -> tuple[CircleFigures, CircleRun | None]:
     capacity = bus(profile)
     if not capacity.fits:
@@ -240,7 +243,7 @@ def _test(
     run = counter.run(one)
     result = _figures(profile, one, capacity, run)
     explained = {"mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm"}
-    if with_contributions or explained & {failure.name for failure in result.failures}:
+    if with_contributions or (explain and explained & {failure.name for failure in result.failures}):
         if not with_contributions:
             counter.expect(one, runs=len(sources(one)), wanted=True)
         ranked = contributions(one, run.contour.max_contour_error_mm, simulate=counter.run)
