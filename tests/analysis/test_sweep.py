@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from busplan.analysis.capacity import CapacityFigures, cycle, figures
 from busplan.analysis.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
-from busplan.analysis.sweep import Block, sweep
+from busplan.analysis.sweep import sweep
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
@@ -44,13 +44,6 @@ COUNTS: dict[str, st.SearchStrategy[Any]] = {
 }
 
 
-def value(block: Block, model: int, name: str, index: int) -> Any:
-    """One figure of one point, as `capacity` would give it."""
-    column = block.column(name)[model]
-    found = np.broadcast_to(column.values, block.chunk.shape).ravel()[index]
-    return column.words[int(found)] if column.words else found.item()
-
-
 def assert_rows_are_those_of_capacity(profile: Profile, grid: Grid, *, chunk_points: int) -> None:
     points = 0
     for block in sweep(profile, grid, timing_models=BOTH, chunk_points=chunk_points):
@@ -60,11 +53,12 @@ def assert_rows_are_those_of_capacity(profile: Profile, grid: Grid, *, chunk_poi
             variant = override(profile, block.chunk.point(index))
             for number, model in enumerate(BOTH):
                 expected = figures(variant, model=model)
-                for name in CapacityFigures._fields:
-                    found, wanted = value(block, number, name, index), getattr(expected, name)
-                    wanted = list(wanted) if name == "exceeded" else wanted
-                    # Bit for bit: they are the same operations in the same order.
-                    assert (name, found) == (name, wanted)
+                row = block.row(len(BOTH) * index + number, CapacityFigures._fields)
+                # Bit for bit: they are the same operations in the same order. As text, so that 4 is not 4.0.
+                assert {name: repr(found) for name, found in row.items()} == {
+                    name: repr(list(wanted) if name == "exceeded" else wanted)
+                    for name, wanted in expected._asdict().items()
+                }
     assert points == grid.points
 
 
@@ -95,7 +89,13 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
     profile = data.draw(any_profile)
     ratio = profile.cycle.slice_ratio
     exact_us = cycle(profile, model=model, nodes=nodes).required_us / ratio
-    around = (exact_us, exact_us * (1 + 1e-12), exact_us * (1 - 1e-12), exact_us * (1 - 3e-12), np.nextafter(exact_us, 0))
+    around = (
+        exact_us,
+        exact_us * (1 + 1e-12),
+        exact_us * (1 - 1e-12),
+        exact_us * (1 - 3e-12),
+        np.nextafter(exact_us, 0),
+    )
     axes: dict[str, Values] = {
         "cycle.period_us": Listed(tuple(dict.fromkeys(float(one) for one in around))),
         "bus.nodes": Listed((nodes, nodes + 1)),
@@ -145,7 +145,10 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
         ({"bus.gap_count": Steps(0, 1, 1, 200)}, "bus.gap_count 199: expected a whole number from 0 to 63"),
         ({"payload.read_bytes": Steps(4, 1, 1, 5000)}, "payload.read_bytes 5003: is outside the execution table"),
         ({"bus.speed": Listed((1,))}, "bus.speed 1: expected"),
-        ({"limits.min_spare_nodes": Listed((1,))}, "--vary limits.min_spare_nodes: no figure of capacity depends on it"),
+        (
+            {"limits.min_spare_nodes": Listed((1,))},
+            "--vary limits.min_spare_nodes: no figure of capacity depends on it",
+        ),
         ({"servo.drive_lag_us": Listed((1,))}, "add --circle to run circle tests"),
         (
             {"bus.gap_count": Listed((63, "optimal")), "bus.cable_length_m": Listed((4.5, 6.0))},

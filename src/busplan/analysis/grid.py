@@ -52,8 +52,10 @@ class Listed(NamedTuple):
 
     def part(self, start: int, stop: int) -> Array:
         """Values from one index to before another."""
-        few = self.values[start:stop]
-        return np.array(few, dtype=object if any(isinstance(one, str) for one in few) else None)
+        kinds = {type(one) for one in self.values}
+        # One type for all parts of the axis.
+        common = object if str in kinds else float if float in kinds else np.int64
+        return np.array(self.values[start:stop], dtype=common)
 
 
 class Steps(NamedTuple):

@@ -33,6 +33,8 @@ CHUNK_POINTS: Final = 1 << 14
 
 FIGURES: Final = CapacityFigures._fields
 """Columns of a sweep behind the varied keys; `timing_model` is the first."""
+WORD_FIGURES: Final = ("timing_model", "binding_term", "limited_by", "exceeded")
+"""Those in words."""
 _TYPES: Final = get_type_hints(CapacityFigures)
 _TERMS: Final[tuple[Term, ...]] = get_args(Term)
 _LIMITS: Final[tuple[Limit, ...]] = ("payload", "nodes", "hops", "time")
@@ -61,13 +63,23 @@ class Block(NamedTuple):
     models: tuple[dict[str, Column], ...]
     """Figures by name, a set for each timing model."""
 
-    def column(self, name: str) -> list[Column]:
+    def columns(self, name: str) -> list[Column]:
         """One column under each timing model."""
         return [(self.varied if name in self.varied else figures)[name] for figures in self.models]
 
+    def row(self, index: int, names: Sequence[str]) -> dict[str, Any]:
+        """One row: a point under one timing model, by its place among `rows`."""
+        point, model = divmod(index, len(self.models))
+        where = np.unravel_index(point, self.chunk.shape)
+        return {name: self._value(self.columns(name)[model], where) for name in names}
+
+    def _value(self, column: Column, where: tuple[Any, ...]) -> Any:
+        found = np.broadcast_to(column.values, self.chunk.shape)[where].item()
+        return found if column.words is None else column.words[found]
+
     def rows(self, name: str) -> Array:
         """One column as plain values: a point after the other, a timing model after the other within each."""
-        parts = [np.broadcast_to(one.values, self.chunk.shape).ravel() for one in self.column(name)]
+        parts = [np.broadcast_to(one.values, self.chunk.shape).ravel() for one in self.columns(name)]
         return np.stack(parts, axis=1).ravel()
 
 
@@ -188,8 +200,8 @@ def _columns(where: Profile, values: Mapping[str, Array], model: TimingModelName
 
 
 def _typed(name: str, number: Any) -> Array:
-    """Counts as whole numbers, whatever they were computed in."""
-    return np.asarray(number, dtype=np.int64 if _TYPES[name] is int else None)
+    """Counts as whole numbers and all else as `capacity` has it, whatever it was computed in."""
+    return np.asarray(number, dtype=_TYPES[name])
 
 
 def _with_axes(values: Any, axes: int) -> Array:

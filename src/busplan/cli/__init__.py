@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
-from busplan.cli import capacity, check, circle_test, init, latency, paper, profiles, rule, schema
+from busplan.cli import capacity, check, circle_test, init, latency, paper, profiles, rule, schema, sweep
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
 from busplan.errors import BusplanError
 
@@ -25,6 +25,7 @@ app = typer.Typer(
 app.command("latency")(latency.latency_command)
 app.command("capacity")(capacity.capacity_command)
 app.command("circle-test")(circle_test.circle_test_command)
+app.command("sweep")(sweep.sweep_command)
 app.command("check")(check.check_command)
 app.command("rule")(rule.rule_command)
 app.command("schema")(schema.schema_command)
