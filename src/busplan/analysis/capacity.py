@@ -371,7 +371,8 @@ class RequiredByNodes(NamedTuple):
         spare_us = available_us - self.c0_us
         spare_us = spare_us * (spare_us > 0)
         # The form without cancellation: c2 may be zero, c1 is not. The power is an operator, and a root for arrays too.
-        return 2 * spare_us / (self.c1_us + (self.c1_us * self.c1_us + 4 * self.c2_us * spare_us) ** 0.5)
+        root: float = (self.c1_us * self.c1_us + 4 * self.c2_us * spare_us) ** 0.5
+        return 2 * spare_us / (self.c1_us + root)
 
 
 def required_by_nodes(profile: Profile, *, model: TimingModelName) -> RequiredByNodes:

@@ -52,10 +52,14 @@ class Listed(NamedTuple):
 
     def part(self, start: int, stop: int) -> Array:
         """Values from one index to before another."""
-        kinds = {type(one) for one in self.values}
         # One type for all parts of the axis.
-        common = object if str in kinds else float if float in kinds else np.int64
+        common = object if self.has_words else float if any(isinstance(one, float) for one in self.values) else np.int64
         return np.array(self.values[start:stop], dtype=common)
+
+    @property
+    def has_words(self) -> bool:
+        """Whether a value is no number."""
+        return any(isinstance(one, str) for one in self.values)
 
 
 class Steps(NamedTuple):
@@ -65,6 +69,7 @@ class Steps(NamedTuple):
     step: int
     scale: int
     size: int
+    has_words: bool = False
 
     def part(self, start: int, stop: int) -> Array:
         """Values from one index to before another."""
@@ -78,6 +83,7 @@ class Even(NamedTuple):
     first: float
     last: float
     size: int
+    has_words: bool = False
 
     def part(self, start: int, stop: int) -> Array:
         """Values from one index to before another."""

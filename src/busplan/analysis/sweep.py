@@ -189,7 +189,7 @@ def _columns(where: Profile, values: Mapping[str, Array], model: TimingModelName
     exceeded: Any = sum(flag * np.uint8(1 << bit) for bit, flag in enumerate(flags))
     numbers |= {"max_nodes": max_nodes, "max_axes": where.node.axes * max_nodes, "fits": np.equal(exceeded, 0)}
     words = {
-        "timing_model": Column(np.uint8(0), (model,)),
+        "timing_model": Column(np.zeros((), np.uint8), (model,)),
         "binding_term": Column(_largest(list(now.terms_us().values())), _TERMS),
         "limited_by": Column(limited_by, _LIMITS),
         "exceeded": Column(exceeded, _EXCEEDED),
@@ -211,7 +211,8 @@ def _with_axes(values: Any, axes: int) -> Array:
 
 def _largest(terms: list[Any]) -> Any:
     """Place of the largest of some terms, the first of equals."""
-    best, place = terms[0], np.uint8(0)
+    best: Any = terms[0]
+    place: Any = np.uint8(0)
     for index, term in enumerate(terms[1:], start=1):
         place = np.where(np.greater(term, best), np.uint8(index), place)
         best = np.maximum(term, best)

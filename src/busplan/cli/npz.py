@@ -59,7 +59,7 @@ class NpzColumns:
             if words[0] is not None:
                 values = self._places(name, values, words, models=len(block.models))
             self._types.setdefault(name, values.dtype)
-            self._files[name].write(memoryview(np.ascontiguousarray(values)).cast("B"))
+            self._files[name].write(np.ascontiguousarray(values).data)
         self._rows += block.chunk.points * len(block.models)
 
     def _places(self, name: str, values: Any, words: Sequence[Any], *, models: int) -> Any:

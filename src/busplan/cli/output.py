@@ -111,7 +111,8 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
     """Open a file that appears as a whole or not at all: a temporary one beside it, which takes its name at the end.
 
     It is opened at once, so that a path that cannot be written is refused before the work for it is done. What fails
-    inside leaves the old file as it was. With `keeps_partial`, what a `StoppedError` leaves behind takes the partial name.
+    inside leaves the old file as it was. With `keeps_partial`, what a `StoppedError` leaves
+    behind takes the partial name.
 
     Raises
     ------

@@ -174,7 +174,8 @@ def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool)
     """Refuse a column that is not there or not in numbers, where only a number will do."""
     from busplan.analysis.sweep import WORD_FIGURES
 
-    numbers = [name for name in _known(grid, circle=circle) if name not in WORD_FIGURES]
+    words = {*WORD_FIGURES, *(key for key, axis in grid.axes.items() if axis.has_words)}
+    numbers = [name for name in _known(grid, circle=circle) if name not in words]
     for option, name in asked.items():
         if name is not None and name not in numbers:
             raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")

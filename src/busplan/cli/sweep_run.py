@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from busplan.analysis.grid import Grid
     from busplan.analysis.sweep import Block
     from busplan.analysis.sweep_circle import CircleTask, Figures
+    from busplan.cli.npz import NpzColumns
     from busplan.profile.model import Profile
     from busplan.report.sweep.figure import FigureData
+    from busplan.report.sweep.top import Tally
     from busplan.timing import TimingModelName
 
 SweepFormat = Literal["table", "csv", "jsonl", "npz"]

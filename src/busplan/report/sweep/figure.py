@@ -112,6 +112,6 @@ class FigureData:
     def _places(self, key: str) -> tuple[Any, list[str] | None]:
         """Where a key's values lie along its axis, and what they are called where that is not by their number."""
         values = self._grid.axes[key].part(0, self._grid.axes[key].size)
-        if values.dtype == object:
+        if values.dtype == object or not (np.diff(values) > 0).all():
             return np.arange(values.size), [str(one) for one in values]
         return values, None

@@ -5,6 +5,7 @@ A value is written once for all the rows that share it: that, and one join a row
 
 import json
 from collections.abc import Callable, Iterable, Sequence
+from math import isnan
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -80,7 +81,7 @@ def _texts(column: Column, style: Style) -> Array:
     """A column's values as text, in the column's own shape."""
     write = _writer(column, style)
     texts = np.empty(column.values.size, dtype=object)
-    texts[:] = [write(value) for value in column.values.ravel().tolist()]
+    texts[:] = list(map(write, column.values.ravel().tolist()))
     return texts.reshape(column.values.shape)
 
 
@@ -92,5 +93,5 @@ def _writer(column: Column, style: Style) -> Callable[[Any], str]:
         return ("false", "true").__getitem__
     if column.values.dtype.kind == "f" and np.isnan(column.values).any():
         missing = "null" if style == "jsonl" else ""
-        return lambda value: missing if value != value else repr(value)  # noqa: PLR0124 - NaN alone differs from itself
+        return lambda value: missing if isnan(value) else repr(value)
     return repr

@@ -1,6 +1,7 @@
 """A sweep for people: how many points fit, and the rows at the top."""
 
 from collections.abc import Sequence
+from math import isnan
 from typing import Any, Final
 
 import numpy as np
@@ -71,7 +72,8 @@ class Tally:
 
 def _share(flags: Any, points: int) -> int:
     """How many points of a block a flag holds for, from its values before they broadcast."""
-    return int(flags.sum()) * (points // flags.size)
+    count = int(flags.sum())
+    return count * (points // int(flags.size))
 
 
 class TopRows:
@@ -125,22 +127,20 @@ class TopRows:
             if len(self._kept) < total
             else f"{plural(total, 'row')}{order}"
         )
-        cells = [[_cell(row[column]) for column in self._columns] for row in self.rows]
+        cells = [[_cell(column, row[column]) for column in self._columns] for row in self.rows]
         return [
             *tally.lines(name, expected=expected),
             Line(f"{shown}."),
             BLANK,
-            *_table(self._columns, cells),
+            *table(self._columns, cells, left=0),
         ]
 
 
-def _table(columns: Sequence[str], cells: Sequence[Sequence[str]]) -> list[Line]:
-    return table(list(columns), cells, left=0)
-
-
-def _cell(value: Any) -> str:
+def _cell(name: str, value: Any) -> str:
     if isinstance(value, bool):
         return yes(value)
     if isinstance(value, float):
-        return "-" if value != value else us(value)  # noqa: PLR0124 - NaN alone differs from itself
+        if isnan(value):
+            return "-"
+        return f"{value:.6f}" if name.endswith("_mm") else us(value)
     return " ".join(value) or "-" if isinstance(value, list) else str(value)
