@@ -5,6 +5,7 @@ G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Cont
 IEEE-1394 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
 
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
 
@@ -177,6 +178,11 @@ GAP_COUNT_BY_HOPS: Final = (
 and, to 15 hops, Linux carry it)."""
 
 
+_GAP_COUNT_STEPS: Final = tuple(
+    (hop, more - less) for hop, (less, more) in enumerate(pairwise((*GAP_COUNT_BY_HOPS, MAX_GAP_COUNT)), start=1)
+)
+
+
 def safe_gap_count(hops: int) -> int:
     """Smallest gap count that is safe for a bus of that many hops.
 
@@ -206,7 +212,33 @@ def safe_gap_count(hops: int) -> int:
     """
     if hops < 1:
         raise ValueError(f"hops must be 1 or more, got {hops}")
-    return GAP_COUNT_BY_HOPS[hops - 1] if hops <= len(GAP_COUNT_BY_HOPS) else MAX_GAP_COUNT
+    return gap_count_by_hops(hops)
+
+
+def gap_count_by_hops(hops: int) -> int:
+    """Look the published gap count up; operators only, nothing is checked.
+
+    Parameters
+    ----------
+    hops
+        Largest number of cable hops between two nodes, 1 or more [1]; integer or integer array.
+
+    Returns
+    -------
+    int
+        Gap count; the shape of the argument.
+
+    References
+    ----------
+    IEEE 1394a table E-1; see `GAP_COUNT_BY_HOPS`.
+
+    Examples
+    --------
+    >>> gap_count_by_hops(3)
+    8
+    """
+    # Each further hop of the table adds its step: a comparison is 0 or 1 for a number and for an array alike.
+    return GAP_COUNT_BY_HOPS[0] + sum((hops > hop) * step for hop, step in _GAP_COUNT_STEPS)
 
 
 def padded_bytes(payload_bytes: int) -> int:

@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from itertools import chain
-from math import floor, sqrt
-from typing import Final, Literal, NamedTuple
+from math import floor
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan import equations
 from busplan.analysis.latency import BOTH_MODELS, phases
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, safe_gap_count
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES, gap_count_by_hops
+from busplan.profile.bus import Ieee1394Bus
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
 from busplan.timing import Phases, TimingModelName
@@ -211,74 +212,113 @@ def cycle(profile: Profile, *, model: TimingModelName, nodes: int, payload_bytes
 
 def figures(profile: Profile, *, model: TimingModelName) -> CapacityFigures:
     """Compute all figures of a profile at its own period under one timing model."""
-    bus, period_us, nodes = profile.bus, profile.cycle.period_us, profile.bus.nodes
-    now = cycle(profile, model=model, nodes=nodes)
-    available_us = profile.cycle.slice_ratio * period_us
-    required_us = now.required_us
+    now = cycle(profile, model=model, nodes=profile.bus.nodes)
+    numbers = numeric_figures(profile, now)
     terms_us = now.terms_us()
-    fits = fits_in(required_us, available_us=available_us)
     max_nodes, limited_by = largest_nodes(profile, model=model)
-    exceeded = broken_limits(profile) + (() if fits else ("time",))
+    fits_time = fits_in(now.required_us, available_us=available_us(profile))
+    exceeded = broken_limits(profile) + (() if fits_time else ("time",))
     return CapacityFigures(
         timing_model=model,
-        period_us=period_us,
-        nodes=nodes,
-        axes=profile.node.axes * nodes,
-        hops=bus.hops(nodes),
-        gap_count=bus.gap_count_for(nodes),
-        safe_gap_count=safe_gap_count(bus.hops(nodes)),
-        gap_count_safe=bus.gap_count_for(nodes) >= safe_gap_count(bus.hops(nodes)),
-        available_us=available_us,
-        required_us=required_us,
-        time_slice_us=equations.time_slice_us(period_us, slice_ratio=profile.cycle.slice_ratio, nodes=nodes),
-        required_time_slice_us=equations.required_time_slice_us(
+        **numbers,
+        binding_term=max(terms_us, key=lambda term: terms_us[term]),
+        max_nodes=max_nodes,
+        max_axes=profile.node.axes * max_nodes,
+        limited_by=limited_by,
+        exceeded=exceeded,
+        fits=not exceeded,
+    )
+
+
+def available_us(profile: Profile) -> float:
+    """Share of the period that is for communication, alpha T_s of (1) [us]."""
+    return profile.cycle.slice_ratio * profile.cycle.period_us
+
+
+def numeric_figures(profile: Profile, now: Cycle) -> dict[str, Any]:
+    """Figures that follow from a cycle by operators alone.
+
+    Parameters
+    ----------
+    profile
+        The network. Its keys may hold arrays that broadcast (see `sweep`), and so may the cycle's.
+    now
+        The cycle of its own number of nodes.
+
+    Returns
+    -------
+    dict
+        By the names of `CapacityFigures`; all but words, `max_nodes`, `max_axes` and `fits`.
+    """
+    bus, period_us, nodes = profile.bus, profile.cycle.period_us, now.nodes
+    hops, gap_count = bus.hops(nodes), bus.gap_count_for(nodes)
+    safe = gap_count_by_hops(hops)
+    given_us, required_us, terms_us = available_us(profile), now.required_us, now.terms_us()
+    spare_us = given_us - required_us
+    fits = fits_in(required_us, available_us=given_us)
+    return {
+        "period_us": period_us,
+        "nodes": nodes,
+        "axes": profile.node.axes * nodes,
+        "hops": hops,
+        "gap_count": gap_count,
+        "safe_gap_count": safe,
+        "gap_count_safe": gap_count >= safe,
+        "available_us": given_us,
+        "required_us": required_us,
+        "time_slice_us": equations.time_slice_us(period_us, slice_ratio=profile.cycle.slice_ratio, nodes=nodes),
+        "required_time_slice_us": equations.required_time_slice_us(
             now.reads_us,
             writes_us=now.writes_us,
             nonperiodic_us=now.nonperiodic_us,
             sync_us=now.sync_us,
             nodes=nodes,
         ),
-        read_latency_us=now.read.latency_us,
-        write_latency_us=now.write.latency_us,
-        gaps_us=now.read.gaps_us,
-        subaction_gap_us=now.read.subaction_gap_us,
-        arbitration_reset_gap_us=now.read.arbitration_reset_gap_us,
-        sync_us=now.sync_us,
-        nonperiodic_us=now.nonperiodic_us,
-        cycle_arbitration_us=terms_us["arbitration"],
-        cycle_data_us=terms_us["data"],
-        cycle_acknowledge_us=terms_us["acknowledge"],
-        cycle_execution_us=terms_us["execution"],
-        cycle_gaps_us=terms_us["gaps"],
-        binding_term=max(terms_us, key=lambda term: terms_us[term]),
-        utilisation=required_us / available_us,
+        "read_latency_us": now.read.latency_us,
+        "write_latency_us": now.write.latency_us,
+        "gaps_us": now.read.gaps_us,
+        "subaction_gap_us": now.read.subaction_gap_us,
+        "arbitration_reset_gap_us": now.read.arbitration_reset_gap_us,
+        "sync_us": now.sync_us,
+        "nonperiodic_us": now.nonperiodic_us,
+        "cycle_arbitration_us": terms_us["arbitration"],
+        "cycle_data_us": terms_us["data"],
+        "cycle_acknowledge_us": terms_us["acknowledge"],
+        "cycle_execution_us": terms_us["execution"],
+        "cycle_gaps_us": terms_us["gaps"],
+        "utilisation": required_us / given_us,
         # What fits by rounding alone has no margin, and no negative one either.
-        margin_us=max(available_us - required_us, 0.0) if fits else available_us - required_us,
-        nodes_eq11=equations.published_nodes(
-            available_us,
+        "margin_us": spare_us - fits * (spare_us < 0) * spare_us,
+        "nodes_eq11": equations.published_nodes(
+            given_us,
             sync_us=now.sync_us,
             latency_us=(now.read.latency_us + now.write.latency_us) / 2,
             gaps_us=now.read.gaps_us,
         ),
-        max_nodes=max_nodes,
-        max_axes=profile.node.axes * max_nodes,
-        limited_by=limited_by,
-        min_period_us=required_us / profile.cycle.slice_ratio,
-        min_slice_ratio=required_us / period_us,
-        exceeded=exceeded,
-        fits=not exceeded,
-    )
+        "min_period_us": required_us / profile.cycle.slice_ratio,
+        "min_slice_ratio": required_us / period_us,
+    }
+
+
+def limits_broken(profile: Profile) -> dict[Limit, bool]:
+    """Whether a profile breaks each of the standard's own limits, whatever the time; arrays broadcast."""
+    bus, payload = profile.bus, profile.payload
+    most_bytes = bus.max_payload_bytes
+    return {
+        "payload": (payload.read_bytes > most_bytes) | (payload.write_bytes > most_bytes),
+        "nodes": bus.nodes > MAX_NODES,
+        "hops": bus.hops(bus.nodes) > MAX_HOPS,
+    }
 
 
 def broken_limits(profile: Profile) -> tuple[Limit, ...]:
     """Tell which of the standard's own limits a profile breaks, whatever the time."""
-    bus, payload = profile.bus, profile.payload
-    broken: dict[Limit, bool] = {
-        "payload": max(payload.read_bytes, payload.write_bytes) > bus.max_payload_bytes,
-        "nodes": bus.nodes > MAX_NODES,
-        "hops": bus.hops(bus.nodes) > MAX_HOPS,
-    }
-    return tuple(limit for limit, is_broken in broken.items() if is_broken)
+    return tuple(limit for limit, is_broken in limits_broken(profile).items() if is_broken)
+
+
+def most_nodes(bus: Ieee1394Bus) -> tuple[int, Limit]:
+    """Nodes that the standard allows on a bus, whatever the time, and the limit that says so."""
+    return (int(min(MAX_NODES, MAX_HOPS)), "hops") if bus.max_hops is None else (int(MAX_NODES), "nodes")
 
 
 def largest_nodes(profile: Profile, *, model: TimingModelName) -> tuple[int, Limit]:
@@ -305,41 +345,53 @@ def largest_nodes(profile: Profile, *, model: TimingModelName) -> tuple[int, Lim
     ----------
     Paper, equations (1)-(11), with (11) solved for N.
     """
-    bus, payload = profile.bus, profile.payload
+    bus = profile.bus
     is_chain = bus.max_hops is None
-    if max(payload.read_bytes, payload.write_bytes) > bus.max_payload_bytes:
+    if limits_broken(profile)["payload"]:
         return 0, "payload"
     if not is_chain and bus.hops(1) > MAX_HOPS:
         return 0, "hops"
-    most = int(min(MAX_NODES, MAX_HOPS) if is_chain else MAX_NODES)
-    available_us = profile.cycle.slice_ratio * profile.cycle.period_us
+    most, structural = most_nodes(bus)
+    given_us = available_us(profile)
 
     def fits(nodes: int) -> bool:
-        required_us = cycle(profile, model=model, nodes=nodes).required_us
-        return fits_in(required_us, available_us=available_us)
+        return fits_in(cycle(profile, model=model, nodes=nodes).required_us, available_us=given_us)
 
     if is_chain and bus.gap_count == "optimal":
         answer = most
     else:
-        answer = min(most, floor(_root(profile, model=model, available_us=available_us)) + 1)
+        answer = min(most, floor(required_by_nodes(profile, model=model).nodes(given_us)) + 1)
     while answer and not fits(answer):
         answer -= 1
-    structural: Limit = "hops" if is_chain else "nodes"
     return answer, structural if answer == most else "time"
 
 
-def _root(profile: Profile, *, model: TimingModelName, available_us: float) -> float:
-    """Largest real N with required(N) <= available, 0 when there is none; for a gap count that is fixed."""
+class RequiredByNodes(NamedTuple):
+    """Required time over the number of nodes, c0 + c1 N + c2 N^2, with a gap count that is fixed."""
+
+    c0_us: float
+    c1_us: float
+    c2_us: float
+
+    def nodes(self, available_us: float) -> float:
+        """Largest real N whose cycle fits, but for rounding; 0 when there is none. Arrays broadcast."""
+        spare_us = available_us - self.c0_us
+        spare_us = spare_us * (spare_us > 0)
+        # The form without cancellation: c2 may be zero, c1 is not. The power is an operator, and a root for arrays too.
+        root: float = (self.c1_us * self.c1_us + 4 * self.c2_us * spare_us) ** 0.5
+        return 2 * spare_us / (self.c1_us + root)
+
+
+def required_by_nodes(profile: Profile, *, model: TimingModelName) -> RequiredByNodes:
+    """Required time as a polynomial of the number of nodes; arrays broadcast."""
     # One and two nodes, and the cycle of none, give the three coefficients through the equations themselves.
     one, two = (cycle(profile, model=model, nodes=nodes) for nodes in (1, 2))
     latencies_one = one.read.latency_with_gaps_us + one.write.latency_with_gaps_us
     latencies_two = two.read.latency_with_gaps_us + two.write.latency_with_gaps_us
     sync_per_node_us = two.sync_us - one.sync_us
     c2 = latencies_two - latencies_one
-    c1 = latencies_one - c2 + sync_per_node_us
-    c0 = one.nonperiodic_us + one.sync_us - sync_per_node_us
-    spare_us = available_us - c0
-    if spare_us < 0:
-        return 0.0
-    # The form without cancellation: c2 may be zero, c1 is not.
-    return 2 * spare_us / (c1 + sqrt(c1 * c1 + 4 * c2 * spare_us))
+    return RequiredByNodes(
+        c0_us=one.nonperiodic_us + one.sync_us - sync_per_node_us,
+        c1_us=latencies_one - c2 + sync_per_node_us,
+        c2_us=c2,
+    )

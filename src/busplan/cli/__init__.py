@@ -22,6 +22,7 @@ from busplan.cli import (
     profiles,
     rule,
     schema,
+    sweep,
     timeline,
 )
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
@@ -42,6 +43,7 @@ app.command("circle-test")(circle_test.circle_test_command)
 app.command("calibrate")(calibrate.calibrate_command)
 app.command("plan")(plan.plan_command)
 app.command("timeline")(timeline.timeline_command)
+app.command("sweep")(sweep.sweep_command)
 app.command("check")(check.check_command)
 app.command("rule")(rule.rule_command)
 app.command("schema")(schema.schema_command)

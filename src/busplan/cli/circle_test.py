@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
-from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us
+from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
 from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
@@ -67,7 +67,7 @@ def circle_test_command(
         raise BusplanError("--every: goes with --trace FILE.csv")
     if every is not None and every < 1:
         raise BusplanError(f"--every {every}: must be 1 or more")
-    plot_format = None if plot is None else _plot_format(plot)
+    file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.circle_test import circle_test
     from busplan.profile.shipped import load
     from busplan.profile.toml import override
@@ -88,26 +88,16 @@ def circle_test_command(
             )
         if trace_file is not None:
             _write_trace(test, trace_file, every=every or 10)
-        if plot_file is not None and plot_format is not None:
+        if plot_file is not None and file_format is not None:
             from busplan.report.plot import circle_figure
 
-            plot_file.write(circle_figure(test, file_format=plot_format))
+            plot_file.write(circle_figure(test, file_format=file_format))
     for path in (trace, plot):
         if path is not None:
             say(f"wrote {path}")
     _emit(test, format_=format_, contributions=contributions)
     if not test.passed:
         raise PlanFailsError
-
-
-def _plot_format(path: Path) -> str:
-    from busplan.report.plot import PLOT_FORMATS, require_matplotlib
-
-    file_format = path.suffix.removeprefix(".").lower()
-    if file_format not in PLOT_FORMATS:
-        raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
-    require_matplotlib()
-    return file_format
 
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from decimal import Decimal
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
@@ -144,3 +145,20 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
 def timing_models(timing: Timing) -> tuple[Literal["paper", "standard"], ...]:
     """Timing models that --timing asks for."""
     return ("paper", "standard") if timing == "both" else (timing,)
+
+
+def plot_format(path: Path) -> str:
+    """File format that a figure's name asks for.
+
+    Raises
+    ------
+    BusplanError
+        Another ending, or nothing to draw with.
+    """
+    from busplan.report.plot import PLOT_FORMATS, require_matplotlib
+
+    file_format = path.suffix.removeprefix(".").lower()
+    if file_format not in PLOT_FORMATS:
+        raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
+    require_matplotlib()
+    return file_format

@@ -30,6 +30,10 @@ class PlanFailsError(Exception):
     """The answer is out, and it is that the plan does not hold: exit with `PLAN_FAILS`."""
 
 
+class StoppedError(KeyboardInterrupt):
+    """Ctrl-C, noted between two steps: what stands in the file so far is whole in itself, and may be kept."""
+
+
 def say(*messages: str) -> None:
     """Write a summary or errors to stderr, a line each; a closed stderr is no reason to fail."""
     with suppress(OSError):
@@ -97,12 +101,18 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
         file.write(content)
 
 
+def partial_path(path: Path) -> Path:
+    """What the file of a stopped run is called: rows.csv becomes rows.partial.csv."""
+    return path.with_name(f"{path.stem}.partial{path.suffix}")
+
+
 @contextmanager
-def new_file(path: Path, *, overwrite: bool) -> Iterator[BinaryIO]:
+def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Iterator[BinaryIO]:
     """Open a file that appears as a whole or not at all: a temporary one beside it, which takes its name at the end.
 
     It is opened at once, so that a path that cannot be written is refused before the work for it is done. What fails
-    inside leaves the old file as it was.
+    inside leaves the old file as it was. With `keeps_partial`, what a `StoppedError` leaves
+    behind takes the partial name.
 
     Raises
     ------
@@ -111,11 +121,17 @@ def new_file(path: Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
+    stopped: StoppedError | None = None
     try:
         mode = _mode_of(target, overwrite=overwrite)
         # "x" gives the file the permissions that any new file of the user has.
         with temporary.open("xb") as file:
-            yield file
+            try:
+                yield file
+            except StoppedError as error:
+                if not keeps_partial:
+                    raise
+                stopped, target, overwrite = error, partial_path(target), True
             file.flush()
             os.fsync(file.fileno())
         if mode is not None:
@@ -124,6 +140,8 @@ def new_file(path: Path, *, overwrite: bool) -> Iterator[BinaryIO]:
             temporary.replace(target)
         else:
             _rename_new(temporary, target)
+        if stopped is not None:
+            raise stopped
     except FileExistsError:
         raise BusplanError(f"{path}: already there; give another name, or --force to overwrite it") from None
     except FileNotFoundError:

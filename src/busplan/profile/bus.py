@@ -16,7 +16,7 @@ from busplan.ieee1394 import (
     MAX_PAYLOAD_BYTES,
     REFERENCE_CABLE_M,
     Speed,
-    safe_gap_count,
+    gap_count_by_hops,
 )
 from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.timing import Link, TimingModelName
@@ -100,7 +100,7 @@ class Ieee1394Bus(Section):
 
     def gap_count_for(self, nodes: int) -> int:
         """Gap count in force with that many nodes on the bus [1]."""
-        return safe_gap_count(self.hops(nodes)) if self.gap_count == "optimal" else self.gap_count
+        return gap_count_by_hops(self.hops(nodes)) if isinstance(self.gap_count, str) else self.gap_count
 
     def link(self, nodes: int) -> Link:
         """Rate, gap count and distance with that many nodes on the bus."""

@@ -74,11 +74,11 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
         for (left, right), (result, run) in zip(axes, pairs, strict=True):
             _polar(left, result, run)
             _over_time(right, result, run)
-        figure.savefig(buffer, format=file_format, dpi=120, metadata=_metadata(file_format))
+        figure.savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
     return buffer.getvalue()
 
 
-def _metadata(file_format: str) -> dict[str, Any]:
+def metadata(file_format: str) -> dict[str, Any]:
     """No date: the same test gives the same bytes."""
     return {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(file_format, {})
 

@@ -43,7 +43,7 @@ def csv_blocks(rows: Iterable[Mapping[str, Any]], *, columns: Sequence[str]) -> 
     writer = csv.DictWriter(buffer, fieldnames=columns, lineterminator="\n")
     writer.writeheader()
     for row in rows:
-        writer.writerow({key: _cell(value) for key, value in row.items()})
+        writer.writerow({key: csv_cell(value) for key, value in row.items()})
         if buffer.tell() > _BLOCK:
             yield buffer.getvalue()
             buffer.seek(0)
@@ -51,7 +51,8 @@ def csv_blocks(rows: Iterable[Mapping[str, Any]], *, columns: Sequence[str]) -> 
     yield buffer.getvalue()
 
 
-def _cell(value: object) -> object:
+def csv_cell(value: object) -> object:
+    """Write a truth in small letters, and a list as words."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):

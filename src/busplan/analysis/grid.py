@@ -1,0 +1,257 @@
+"""A full grid of profile values, in row-major order, taken piece by piece: no axis is ever held as a whole."""
+
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from math import prod
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+
+Array = NDArray[Any]
+
+CAPACITY_KEYS: Final = (
+    "bus.gap_count",
+    "bus.nodes",
+    "bus.max_hops",
+    "bus.cable_length_m",
+    "cycle.period_us",
+    "cycle.slice_ratio",
+    "cycle.nonperiodic_us",
+    "cycle.sync.ping_us",
+    "cycle.sync.ping_per_node_us",
+    "payload.read_bytes",
+    "payload.write_bytes",
+    "payload.overhead_bytes",
+    "node.axes",
+    "node.execution.base_us",
+    "node.execution.per_byte_us",
+)
+"""The keys in numbers that the figures of `capacity` depend on."""
+CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance")
+"""The sections that only a circle test reads."""
+_CHECKED_EACH: Final = 100
+"""Values of one key that are checked one by one; of more, the extremes: every range of the profile is an interval."""
+MAX_POINTS: Final = 10**12
+"""A larger grid would take weeks: it is a slip of the keyboard."""
+
+
+class Listed(NamedTuple):
+    """Values one by one: numbers, and "optimal" where the profile knows it."""
+
+    values: tuple[int | float | str, ...]
+
+    @property
+    def size(self) -> int:
+        """How many values."""
+        return len(self.values)
+
+    def part(self, start: int, stop: int) -> Array:
+        """Values from one index to before another."""
+        # One type for all parts of the axis.
+        common = object if self.has_words else float if any(isinstance(one, float) for one in self.values) else np.int64
+        return np.array(self.values[start:stop], dtype=common)
+
+    @property
+    def has_words(self) -> bool:
+        """Whether a value is no number."""
+        return any(isinstance(one, str) for one in self.values)
+
+
+class Steps(NamedTuple):
+    """Values an equal step apart: (first + i step) / scale, exact in decimals because all three are whole."""
+
+    first: int
+    step: int
+    scale: int
+    size: int
+    has_words: bool = False
+
+    def part(self, start: int, stop: int) -> Array:
+        """Values from one index to before another."""
+        whole = self.first + self.step * np.arange(start, stop, dtype=np.int64)
+        return whole if self.scale == 1 else whole / self.scale
+
+
+class Even(NamedTuple):
+    """So many values evenly from one end to the other, both included."""
+
+    first: float
+    last: float
+    size: int
+    has_words: bool = False
+
+    def part(self, start: int, stop: int) -> Array:
+        """Values from one index to before another."""
+        share = np.arange(start, stop) / (self.size - 1)
+        return self.first * (1 - share) + self.last * share
+
+
+Values = Listed | Steps | Even
+
+
+class Chunk(NamedTuple):
+    """A piece of a grid that follows on from the one before."""
+
+    start: int
+    """Index of its first point."""
+    shape: tuple[int, ...]
+    """Points along each axis of the grid."""
+    values: dict[str, Array]
+    """Values of each key, in the shape of its own axis: together they broadcast."""
+
+    @property
+    def points(self) -> int:
+        """How many points."""
+        return prod(self.shape)
+
+    def point(self, index: int) -> dict[str, object]:
+        """Values of one of its points by key."""
+        where = np.unravel_index(index, self.shape)
+        return {
+            key: np.broadcast_to(values, self.shape)[where].item()
+            if values.dtype != object
+            else np.broadcast_to(values, self.shape)[where]
+            for key, values in self.values.items()
+        }
+
+
+class Grid(NamedTuple):
+    """Every combination of the values of some keys; the last key changes fastest."""
+
+    axes: dict[str, Values]
+
+    @property
+    def points(self) -> int:
+        """How many points."""
+        return prod(axis.size for axis in self.axes.values())
+
+    def chunks(self, most: int) -> Iterator[Chunk]:
+        """Take the grid apart.
+
+        Parameters
+        ----------
+        most
+            Largest number of points of a chunk.
+
+        Yields
+        ------
+        Chunk
+            One after the other in row-major order.
+        """
+        sizes = [axis.size for axis in self.axes.values()]
+        # The axis that is cut: all behind it go whole into each chunk, all before it with one value.
+        cut, behind = len(sizes) - 1, 1
+        while cut and behind * sizes[cut] <= most:
+            behind *= sizes[cut]
+            cut -= 1
+        width = max(1, most // behind)
+        start = 0
+        for before in range(prod(sizes[:cut])):
+            fixed = [int(index) for index in np.unravel_index(before, sizes[:cut])] if cut else []
+            for begin in range(0, sizes[cut], width):
+                end = min(begin + width, sizes[cut])
+                parts = [(index, index + 1) for index in fixed] + [(begin, end)]
+                parts += [(0, size) for size in sizes[cut + 1 :]]
+                chunk = self._chunk(start, parts)
+                yield chunk
+                start += chunk.points
+
+    def _chunk(self, start: int, parts: list[tuple[int, int]]) -> Chunk:
+        shape = tuple(stop - first for first, stop in parts)
+        values = {}
+        for number, (key, axis) in enumerate(self.axes.items()):
+            own = [1] * len(shape)
+            own[number] = shape[number]
+            values[key] = axis.part(*parts[number]).reshape(own)
+        return Chunk(start, shape, values)
+
+
+def checked_grid(profile: Profile, axes: Mapping[str, Values], *, with_circle: bool) -> Grid:
+    """Make a grid after asking the profile about its values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    axes
+        Values by dotted key.
+    with_circle
+        Whether a circle test is to be run: without one, keys that only it reads are refused.
+
+    Raises
+    ------
+    BusplanError
+        A key that is not known, that is no number, or that nothing here reads; a value the profile's schema refuses.
+    """
+    for key in axes:
+        _require_known(profile, key)
+    samples = {key: _samples(axis) for key, axis in axes.items()}
+    first: dict[str, object] = {key: values[0] for key, values in samples.items()}
+    override(profile, first)
+    for key in axes:
+        _require_read(key, with_circle=with_circle)
+    for key, values in samples.items():
+        for value in values[1:]:
+            override(profile, {**first, key: value})
+    # What two keys must keep together shows where each is at its end.
+    for end in (_least, _greatest):
+        override(profile, {key: end(values) for key, values in samples.items()})
+    grid = Grid(dict(axes))
+    if grid.points > MAX_POINTS:
+        raise BusplanError(f"--vary: {grid.points:,} points are more than the {MAX_POINTS:,} a sweep takes; vary less")
+    return grid
+
+
+def _require_known(profile: Profile, key: str) -> None:
+    """Refuse a key that is not there, or that is a section or a list; of the rest the profile itself tells."""
+    *tables, last = key.split(".")
+    table: Any = profile.model_dump()
+    for name in tables:
+        table = table.get(name) if isinstance(table, dict) else None
+    if not isinstance(table, dict) or last not in table:
+        section = ".".join(tables)
+        siblings = list(table) if isinstance(table, dict) and tables else []
+        close = [f"{section}.{name}" for name in get_close_matches(last, siblings, n=1, cutoff=0.7)]
+        close = close or get_close_matches(key, CAPACITY_KEYS, n=1, cutoff=0.8) * (not siblings)
+        known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(CAPACITY_KEYS)}"
+        hint = f"did you mean {close[0]}?" if close else known
+        raise BusplanError(f"--vary {key}: no such key of this profile; {hint}")
+    if isinstance(table[last], dict | list | tuple):
+        what = "section" if isinstance(table[last], dict) else "list"
+        raise BusplanError(f"--vary {key}: is a {what}; expected the key of one number")
+
+
+def _require_read(key: str, *, with_circle: bool) -> None:
+    """Refuse a key that nothing of what is computed depends on."""
+    if key in CAPACITY_KEYS:
+        return
+    section = key.partition(".")[0]
+    if section not in CIRCLE_SECTIONS:
+        raise BusplanError(f"--vary {key}: no figure of capacity depends on it")
+    if not with_circle:
+        raise BusplanError(f"--vary {key}: no figure of capacity depends on it; add --circle to run circle tests")
+
+
+def _samples(axis: Values) -> list[Any]:
+    """Values to check: each, or the extremes of many."""
+    if isinstance(axis, Listed):
+        if axis.size <= _CHECKED_EACH:
+            return list(dict.fromkeys(axis.values))
+        numbers = [one for one in axis.values if not isinstance(one, str)]
+        return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *(set(axis.values) - set(numbers))))]
+    chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, axis.size - 1)
+    return [axis.part(index, index + 1).item() for index in chosen]
+
+
+def _least(values: list[Any]) -> Any:
+    return min((one for one in values if not isinstance(one, str)), default=values[0])
+
+
+def _greatest(values: list[Any]) -> Any:
+    words = [one for one in values if isinstance(one, str)]
+    return words[0] if words else max(values)

@@ -1,0 +1,199 @@
+"""`busplan sweep`: its options, and what of them goes together."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from busplan.cli.options import ProfileArgument, TimingOption, plot_format, timing_models
+from busplan.cli.sweep_run import SweepFormat, SweepJob, available_processors, run_sweep
+from busplan.cli.vary import parse_axes
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.analysis.grid import Grid
+
+_ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".jsonl": "jsonl", ".npz": "npz"}
+_DEFAULT_TOP: Final = 20
+_DEFAULT_FIGURE: Final = "max_axes"
+
+
+def sweep_command(
+    profile: ProfileArgument,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help="A key of the profile in numbers, and its values in the profile's unit: 250,500,1000 or a range "
+            "A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). bus.gap_count also takes "
+            "optimal. Given several times, every combination is computed; the last key changes fastest.",
+            show_default=False,
+        ),
+    ] = None,
+    timing: TimingOption = "both",
+    format_: Annotated[
+        SweepFormat | None,
+        typer.Option(
+            "--format",
+            help="Form of the document: a table of the top rows, or every row as csv, jsonl (a JSON object a line, the "
+            "first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the ending of -o, else table]",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Write the document there instead of to standard output; as a whole."
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            metavar="NAMES",
+            help="Figures to write, between commas, by their names in capacity --format json.  [default: all; in a "
+            "table the main ones]",
+        ),
+    ] = None,
+    sort: Annotated[
+        str | None,
+        typer.Option(
+            "--sort",
+            metavar="COLUMN[:asc]",
+            help="Table: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
+        ),
+    ] = None,
+    top: Annotated[
+        int | None, typer.Option("--top", metavar="N", help="Table: how many rows.  [default: 20]", show_default=False)
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Draw --figure into FILE.png, FILE.svg or FILE.pdf: curves where one key varies, heat maps where two "
+            "do; needs the extra plot.",
+        ),
+    ] = None,
+    figure: Annotated[
+        str | None,
+        typer.Option("--figure", metavar="COLUMN", help="What --plot draws.  [default: max_axes]", show_default=False),
+    ] = None,
+    circle: Annotated[
+        bool,
+        typer.Option(
+            "--circle", help="Also run the circle test of every point, and add its columns (errors in mm, margins)."
+        ),
+    ] = False,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            metavar="N",
+            help="Processes for --circle.  [default: one for each processor]",
+            show_default=False,
+        ),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Run more circle tests than are sane without being asked twice (1,000).")
+    ] = False,
+) -> None:
+    """Compute capacity over a grid: any keys of the profile, every combination, both timing models.
+
+    Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
+    points take seconds, and writing them as text some minutes. Ctrl-C keeps the rows so far in FILE.partial.csv (or
+    .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
+
+    Example: busplan sweep paper-4ms --vary bus.nodes=1:16 --vary cycle.period_us=250,500,1000 --sort max_axes
+    """
+    wanted = format_ or (_ENDINGS.get(output.suffix.lower(), "table") if output else "table")
+    _require_sense(wanted, output=output, sort=sort, top=top)
+    _require_needed("--plot FILE", plot is not None, {"--figure": figure})
+    _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None})
+    for option, number in (("--top", top), ("--jobs", jobs)):
+        if number is not None and number < 1:
+            raise BusplanError(f"{option} {number}: must be 1 or more")
+    axes = parse_axes(vary or [])
+    file_format = None if plot is None else plot_format(plot)
+    from busplan.analysis.grid import checked_grid
+    from busplan.profile.shipped import load
+
+    loaded = load(profile).profile
+    grid = checked_grid(loaded, axes, with_circle=circle)
+    sort_by, _, order = (sort or "").partition(":")
+    if order not in {"", "asc"}:
+        raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
+    drawn = figure or _DEFAULT_FIGURE
+    _require_number(grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
+    run_sweep(
+        SweepJob(
+            profile=loaded,
+            grid=grid,
+            timing_models=timing_models(timing),
+            columns=_columns(columns, grid, circle=circle, short=wanted == "table", sort_by=sort_by),
+            format_=wanted,
+            output=output,
+            top=top or _DEFAULT_TOP,
+            sort_by=sort_by or None,
+            ascending=order == "asc",
+            plot=plot,
+            plot_format=file_format,
+            figure=drawn,
+            jobs=(jobs or available_processors()) if circle else None,
+            force=force,
+        )
+    )
+
+
+def _require_sense(format_: SweepFormat, *, output: Path | None, sort: str | None, top: int | None) -> None:
+    """Refuse options that the format cannot follow."""
+    if format_ == "npz" and output is None:
+        raise BusplanError("--format npz: is no text for a terminal; give -o FILE.npz")
+    for option, value in (("--sort", sort), ("--top", top)):
+        if value is not None and format_ != "table":
+            raise BusplanError(f"{option}: goes with --format table; {format_} has every row in the order of the grid")
+
+
+def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> None:
+    """Refuse options that mean nothing without another."""
+    for option, value in options.items():
+        if value is not None and not is_there:
+            raise BusplanError(f"{option}: goes with {needed}")
+
+
+def _known(grid: "Grid", *, circle: bool) -> tuple[str, ...]:
+    """All columns of a sweep."""
+    from busplan.analysis.sweep import FIGURES
+    from busplan.analysis.sweep_circle import CIRCLE_FIGURES
+
+    return (*grid.axes, *FIGURES, *(CIRCLE_FIGURES if circle else ()))
+
+
+def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
+    """Refuse a column that is not there or not in numbers, where only a number will do."""
+    from busplan.analysis.sweep import WORD_FIGURES
+
+    words = {*WORD_FIGURES, *(key for key, axis in grid.axes.items() if axis.has_words)}
+    numbers = [name for name in _known(grid, circle=circle) if name not in words]
+    for option, name in asked.items():
+        if name is not None and name not in numbers:
+            raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
+
+
+def _columns(asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str) -> tuple[str, ...]:
+    """Columns to write: the varied keys and timing_model, then those asked for, or all, or a table's main ones."""
+    known = _known(grid, circle=circle)
+    front = (*grid.axes, "timing_model")
+    if asked is not None:
+        chosen = tuple(name.strip() for name in asked.split(","))
+        for name in chosen:
+            if name not in known:
+                raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
+    elif short:
+        from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS
+
+        chosen = DEFAULT_COLUMNS + (CIRCLE_COLUMNS if circle else ())
+    else:
+        chosen = known
+    return tuple(dict.fromkeys((*front, *chosen, *([sort_by] if sort_by else []))))
