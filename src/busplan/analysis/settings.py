@@ -126,8 +126,7 @@ def most_nodes(profile: Profile, *, model: TimingModelName) -> Largest:
 
 def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:
     """Smallest whole number above 0 that fits, from its estimate in floats; every larger one must fit too."""
-    number = max(1, ceil(estimate)) + 1
-    return number
+    number = max(1, ceil(estimate))
     while number > 1 and fits(number - 1):
         number -= 1
     while not fits(number):
