@@ -65,7 +65,7 @@ def plan_command(
             help="Periods in a row to test for the smallest that passes the circle; then the strides double, and the "
             "answer is marked as not proven.",
         ),
-    ] = 50,
+    ] = 50,  # settings.MAX_CIRCLES, which --help must not load
     apply: Annotated[
         bool,
         typer.Option(

@@ -127,7 +127,7 @@ def _table(options: tuple[Option, ...]) -> list[Line]:
 def _cells(option: Option) -> list[str]:
     circle = {None: "-", True: "passes", False: "FAILS"}[option.circle_passed]
     return [
-        "*" if option.recommended else "" if option.proven else "?",
+        "*" * option.recommended + "?" * (not option.proven),
         option.title,
         _short(option.changes),
         option.deciding.binding_term,
