@@ -158,6 +158,12 @@ def test_outliers_are_named_and_do_not_pull_a_robust_fit(make: Make, form: str) 
             assert abs(plain.execution.execution_us(size) - clean.execution.execution_us(size)) > 5
 
 
+@pytest.mark.parametrize("form", ["table", "linear"])
+def test_wide_but_even_scatter_has_no_outliers(make: Make, form: str) -> None:
+    rows = [(size, 100.0 + size + away) for size in (4, 64) for away in (-20, -10, 0, 10, 20)]
+    assert run(make(), of_execution(make(), rows), form=form).outliers == ()
+
+
 def test_steps_of_a_timer_are_no_outliers(make: Make) -> None:
     rows = [(4, 48.0)] * 20 + [(4, 48.1)]
     assert run(make(), of_execution(make(), rows), form="table").outliers == ()
