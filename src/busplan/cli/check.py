@@ -25,7 +25,7 @@ def check_command(
     paths: Annotated[
         list[str],
         typer.Argument(
-            metavar="PATH...",
+            metavar="PATH",
             help="Profile files, folders (every *.toml below that claims a schema_version), shipped names, "
             "or - for standard input.",
             autocompletion=complete_profile,
@@ -69,7 +69,7 @@ def check_command(
     `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. Exits 0 when clean, 1 with
     findings at or above --fail-on, 2 when it could not do the job; one broken file does not stop the others.
 
-    Example: busplan check profiles/ --format github --baseline busplan-baseline.json
+    Example: busplan check profiles/ --format github --baseline baseline.json
     """
     if update_baseline and baseline is None:
         raise BusplanError("--update-baseline: needs --baseline FILE")

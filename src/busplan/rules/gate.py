@@ -63,7 +63,7 @@ def check_document(document: Document, *, with_circle: bool = True, baseline: Re
         return _result(document, None, list(_of_file(error)), {})
     subject = Subject(LoadedProfile(profile, document))
     found = list(_bus_findings(subject))
-    ran = {rule.code for rule in bus.RULES} | {rule.code for rule in BY_KIND.values()}
+    ran = {rule.code for rule in bus.RULES}
     if with_circle:
         problems = list(circle.circle_problems(subject))
         found += [_placed(subject, RULES[code], problem) for code, problem in problems]

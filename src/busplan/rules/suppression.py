@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.profile.document import Document
 from busplan.rules.finding import Finding, Rule
-from busplan.rules.registry import RULES, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON
+from busplan.rules.registry import NEVER_SUPPRESSED, RULES, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON
 
 MARK: Final = "busplan:"
 _ADDRESSED: Final = re.compile(r"#\s*busplan:")
@@ -68,6 +68,8 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
             left = [finding for finding in left if finding not in hit]
             if code not in RULES:
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
+            elif code in NEVER_SUPPRESSED:
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code} cannot be suppressed, it must be mended"))
             elif not hit and code in ran:
                 message = f"{code} has nothing to suppress on line {one.of_line}"
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))

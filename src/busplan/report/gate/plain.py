@@ -79,9 +79,10 @@ def _github(report: CheckReport) -> Iterator[str]:
             "title": f"{finding.code} {finding.rule}",
         }
         said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
-        yield f"::{finding.severity} {said}::{_escaped(printable(finding.message), property_=False)}"
+        yield f"::{finding.severity} {said}::{_escaped(finding.message, property_=False)}"
 
 
 def _escaped(text: str, *, property_: bool) -> str:
     text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    return text.replace(":", "%3A").replace(",", "%2C") if property_ else text
+    # What GitHub has no escape for commands no terminal either.
+    return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)
