@@ -100,7 +100,7 @@ def test_what_is_no_file_is_refused(refused: Refused, tmp_path: Path, command: s
     assert refused(command, "missing.toml", cwd=tmp_path).startswith(
         "missing.toml: no such file, and no shipped profile"
     )
-    assert refused(command, ".", cwd=tmp_path) == ".: is a directory; give a profile file"
+    assert refused(command, ".", cwd=tmp_path) == ".: is a directory; give a file"
 
 
 @pytest.mark.parametrize("command", ["capacity", "latency"])

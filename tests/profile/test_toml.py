@@ -506,7 +506,7 @@ def test_a_file_is_read_no_further_than_a_profile_can_be_long(tmp_path: Path) ->
     ("path", "message"),
     [
         ("missing.toml", "x: no such file"),
-        (".", "x: is a directory; give a profile file"),
+        (".", "x: is a directory; give a file"),
         ("file/below.toml", "x: cannot be read: Not a directory"),
         ("nul\0.toml", "x: cannot be read: "),
         ("long" * 1000, "x: cannot be read: File name too long"),
