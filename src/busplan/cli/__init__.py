@@ -10,46 +10,20 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
-from busplan.cli import (
-    calibrate,
-    capacity,
-    check,
-    circle_test,
-    init,
-    latency,
-    paper,
-    plan,
-    profiles,
-    rule,
-    schema,
-    sweep,
-    timeline,
-)
+from busplan.cli.lazy import SETTINGS, LazyGroup
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
 from busplan.errors import BusplanError
 
 app = typer.Typer(
     name="busplan",
+    cls=LazyGroup,
     help="Does this motion network fit its period, and how many axes can it carry?",
     epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job. Start with: busplan capacity paper-4ms",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    context_settings=SETTINGS,
 )
-app.command("latency")(latency.latency_command)
-app.command("capacity")(capacity.capacity_command)
-app.command("circle-test")(circle_test.circle_test_command)
-app.command("calibrate")(calibrate.calibrate_command)
-app.command("plan")(plan.plan_command)
-app.command("timeline")(timeline.timeline_command)
-app.command("sweep")(sweep.sweep_command)
-app.command("check")(check.check_command)
-app.command("rule")(rule.rule_command)
-app.command("schema")(schema.schema_command)
-app.command("paper")(paper.paper_command)
-app.command("profiles")(profiles.profiles_command)
-app.command("init")(init.init_command)
 
 
 def _print_version(wanted: bool) -> None:

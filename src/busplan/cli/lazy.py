@@ -1,0 +1,68 @@
+"""Commands that load when they are called: one call pays for one command, and only --help for all."""
+
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from typing import Any, Final
+
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command
+
+SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+COMMANDS: Final = (
+    "latency",
+    "capacity",
+    "circle-test",
+    "calibrate",
+    "plan",
+    "timeline",
+    "sweep",
+    "check",
+    "rule",
+    "schema",
+    "paper",
+    "profiles",
+    "init",
+)
+"""In the order of the help. `circle-test` is `circle_test_command` of the module `circle_test`, and so for all."""
+
+
+class LazyCommands(Mapping[str, Any]):
+    """Commands by name, each made when it is first asked for."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
+        if name not in self._made:
+            stem = name.replace("-", "_")
+            module = import_module(f"busplan.cli.{stem}")
+            single = typer.Typer(
+                add_completion=False,
+                rich_markup_mode=None,
+                pretty_exceptions_enable=False,
+                context_settings=SETTINGS,
+            )
+            single.command(name)(getattr(module, f"{stem}_command"))
+            self._made[name] = get_command(single)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+class LazyGroup(TyperGroup):
+    """The program's group of commands."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands: Any = LazyCommands()
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - the signature is typer's
+        """Names of all commands, none of them loaded."""
+        return list(COMMANDS)
