@@ -98,11 +98,11 @@ def by_hand(chunk: Chunk, clock: float, packets: tuple[int, int, int, int]) -> d
         "nodes_eq11": (available - sync) / (2 * ((read + write) / 2 + gaps)),
         "max_nodes": max_nodes,
         "max_axes": axes * max_nodes,
-        "limited_by": max_nodes == 16,  # noqa: PLR2004
+        "limited_by": max_nodes == 16,
         "min_period_us": required / ratio,
         "min_slice_ratio": required / period,
-        "exceeded": (n > 62) * 2 + (n > 16) * 4 + ~fits * 8,  # noqa: PLR2004
-        "fits": fits & (n <= 16),  # noqa: PLR2004
+        "exceeded": (n > 62) * 2 + (n > 16) * 4 + ~fits * 8,
+        "fits": fits & (n <= 16),
     }
 
 
