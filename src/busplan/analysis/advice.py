@@ -18,7 +18,7 @@ from busplan.timing import TimingModelName
 
 Value = int | float | str
 
-_RATIO_STEPS: Final = 10_000
+RATIO_STEPS: Final = 10_000
 """A slice ratio is advised in steps of 0.0001, a period in steps of 1 us, always rounded to the safe side."""
 MAX_ADVISED_RATIO: Final = 0.9
 """No larger slice ratio is advised: the host computes in what communication leaves of the period. Chosen."""
@@ -50,17 +50,34 @@ def change_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> Cha
     Change
         None when no single kind of change does.
     """
+    return next(changes_to_fit(profile, models=models), None)
+
+
+def changes_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> Iterator[Change]:
+    """Find every kind of change after which a profile fits under every one of some timing models.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    models
+        Timing models.
+
+    Yields
+    ------
+    Change
+        The cheapest first; no change at all when the profile fits and its gap count is safe.
+    """
     cures = structural_cures(profile)
     nodes = int(cures.get("bus.nodes", profile.bus.nodes))
     try:
         cured = override(profile, dict(cures))
     except BusplanError:  # a payload that the bus could carry and the execution table does not know
-        return None
+        return
     for cure in ({}, *_time_cures(cured, nodes, models)):
         after = _after(profile, {**cures, **cure}, models=models)
         if after and all(one.fits for one in after):
-            return Change({**cures, **cure}, nodes, min(after, key=lambda one: one.margin_us))
-    return None
+            yield Change({**cures, **cure}, nodes, min(after, key=lambda one: one.margin_us))
 
 
 def change_for_more(profile: Profile, *, model: TimingModelName) -> Change | None:
@@ -98,6 +115,34 @@ def change_for_more(profile: Profile, *, model: TimingModelName) -> Change | Non
     return None
 
 
+def change_for_room(profile: Profile, *, model: TimingModelName, nodes: int, utilisation: float = 1.0) -> Change | None:
+    """Find the cheapest change after which a bus carries some nodes, and its own use no more than a share of the slice.
+
+    Parameters
+    ----------
+    profile
+        A network that keeps the standard's own limits.
+    model
+        Timing model.
+    nodes
+        Nodes that the period must carry [1].
+    utilisation
+        Share of the slice that they may use, 0..1 [1].
+
+    Returns
+    -------
+    Change
+        None when no single kind of change does.
+    """
+    if not utilisation:
+        return None
+    for cure in _time_cures(profile, nodes, [model], share=utilisation):
+        after = _after(profile, cure, models=[model])
+        if after and after[0].max_nodes >= nodes and after[0].utilisation <= utilisation:
+            return Change(cure, nodes, after[0])
+    return None
+
+
 def structural_cures(profile: Profile) -> dict[str, Value]:
     """The nearest values that keep the standard's own limits and a safe gap count, for each that a profile breaks."""
     cures: dict[str, Value] = {}
@@ -128,8 +173,10 @@ def _largest_by_gap_count(profile: Profile, *, model: TimingModelName) -> int:
     return largest_nodes(override(profile, {"bus.gap_count": "optimal"}), model=model)[0]
 
 
-def _time_cures(profile: Profile, nodes: int, models: Sequence[TimingModelName]) -> Iterator[dict[str, Value]]:
-    """Changes that win time for that many nodes, the cheapest first."""
+def _time_cures(
+    profile: Profile, nodes: int, models: Sequence[TimingModelName], *, share: float = 1.0
+) -> Iterator[dict[str, Value]]:
+    """Changes that win time for that many nodes to use a share of the slice, the cheapest first."""
     bus = profile.bus
     gap_cure: dict[str, Value] = {}
     safe = safe_gap_count(bus.hops(nodes))
@@ -138,12 +185,13 @@ def _time_cures(profile: Profile, nodes: int, models: Sequence[TimingModelName])
         yield gap_cure
     # A wider slice alone, then with the gap count: one key is a smaller change than two.
     for before in ({}, gap_cure) if gap_cure else ({},):
-        required_us = _required_us(override(profile, dict(before)), nodes, models)
-        ratio = ceil(required_us / profile.cycle.period_us * _RATIO_STEPS) / _RATIO_STEPS
+        required_us = _required_us(override(profile, dict(before)), nodes, models) / share
+        ratio = ceil(required_us / profile.cycle.period_us * RATIO_STEPS) / RATIO_STEPS
         if ratio <= MAX_ADVISED_RATIO:
             yield {**before, "cycle.slice_ratio": ratio}
-    required_us = _required_us(profile, nodes, models)
-    yield {"cycle.period_us": ceil(required_us / profile.cycle.slice_ratio)}
+    for before in ({}, gap_cure) if gap_cure else ({},):
+        required_us = _required_us(override(profile, dict(before)), nodes, models) / share
+        yield {**before, "cycle.period_us": ceil(required_us / profile.cycle.slice_ratio)}
 
 
 def _required_us(profile: Profile, nodes: int, models: Sequence[TimingModelName]) -> float:

@@ -182,7 +182,7 @@ def fits_in(required_us: float, *, available_us: float) -> bool:
     return required_us <= available_us * (1 + FIT_ROUNDING)
 
 
-def cycle(profile: Profile, *, model: TimingModelName, nodes: int) -> Cycle:
+def cycle(profile: Profile, *, model: TimingModelName, nodes: int, payload_bytes: int | None = None) -> Cycle:
     """Put a cycle together, with any number of nodes on the profile's bus.
 
     Parameters
@@ -193,11 +193,18 @@ def cycle(profile: Profile, *, model: TimingModelName, nodes: int) -> Cycle:
         Timing model.
     nodes
         Nodes on the bus, 1 or more [1].
+    payload_bytes
+        Payload of read and write alike [bytes]; without it the profile's own of each.
     """
+    read_bytes, write_bytes = (
+        (profile.payload.read_bytes, profile.payload.write_bytes)
+        if payload_bytes is None
+        else (payload_bytes, payload_bytes)
+    )
     return Cycle(
         nodes=nodes,
-        read=phases(profile, "read", model=model, payload_bytes=profile.payload.read_bytes, nodes=nodes),
-        write=phases(profile, "write", model=model, payload_bytes=profile.payload.write_bytes, nodes=nodes),
+        read=phases(profile, "read", model=model, payload_bytes=read_bytes, nodes=nodes),
+        write=phases(profile, "write", model=model, payload_bytes=write_bytes, nodes=nodes),
         sync_us=profile.cycle.sync.sync_us(nodes),
         nonperiodic_us=profile.cycle.nonperiodic_us,
     )

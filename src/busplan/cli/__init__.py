@@ -1,5 +1,6 @@
 """The command line: parse, call, render, exit. One module a command; heavy imports stand inside the commands."""
 
+import codecs
 import os
 import sys
 from io import TextIOWrapper
@@ -9,7 +10,21 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
-from busplan.cli import capacity, check, circle_test, init, latency, paper, profiles, rule, schema, sweep
+from busplan.cli import (
+    calibrate,
+    capacity,
+    check,
+    circle_test,
+    init,
+    latency,
+    paper,
+    plan,
+    profiles,
+    rule,
+    schema,
+    sweep,
+    timeline,
+)
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
 from busplan.errors import BusplanError
 
@@ -25,6 +40,9 @@ app = typer.Typer(
 app.command("latency")(latency.latency_command)
 app.command("capacity")(capacity.capacity_command)
 app.command("circle-test")(circle_test.circle_test_command)
+app.command("calibrate")(calibrate.calibrate_command)
+app.command("plan")(plan.plan_command)
+app.command("timeline")(timeline.timeline_command)
 app.command("sweep")(sweep.sweep_command)
 app.command("check")(check.check_command)
 app.command("rule")(rule.rule_command)
@@ -76,7 +94,16 @@ def _mend_streams() -> None:
     if sys.stderr is None:
         # Errors have nowhere to go; they must not go to stdout.
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
+    codecs.register_error("busplan", _escaped)
     for stream in (sys.stdout, sys.stderr):
         # A terminal without UTF-8 gets escapes instead of a failure.
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+            stream.reconfigure(errors="busplan")
+
+
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    """Escape what an encoding lacks as JSON does: a document is JSON on every stream."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2)), error.end

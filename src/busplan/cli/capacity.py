@@ -1,14 +1,11 @@
 """`busplan capacity`."""
 
-from typing import Annotated
-
-import typer
-
 from busplan.cli.options import (
     BUS_OPTIONS,
     FormatOption,
     GapCountOption,
     NodesOption,
+    PeriodsOption,
     ProfileArgument,
     TimingOption,
     bus_changes,
@@ -20,16 +17,7 @@ from busplan.cli.output import emit, emit_text
 
 def capacity_command(
     profile: ProfileArgument,
-    period: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--period",
-            metavar="TIME",
-            help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
-            "May be given several times.",
-            show_default=False,
-        ),
-    ] = None,
+    period: PeriodsOption = None,
     nodes: NodesOption = None,
     gap_count: GapCountOption = None,
     timing: TimingOption = "both",

@@ -13,7 +13,7 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.profile.collect import Collection, Source
+    from busplan.profile.collect import Source
     from busplan.rules.baseline import Recorded
     from busplan.rules.gate import FileResult
     from busplan.rules.report import CheckReport
@@ -25,7 +25,7 @@ def check_command(
     paths: Annotated[
         list[str],
         typer.Argument(
-            metavar="PATH...",
+            metavar="PATH",
             help="Profile files, folders (every *.toml below that claims a schema_version), shipped names, "
             "or - for standard input.",
             autocompletion=complete_profile,
@@ -69,7 +69,7 @@ def check_command(
     `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. Exits 0 when clean, 1 with
     findings at or above --fail-on, 2 when it could not do the job; one broken file does not stop the others.
 
-    Example: busplan check profiles/ --format github --baseline busplan-baseline.json
+    Example: busplan check profiles/ --format github --baseline baseline.json
     """
     if update_baseline and baseline is None:
         raise BusplanError("--update-baseline: needs --baseline FILE")
@@ -78,13 +78,16 @@ def check_command(
     collection = collect(paths, stdin_name=stdin_filename)
     recorded = _read_baseline(baseline, needed=not update_baseline)
     report = _check(collection.sources, recorded=None if update_baseline else recorded, with_circle=circle, jobs=jobs)
-    if update_baseline and baseline is not None:
-        _update_baseline(baseline, recorded or {}, report)
     _write(report, format_=format_, output=output)
+    say(*(file.failure for file in report.files if file.failure is not None))
+    if verbose:
+        say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
+        say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
+    if update_baseline and baseline is not None:
+        _update_baseline(baseline, recorded or {}, report, quiet=quiet)
     if not quiet:
-        _summarise(report, collection, verbose=verbose)
-    say(*collection.failures)
-    if collection.failures or report.failed:
+        say(_summary(report))
+    if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
         raise PlanFailsError
@@ -94,14 +97,19 @@ def _check(sources: "Sequence[Source]", *, recorded: Recordings | None, with_cir
     from busplan.rules.report import CheckReport
 
     one = partial(_check_source, recorded=recorded, with_circle=with_circle)
-    # A process costs more than some files do: each gets a fair number of them.
     workers = min(jobs, len(sources))
     if workers <= 1:
         return CheckReport(tuple(map(one, sources)))
     from concurrent.futures import ProcessPoolExecutor
 
+    # Only this process has the standard input.
+    own = {source: one(source) for source in sources if str(source.path) == "-"}
+    others = [source for source in sources if source not in own]
     with ProcessPoolExecutor(workers) as pool:
-        return CheckReport(tuple(pool.map(one, sources, chunksize=max(1, len(sources) // (4 * workers)))))
+        # A process costs more than some files do: each gets a fair number of them.
+        results = pool.map(one, others, chunksize=max(1, len(others) // (4 * workers)))
+        found = own | dict(zip(others, results, strict=True))
+    return CheckReport(tuple(found[source] for source in sources))
 
 
 def _check_source(source: "Source", *, recorded: Recordings | None, with_circle: bool) -> "FileResult":
@@ -109,12 +117,16 @@ def _check_source(source: "Source", *, recorded: Recordings | None, with_circle:
     from busplan.profile.toml import decode, read_bytes
     from busplan.rules.gate import FileResult, check_document, unreadable
 
+    if source.failure is not None:
+        return FileResult(source.name, None, (), {}, failure=source.failure)
     try:
-        document = decode(read_bytes(source.path, name=source.name), name=source.name)
-    except PlacedError as error:
-        return unreadable(source.name, error)
+        content = read_bytes(source.path, name=source.name)
     except BusplanError as error:
         return FileResult(source.name, None, (), {}, failure=str(error))
+    try:
+        document = decode(content, name=source.name)
+    except PlacedError as error:
+        return unreadable(source.name, error, content)
     before: Recorded | None = None if recorded is None else recorded.get(source.name, {})
     return check_document(document, with_circle=with_circle, baseline=before)
 
@@ -132,13 +144,15 @@ def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
     return read_baseline(text, name=str(path))
 
 
-def _update_baseline(path: Path, recorded: Recordings, report: "CheckReport") -> None:
+def _update_baseline(path: Path, recorded: Recordings, report: "CheckReport", *, quiet: bool) -> None:
     """Record what was checked; profiles that were not checked keep their record."""
     from busplan.rules.baseline import write_baseline
 
     now = {file.path: file.figures for file in report.files if file.figures}
-    write_file(path, write_baseline({**recorded, **now}).encode(), overwrite=True)
-    say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
+    # A path that is no UTF-8 becomes an escape, which reading the JSON takes back.
+    write_file(path, write_baseline({**recorded, **now}).encode("utf-8", "backslashreplace"), overwrite=True)
+    if not quiet:
+        say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
 
 
 def _write(
@@ -159,12 +173,9 @@ def _write(
         say(*render(report, file_format="text").splitlines())
 
 
-def _summarise(report: "CheckReport", collection: "Collection", *, verbose: bool) -> None:
-    if verbose:
-        say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
-        say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
-    say(*(file.failure for file in report.files if file.failure is not None))
+def _summary(report: "CheckReport") -> str:
     counts = report.summary
-    words = (("profile", counts.files), ("error", counts.errors), ("warning", counts.warnings))
+    failed = sum(file.failure is not None for file in report.files)
+    words = (("profile", counts.files - failed), ("error", counts.errors), ("warning", counts.warnings))
     profiles, errors, warnings = (f"{number} {word}{'s' * (number != 1)}" for word, number in words)
-    say(f"checked {profiles}: {errors}, {warnings}")
+    return f"checked {profiles}: {errors}, {warnings}{f'; {failed} could not be checked' if failed else ''}"

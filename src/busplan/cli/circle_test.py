@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
-from busplan.cli.options import FormatOption, ProfileArgument, periods_us, plot_format
+from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
 from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
@@ -19,16 +19,7 @@ _OPTIONS = {"circle.feed_mm_per_min": "--feed", "circle.radius_mm": "--radius", 
 
 def circle_test_command(
     profile: ProfileArgument,
-    period: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--period",
-            metavar="TIME",
-            help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
-            "May be given several times.",
-            show_default=False,
-        ),
-    ] = None,
+    period: PeriodsOption = None,
     feed: Annotated[
         float | None,
         typer.Option("--feed", metavar="MM_PER_MIN", help="Speed along the circle, instead of the profile's [mm/min]."),

@@ -33,9 +33,9 @@ def init_command(
     """
     from busplan.profile.starter import starter_text
 
-    if not Path(name).name.removesuffix(".toml").strip("."):
-        raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
+    if not path.name.removesuffix(".toml").strip("."):
+        raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     write_file(path, starter_text(source, name=path.stem).encode(), overwrite=force)
     # A name that begins with a dash would be read as an option.
     shown = f"./{path}" if str(path).startswith("-") else str(path)

@@ -17,7 +17,7 @@ Format = Literal["table", "json", "csv"]
 
 _TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
 MAX_BYTES: Final = 1_000_000
-_MAX_DIGITS: Final = 12
+_SIZE: Final = r"\s*[0-9]{1,12}\s*"
 _EXPONENT: Final = {"us": 0, "ms": 3, "s": 6}
 
 
@@ -33,6 +33,16 @@ ProfileArgument = Annotated[
     typer.Argument(
         help="A profile file, the name of a shipped profile (see `busplan profiles`), or - for standard input.",
         autocompletion=complete_profile,
+        show_default=False,
+    ),
+]
+PeriodsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--period",
+        metavar="TIME",
+        help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
+        "May be given several times.",
         show_default=False,
     ),
 ]
@@ -93,14 +103,25 @@ def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | Non
 
     found = []
     for text in texts:
-        match = _TIME.fullmatch(text.strip())
-        if match is None:
-            raise BusplanError(f"--period {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
-        # Decimal keeps 0.0003 s the float nearest to 300 us.
-        period_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+        period_us = time_us(text, option="--period")
         override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": f"--period {text}, in us"})
         found.append(period_us)
     return found
+
+
+def time_us(text: str, *, option: str) -> float:
+    """Read a time with its unit, as 4ms, 250us or 0.001s [us].
+
+    Raises
+    ------
+    BusplanError
+        No number, or no unit.
+    """
+    match = _TIME.fullmatch(text.strip())
+    if match is None:
+        raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
+    # Decimal keeps 0.0003 s the float nearest to 300 us.
+    return float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
 
 
 def parse_sizes(text: str, *, option: str) -> list[int]:
@@ -113,7 +134,7 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
     """
     sizes = []
     for part in text.split(","):
-        if not re.fullmatch(r"\s*[0-9]+\s*", part) or not 1 <= int(part[:_MAX_DIGITS]) <= MAX_BYTES:
+        if not re.fullmatch(_SIZE, part) or not 1 <= int(part) <= MAX_BYTES:
             raise BusplanError(
                 f"{option} {text}: expected payloads of 1 to {MAX_BYTES:,} bytes between commas, as 4,16,32"
             )

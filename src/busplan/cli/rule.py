@@ -12,7 +12,7 @@ def complete_code(incomplete: str) -> list[str]:
     """Codes of rules that begin as typed, for the shell's completion."""
     from busplan.rules.registry import RULES
 
-    return [code for code in RULES if code.startswith(incomplete.upper())]
+    return [code for code in RULES if code.startswith(incomplete)]
 
 
 def rule_command(

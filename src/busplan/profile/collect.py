@@ -10,15 +10,17 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import locate
 from busplan.profile.toml import MAX_FILE_BYTES
 
-_CLAIM = re.compile(rb"^[ \t]*[\"']?schema_version[\"']?[ \t]*=", re.MULTILINE)
+_CLAIM = re.compile(rb"^(?:\xef\xbb\xbf)?[ \t]*[\"']?schema_version[\"']?[ \t]*=", re.MULTILINE)
 _SKIPPED_FOLDERS = {"node_modules", "__pycache__"}
 
 
 class Source(NamedTuple):
-    """One profile to read, and what to call it."""
+    """One profile to read, and what to call it; or a path that could not be followed."""
 
     path: Path
     name: str
+    failure: str | None = None
+    """Why there is no profile to read."""
 
 
 class Collection(NamedTuple):
@@ -27,8 +29,6 @@ class Collection(NamedTuple):
     sources: tuple[Source, ...]
     skipped: tuple[str, ...]
     """TOML files below a folder that claim no `schema_version`."""
-    failures: tuple[str, ...]
-    """One message for each path that means nothing."""
 
 
 def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collection:
@@ -45,41 +45,76 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
     Returns
     -------
     Collection
-        Sources in the order of the arguments, and by name within a folder.
+        Sources in the order of the arguments, and by name within a folder; a path that means nothing is one too, with
+        its failure. Names are from the working folder for all that lies below it, however it was written.
     """
     sources: dict[str, Source] = {}
+    names: set[str] = set()
     skipped: list[str] = []
-    failures: list[str] = []
     for argument in arguments:
-        try:
-            if argument == "-":
-                sources.setdefault(stdin_name, Source(Path("-"), stdin_name))
-            elif Path(argument).is_dir():
-                below = list(_below(argument, skipped))
-                if not below:
-                    failures.append(f"{argument}: no profile below this folder (a *.toml with a schema_version)")
-                sources.update({source.name: source for source in below if source.name not in sources})
-            else:
-                source = Source(*locate(argument))
-                sources.setdefault(source.name, source)
-        except (BusplanError, ValueError) as error:  # ValueError: a NUL in the path
-            failures.append(str(error))
-    return Collection(tuple(sources.values()), tuple(skipped), tuple(failures))
+        for source in _meant(argument, stdin_name=stdin_name, skipped=skipped):
+            key = _place(source.path).as_posix() if source.failure is None else source.failure
+            if key in sources:
+                continue
+            # A shipped profile and a file can be called alike: the second says where it is.
+            taken = source.failure is None and source.name in names
+            sources[key] = source._replace(name=source.path.absolute().as_posix()) if taken else source
+            names.add(source.name)
+    return Collection(tuple(sources.values()), tuple(skipped))
 
 
-def _below(folder: str, skipped: list[str]) -> Iterator[Source]:
-    """Every profile below a folder, in the order of their names."""
-    for root, folders, files in os.walk(folder):
+def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[Source]:
+    """What one argument means: one source, or all below a folder."""
+    try:
+        path, name = locate(argument)
+        if argument == "-":
+            yield Source(path, stdin_name)
+        elif name != argument:  # a shipped name, whatever lies in the working folder
+            yield Source(path, name)
+        elif path.is_dir():
+            yield from _below(path, skipped)
+        else:
+            yield Source(path, _name(path))
+    except (BusplanError, ValueError) as error:  # ValueError: a NUL in the path
+        yield Source(Path(argument), argument, str(error))
+
+
+def _place(path: Path) -> Path:
+    """The one place of a path: from the working folder where it lies below it, otherwise from the root."""
+    if not path.is_absolute() and ".." not in path.parts:
+        return path
+    real = Path(os.path.realpath(path)) if path.name == ".." else Path(os.path.realpath(path.parent), path.name)
+    here = Path.cwd()
+    return real.relative_to(here) if real.is_relative_to(here) else real
+
+
+def _name(path: Path) -> str:
+    """What a file is called: by its place where that is short, otherwise as it was given."""
+    place = _place(path)
+    return (path if place.is_absolute() else place).as_posix()
+
+
+def _below(folder: Path, skipped: list[str]) -> Iterator[Source]:
+    """Every profile below a folder, in the order of their names, and every folder that cannot be looked into."""
+    unreadable: list[OSError] = []
+    found = False
+    for root, folders, files in os.walk(folder, onerror=unreadable.append):
         folders[:] = sorted(name for name in folders if not name.startswith(".") and name not in _SKIPPED_FOLDERS)
         for name in sorted(files):
             if not name.endswith(".toml"):
                 continue
             path = Path(root) / name
-            shown = path.as_posix()
             if _claims(path):
-                yield Source(path, shown)
+                found = True
+                yield Source(path, _name(path))
             else:
-                skipped.append(shown)
+                skipped.append(_name(path))
+    for error in unreadable:
+        name = _name(Path(error.filename))
+        yield Source(Path(error.filename), name, f"{name}: cannot be read: {error.strerror}")
+    if not found and not unreadable:
+        name = _name(folder)
+        yield Source(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
 
 
 def _claims(path: Path) -> bool:

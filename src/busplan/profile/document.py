@@ -5,6 +5,7 @@ import tomllib
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Final
 
 from busplan.errors import PlacedError, PlacedProblem
@@ -17,8 +18,8 @@ _LONG_INTEGER: Final = r"[0-9_]{4000,}"
 _MAX_NESTING: Final = 100
 _MAX_KEY_PARTS: Final = 20
 _LONG_KEY: Final = (
-    r"""(?<![A-Za-z0-9_"'-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
-    f"{{{_MAX_KEY_PARTS}}}"
+    r"""(?m)(?:^|[\[{,])[ \t]*+((?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    f"{{{_MAX_KEY_PARTS}}})"
 )
 """A dotted key of very many parts, which costs the standard library's parser the square of their number."""
 
@@ -28,7 +29,7 @@ class Lines:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._starts = [0, *(at + 1 for at, character in enumerate(text) if character == "\n")]
+        self._starts = [0, *accumulate(len(line) + 1 for line in text.split("\n")[:-1])]
 
     def offset(self, line: int, column: int) -> int:
         """Offset of a line and column."""
@@ -83,9 +84,9 @@ class Document:
         PlacedError
             The text is no TOML; with the place where it stops being so.
         """
-        long_key = re.search(_LONG_KEY, self.text)
+        long_key = self._long_key()
         if long_key:
-            raise self.syntax_error(long_key.start(), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
+            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
         try:
             return tomllib.loads(self.text)
         except RecursionError:
@@ -93,6 +94,12 @@ class Document:
             raise self.syntax_error(_first_deep_bracket(self.text), message) from None
         except ValueError as error:
             raise self._refusal(error) from None
+
+    def _long_key(self) -> re.Match[str] | None:
+        # A key stands on one line, so that its points can be counted first: that is much faster than looking for keys.
+        if all(line.count(".") < _MAX_KEY_PARTS for line in self.text.split("\n")):
+            return None
+        return re.search(_LONG_KEY, self.text)
 
     def _refusal(self, error: ValueError) -> PlacedError:
         match = re.match(_TOMLLIB_MESSAGE, str(error))

@@ -16,6 +16,8 @@ from busplan.profile.sections import Problem, Section, refused
 
 SCHEMA_VERSION: Final = 1
 
+_CIRCLE_SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
+
 
 def _without_control_characters(allowed: str) -> Callable[[str], str]:
     def check(text: str) -> str:
@@ -55,6 +57,11 @@ class Profile(Section):
     circle: Circle = Field(default_factory=Circle, description="The circle of the test")
     limits: Limits = Field(default_factory=Limits, description="What the gate asks for beyond fitting")
     tolerance: Tolerance = Field(default_factory=Tolerance, description="What the circle test must hold")
+
+    @property
+    def asks_for_circle(self) -> bool:
+        """Whether the profile says anything that a circle test is for."""
+        return bool(_CIRCLE_SECTIONS & self.model_fields_set)
 
     @model_validator(mode="after")
     def _execution_is_known(self) -> Self:

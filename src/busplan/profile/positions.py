@@ -37,6 +37,10 @@ _STRING: Final = re.compile(
     re.DOTALL,
 )
 _SCALAR: Final = re.compile(r"[^,\]}#\r\n]*")
+_PLAIN_LINE: Final = re.compile(
+    r"""([A-Za-z0-9_-]+)[ \t]*=[ \t]*("[^"\\\n]*+"|'[^'\n]*+'|[^\s"'\[{#]++)[ \t]*(#[^\n]*+)?(?:\n|\Z)"""
+)
+"""A bare key, a scalar on the same line and perhaps a comment: what most lines of a profile are, read at one go."""
 
 
 @dataclass(slots=True)
@@ -67,7 +71,8 @@ class _Scanner:
         """Skip space, line ends and comments, and remember where the comments begin."""
         start = self.at
         self.skip(_SPACE_AND_LINES)
-        self.comments.extend(match.start() for match in _COMMENT.finditer(self.text, start, self.at))
+        if self.text.find("#", start, self.at) >= 0:
+            self.comments.extend(match.start() for match in _COMMENT.finditer(self.text, start, self.at))
 
     def document(self) -> dict[KeyPath, Place]:
         table: KeyPath = ()
@@ -75,10 +80,21 @@ class _Scanner:
         while self.at < len(self.text):
             if self.text[self.at] == "[":
                 table = self.header()
-            else:
+            elif not self.plain_line(table):
                 self.key_and_value(table)
             self.skip_lines()
         return self.places
+
+    def plain_line(self, table: KeyPath) -> bool:
+        """Read a line that needs no scanner; tell whether it was one."""
+        match = _PLAIN_LINE.match(self.text, self.at)
+        if match is None:
+            return False
+        self.places[*table, match[1]] = Place(*match.span(1), *match.span(2))
+        if match[3] is not None:
+            self.comments.append(match.start(3))
+        self.at = match.end()
+        return True
 
     def header(self) -> KeyPath:
         """Read [a.b] or [[a.b]] and give the path its keys belong to."""

@@ -60,7 +60,10 @@ class Finding(NamedTuple):
 
 def _quoted(part: str) -> str:
     bare = part.isascii() and part.replace("-", "").replace("_", "").isalnum()
-    return part if bare else f'"{part.encode("unicode_escape").decode()}"'
+    if bare:
+        return part
+    escaped = part.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in escaped) + '"'
 
 
 def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import NamedTuple
 
 from busplan.errors import BusplanError
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
@@ -48,6 +49,37 @@ def locate(argument: str) -> tuple[Path, str]:
             f"{shown}: no such file, and no shipped profile of that name; shipped are {', '.join(names)}"
         )
     return path, argument
+
+
+class MeasurementsFile(NamedTuple):
+    """A file of measurements."""
+
+    path: Path
+    name: str
+    """What to call it in messages."""
+    shipped: bool
+    """Whether it is an example of ours, with published figures."""
+
+
+def locate_measurements(argument: str) -> MeasurementsFile:
+    """Find the file that a command's MEASUREMENTS argument means.
+
+    A file that is there comes first: measurements of one's own must never be taken for the shipped example.
+
+    Raises
+    ------
+    BusplanError
+        Neither an existing file nor the name of a shipped example.
+    """
+    if argument == "-":
+        return MeasurementsFile(Path("-"), "<stdin>", shipped=False)
+    if argument and os.path.lexists(argument):
+        return MeasurementsFile(Path(argument), argument, shipped=False)
+    names = sorted(path.name for path in shipped_folder().glob("*.csv"))
+    if argument in names:
+        return MeasurementsFile(shipped_folder() / argument, argument, shipped=True)
+    shown = argument or repr(argument)
+    raise BusplanError(f"{shown}: no such file, and no shipped example of that name; shipped is {', '.join(names)}")
 
 
 def load(argument: str) -> LoadedProfile:

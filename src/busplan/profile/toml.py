@@ -46,16 +46,26 @@ def decode(content: bytes, *, name: str) -> Document:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        before = content[: error.start].decode("utf-8-sig")
+        # The codec counts without the byte order mark, in bytes of its own.
+        before = error.object[: error.start].decode()
         line, column = Lines(before + "?").line_and_column(len(before))
-        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
+        message = f"not a text file: byte 0x{error.object[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
         raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
     # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
     return Document(name, text.replace("\r\n", "\n"))
 
 
-def read_bytes(path: Path, *, name: str) -> bytes:
-    """Read a file, or standard input for the path "-", no further than a profile can be long.
+def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
+    """Read a file, or standard input for the path "-", no further than it may be long and one byte more.
+
+    Parameters
+    ----------
+    path
+        The file, or "-".
+    name
+        What to call it in messages.
+    limit
+        How long it may be [bytes]; without it, as a profile.
 
     Raises
     ------
@@ -66,13 +76,16 @@ def read_bytes(path: Path, *, name: str) -> bytes:
         if str(path) == "-":
             if sys.stdin is None:
                 raise BusplanError(f"{name}: standard input is closed")
-            return sys.stdin.buffer.read(MAX_FILE_BYTES + 1)
+            return sys.stdin.buffer.read(limit + 1)
+        if path.is_fifo() and not path.is_relative_to("/dev"):
+            # Opening it would wait for a writer, for ever; a shell's <(command) is /dev/fd/N and has one.
+            raise BusplanError(f"{name}: is a named pipe; give a profile file, or - for standard input")
         with path.open("rb") as file:
-            return file.read(MAX_FILE_BYTES + 1)
+            return file.read(limit + 1)
     except FileNotFoundError:
         raise BusplanError(f"{name}: no such file") from None
     except IsADirectoryError:
-        raise BusplanError(f"{name}: is a directory; give a profile file") from None
+        raise BusplanError(f"{name}: is a directory; give a file") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise BusplanError(f"{name}: cannot be read: {reason}") from None
@@ -96,7 +109,7 @@ def validate(document: Document) -> Profile:
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
-    """Make a profile with other values, checked like one that was read.
+    """Make a profile with other values, checked like one that was read; what it leaves out it still leaves out.
 
     Parameters
     ----------
@@ -114,12 +127,12 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     """
     if not changes:
         return profile
-    data = profile.model_dump()
+    data = profile.model_dump(exclude_unset=True)
     for key, value in changes.items():
         *tables, last = key.split(".")
         table = data
         for name in tables:
-            table = table[name]
+            table = table.setdefault(name, {})
         table[last] = value
     try:
         return Profile.model_validate(data)

@@ -20,8 +20,13 @@ _ERROR_SHARE: Final = 0.25
 """Largest error in the polar plot as a share of the drawn radius."""
 
 
-def require_matplotlib() -> None:
+def require_matplotlib(option: str = "--plot") -> None:
     """Refuse early, before anything is simulated, where no figure can be drawn.
+
+    Parameters
+    ----------
+    option
+        What asked for the figure.
 
     Raises
     ------
@@ -29,7 +34,7 @@ def require_matplotlib() -> None:
         The extra `plot` is not installed.
     """
     if find_spec("matplotlib") is None:
-        raise BusplanError("--plot needs matplotlib: install it with the extra, as in pip install 'busplan[plot]'")
+        raise BusplanError(f"{option} needs matplotlib: install it with the extra, as in pip install 'busplan[plot]'")
 
 
 def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from busplan.report.lines import table
 from busplan.rules.finding import Rule
+from busplan.rules.registry import NEVER_SUPPRESSED
 
 _WIDTH: Final = 88
 
@@ -34,6 +35,9 @@ def rule_page(rule: Rule) -> str:
     """All that is to say of one rule."""
     explanation = textwrap.fill(rule.explanation, _WIDTH)
     suppression = (
-        f"Suppress it with a reason, on its line or alone on the line above:\n\n  # busplan: ignore[{rule.code}] reason"
+        "It cannot be suppressed."
+        if rule.code in NEVER_SUPPRESSED
+        else "Suppress it with a reason, on its line or alone on the line above:\n\n"
+        f"  # busplan: ignore[{rule.code}] reason"
     )
     return f"{rule.code} {rule.name} ({rule.severity}): {rule.summary}\n\n{explanation}\n\n{suppression}\n"

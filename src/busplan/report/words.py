@@ -9,7 +9,7 @@ from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_co
 from busplan.profile.model import Profile
 from busplan.report.lines import Line, plural, us
 
-_MEANING: Final = {
+MEANING: Final = {
     "bus.max_hops": "rewired as a tree",
     "bus.nodes": "the others on a second bus",
     "bus.speed": "if all nodes can",
@@ -87,15 +87,16 @@ def _headline(verdict: Verdict, profile: Profile) -> Line:
     same = all(other.exceeded == figures.exceeded for other in verdict.others)
     if verdict.models_agree and same:
         others = "".join(f"; {other.timing_model} agrees" for other in verdict.others)
-        text = f"{subject}: {_story(figures, profile)} ({figures.timing_model} model{others})."
+        text = f"{subject}: {story(figures, profile)} ({figures.timing_model} model{others})."
     else:
         loud = "" if verdict.models_agree else " THE MODELS DISAGREE."
-        stories = "; ".join(f"{one.timing_model}: {_story(one, profile)}" for one in verdict.all_figures)
+        stories = "; ".join(f"{one.timing_model}: {story(one, profile)}" for one in verdict.all_figures)
         text = f"{subject}:{loud} {stories}."
     return Line(text, "good" if verdict.all_well else "bad")
 
 
-def _story(figures: CapacityFigures, profile: Profile) -> str:
+def story(figures: CapacityFigures, profile: Profile) -> str:
+    """Say of one set of figures whether it fits, and by how much or why not."""
     if figures.fits:
         safe = "" if figures.gap_count_safe else ", but only with an unsafe gap count"
         return (
@@ -158,5 +159,5 @@ def _advice(verdict: Verdict, profile: Profile) -> Line:
 
 
 def _setting(key: str, value: object) -> str:
-    meaning = f" ({_MEANING[key]})" if key in _MEANING else ""
+    meaning = f" ({MEANING[key]})" if key in MEANING else ""
     return f"{key} = {value}{meaning}"

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from sys import float_info
 from typing import Any, Final
 
 from busplan.errors import BusplanError
@@ -10,6 +11,9 @@ from busplan.rules.finding import Problem, Subject
 _SCHEMA: Final = 1
 _ROUNDING: Final = 1e-9
 """Relative allowance for a figure that was written and read again, or computed on another machine."""
+
+_CURE: Final = "remove it, and record one with --update-baseline"
+"""A file that is no baseline may be anything: it is never overwritten."""
 
 Recorded = Mapping[str, float]
 """Figures of one profile by name: "paper.max_axes"."""
@@ -50,18 +54,19 @@ def read_baseline(text: str, *, name: str) -> dict[str, dict[str, float]]:
     try:
         document = json.loads(text)
     except (ValueError, RecursionError):
-        raise BusplanError(f"{name}: no JSON; record a baseline with --update-baseline") from None
+        raise BusplanError(f"{name}: no JSON, so no baseline; {_CURE}") from None
     if not isinstance(document, dict) or document.get("command") != "baseline" or document.get("schema") != _SCHEMA:
-        raise BusplanError(f"{name}: no baseline of this version; record one with --update-baseline")
+        raise BusplanError(f"{name}: no baseline of this version; {_CURE}")
     profiles = document.get("profiles")
     if not isinstance(profiles, dict) or not all(map(_are_figures, profiles.values())):
-        raise BusplanError(f"{name}: a damaged baseline; record it again with --update-baseline")
+        raise BusplanError(f"{name}: a damaged baseline; {_CURE}")
     return profiles
 
 
 def _are_figures(value: Any) -> bool:
     return isinstance(value, dict) and all(
-        isinstance(one, int | float) and not isinstance(one, bool) and abs(one) < float("inf") for one in value.values()
+        isinstance(one, int | float) and not isinstance(one, bool) and abs(one) <= float_info.max
+        for one in value.values()
     )
 
 

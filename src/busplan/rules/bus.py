@@ -1,11 +1,12 @@
 """Rules of the bus: does the cycle fit, is the gap count right, is the payload one that the bus carries?"""
 
 from collections.abc import Iterator
+from math import ceil
 from typing import Final
 
-from busplan.analysis.advice import change_to_fit
+from busplan.analysis.advice import Change, change_for_room, change_to_fit
 from busplan.analysis.capacity import CapacityFigures, figures
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, QUADLET_BYTES, padded_bytes
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, QUADLET_BYTES, padded_bytes
 from busplan.profile.toml import override
 from busplan.rules.finding import Problem, Rule, Subject
 
@@ -22,9 +23,12 @@ def _overrun(one: CapacityFigures) -> str:
 
 
 def _cure(subject: Subject, *models: CapacityFigures) -> str:
-    change = change_to_fit(subject.profile, models=[one.timing_model for one in models])
+    return _said(change_to_fit(subject.profile, models=[one.timing_model for one in models]))
+
+
+def _said(change: Change | None) -> str:
     if change is None:
-        return "no change of gap count, slice ratio or period alone makes it fit"
+        return "no change of gap count, slice ratio or period alone is a cure"
     return "cheapest cure: " + ", ".join(f"{key} = {value}" for key, value in change.changes.items())
 
 
@@ -50,8 +54,9 @@ def over_utilisation(subject: Subject) -> Iterator[Problem]:
     """The slice is fuller than [limits] allows."""
     limit, one = subject.profile.limits.max_utilisation, subject.deciding
     if limit is not None and one.utilisation > limit:
-        needed_us = one.min_period_us / limit if limit else float("inf")
-        cure = f"a period of {_us(needed_us)} would do" if limit else "no period will do"
+        cure = _said(
+            change_for_room(subject.profile, model=one.timing_model, nodes=one.nodes, utilisation=limit),
+        )
         yield Problem(
             "limits.max_utilisation",
             f"{one.utilisation:.1%} of the slice is used under the {one.timing_model} timing, "
@@ -64,7 +69,7 @@ def too_few_spare_nodes(subject: Subject) -> Iterator[Problem]:
     limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
     spare = one.max_nodes - one.nodes
     if limit is not None and spare < limit:
-        yield Problem("limits.min_spare_nodes", f"{_spare(spare, limit, one)}; limited by {one.limited_by}")
+        yield Problem("limits.min_spare_nodes", f"{_spare(spare, limit, one)}; {_room(subject, one.nodes + limit)}")
 
 
 def too_few_spare_axes(subject: Subject) -> Iterator[Problem]:
@@ -72,11 +77,24 @@ def too_few_spare_axes(subject: Subject) -> Iterator[Problem]:
     limit, one = subject.profile.limits.min_spare_axes, subject.deciding
     spare = one.max_axes - one.axes
     if limit is not None and spare < limit:
-        yield Problem("limits.min_spare_axes", f"{_spare(spare, limit, one)}; limited by {one.limited_by}")
+        nodes = ceil((one.axes + limit) / subject.profile.node.axes)
+        yield Problem("limits.min_spare_axes", f"{_spare(spare, limit, one)}; {_room(subject, nodes)}")
 
 
 def _spare(spare: int, limit: int, one: CapacityFigures) -> str:
     return f"{max(spare, 0)} to spare under the {one.timing_model} timing, {limit} asked for"
+
+
+def _room(subject: Subject, nodes: int) -> str:
+    """What limits the nodes, and how that many would have room."""
+    one = subject.deciding
+    if one.limited_by == "time":
+        cure = _said(change_for_room(subject.profile, model=one.timing_model, nodes=nodes))
+    elif one.limited_by == "hops":
+        cure = f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes"
+    else:
+        cure = f"a second bus has {MAX_NODES:g} more" if one.limited_by == "nodes" else "the payload fits no packet"
+    return f"limited by {one.limited_by}; {cure}"
 
 
 def too_many_nodes(subject: Subject) -> Iterator[Problem]:
@@ -106,9 +124,10 @@ def payload_over_limit(subject: Subject) -> Iterator[Problem]:
     for key in ("read_bytes", "write_bytes"):
         size = getattr(payload, key)
         if size > bus.max_payload_bytes:
-            yield Problem(
-                f"payload.{key}", f"{size} bytes are over the {bus.max_payload_bytes} bytes of a packet at {bus.speed}"
-            )
+            faster = [speed for speed, most in MAX_PAYLOAD_BYTES.items() if size <= most]
+            cure = f'cheapest cure: bus.speed = "{faster[0]}"' if faster else "share it out among several transactions"
+            over = f"{size} bytes are over the {bus.max_payload_bytes} bytes of a packet at {bus.speed}"
+            yield Problem(f"payload.{key}", f"{over}; {cure}")
 
 
 def payload_not_quadlets(subject: Subject) -> Iterator[Problem]:

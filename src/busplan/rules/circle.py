@@ -3,19 +3,14 @@
 They share one run of the test, made only for profiles that say something of servo, circle or tolerance.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from busplan.errors import BusplanError
+from busplan.profile.model import Profile
 from busplan.rules.finding import Problem, Rule, Subject
 
-_SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
-_KEYS: Final = {"stability": "servo.position_gain_per_s"}
-
-
-def asks_for_circle(subject: Subject) -> bool:
-    """Whether the profile says anything that a circle test is for."""
-    return bool(_SECTIONS & subject.profile.model_fields_set)
+_NAMED: Final = ("circle", "servo", "delivery", "cycle")
 
 
 def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
@@ -25,21 +20,40 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
     """
     from busplan.analysis.circle_test import circle_test
 
-    if not asks_for_circle(subject) or not subject.deciding.fits:
+    if not subject.profile.asks_for_circle or not subject.deciding.fits:
         return
     try:
         result = circle_test(subject.profile).results[0]
     except BusplanError as error:
         for message in error.problems:
-            yield "BP203", Problem("servo" if "servo" in subject.profile.model_fields_set else "circle", message)
+            yield "BP203", Problem(_key_of(message, subject.profile), message)
         return
     worst = result.contributions[0] if result.contributions else None
     attack = f"; attack {worst.source} first" if worst is not None and worst.removed_mm > 0 else ""
     for failure in result.failures:
         stability = failure.name in ("stability", "min_phase_margin_deg", "min_gain_margin_db")
-        key = _KEYS.get(failure.name, f"tolerance.{failure.name}")
+        # Margins have default limits: what is not said in the file cannot be where its finding stands.
+        said = failure.name in subject.profile.tolerance.model_fields_set
+        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
         cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else attack
         yield "BP202" if stability else "BP201", Problem(key, f"{failure.text}{cure}")
+
+
+def _key_of(message: str, profile: Profile) -> str:
+    """Key of the value that a message of the servo core begins with, where the file says it."""
+    name = message.partition(" = ")[0]
+    for section in _NAMED:
+        if name in getattr(profile, section).model_fields_set:
+            return f"{section}.{name}"
+    return "servo" if "servo" in profile.model_fields_set else "circle"
+
+
+def answered(subject: Subject, problems: Sequence[tuple[str, Problem]]) -> set[str]:
+    """Codes of the rules that have an answer: none without a test, one alone where the test could not be run."""
+    if subject.profile.asks_for_circle and not subject.deciding.fits:
+        return set()
+    impossible = {code for code, _ in problems if code == "BP203"}
+    return impossible or {rule.code for rule in RULES}
 
 
 RULES: Final = (

@@ -63,10 +63,11 @@ def check_document(document: Document, *, with_circle: bool = True, baseline: Re
         return _result(document, None, list(_of_file(error)), {})
     subject = Subject(LoadedProfile(profile, document))
     found = list(_bus_findings(subject))
-    ran = {rule.code for rule in bus.RULES} | {rule.code for rule in BY_KIND.values()}
+    ran = {rule.code for rule in bus.RULES}
     if with_circle:
-        found += [_placed(subject, RULES[code], problem) for code, problem in circle.circle_problems(subject)]
-        ran |= {rule.code for rule in circle.RULES}
+        problems = list(circle.circle_problems(subject))
+        found += [_placed(subject, RULES[code], problem) for code, problem in problems]
+        ran |= circle.answered(subject, problems)
     if baseline is not None:
         lost = regressions(figures_of(subject), baseline)
         found += [_placed(subject, BASELINE, problem) for problem in lost]
@@ -81,10 +82,11 @@ def _bus_findings(subject: Subject) -> Iterator[Finding]:
                 yield _placed(subject, rule, problem)
 
 
-def unreadable(name: str, error: PlacedError) -> FileResult:
+def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
     """Make the result for a file that is no text."""
+    lines = content.decode("utf-8-sig", errors="replace").split("\n")
     found = tuple(_of_file(error))
-    return FileResult(name, None, found, {}, ("",) * len(found))
+    return FileResult(name, None, found, {}, tuple(lines[one.line - 1] for one in found))
 
 
 def _of_file(error: PlacedError) -> Iterator[Finding]:
@@ -106,5 +108,5 @@ def _placed(subject: Subject, rule: Rule, problem: Problem) -> Finding:
 
 def _result(document: Document, name: str | None, found: list[Finding], figures: dict[str, float]) -> FileResult:
     ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
-    lines = document.text.split("\n")
+    lines = document.text.split("\n") if ordered else []
     return FileResult(document.name, name, ordered, figures, tuple(lines[one.line - 1] for one in ordered))

@@ -34,6 +34,11 @@ SUPPRESSION_WITHOUT_EFFECT: Final = Rule(
     "effect either.",
 )
 
+NEVER_SUPPRESSED: Final = frozenset(
+    rule.code for rule in (*BY_KIND.values(), SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT)
+)
+"""Codes of what must be mended: a file that cannot be read further, and suppressions themselves."""
+
 RULES: Final[Mapping[str, Rule]] = MappingProxyType(
     {
         rule.code: rule

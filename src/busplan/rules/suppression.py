@@ -6,9 +6,10 @@ from typing import Final, NamedTuple
 
 from busplan.profile.document import Document
 from busplan.rules.finding import Finding, Rule
-from busplan.rules.registry import RULES, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON
+from busplan.rules.registry import NEVER_SUPPRESSED, RULES, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON
 
 MARK: Final = "busplan:"
+_ADDRESSED: Final = re.compile(r"#\s*busplan:")
 _COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n]*)\](?P<reason>[^\n]*)")
 
 
@@ -16,6 +17,7 @@ class Suppression(NamedTuple):
     """One comment, and the line that it speaks of."""
 
     codes: tuple[str, ...]
+    """Empty where the comment is addressed to busplan and says nothing that it understands."""
     reason: str
     line: int
     column: int
@@ -27,10 +29,13 @@ def suppressions(document: Document) -> Iterator[Suppression]:
     if MARK not in document.text:
         return
     for offset in document.comments:
-        match = _COMMENT.match(document.text, offset)
-        if match is None:
+        if not _ADDRESSED.match(document.text, offset):
             continue
+        match = _COMMENT.match(document.text, offset)
         line, column = document.lines.line_and_column(offset)
+        if match is None:
+            yield Suppression((), "", line, column, line)
+            continue
         alone = not document.text[document.lines.offset(line, 1) : offset].strip()
         codes = tuple(code.strip() for code in match["codes"].split(","))
         yield Suppression(codes, match["reason"].strip(), line, column, line + 1 if alone else line)
@@ -51,7 +56,10 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
     left = list(found)
     own: list[Finding] = []
     for one in suppressions(document):
-        if not one.reason:
+        if not one.codes:
+            message = "the comment suppresses nothing; write # busplan: ignore[CODE] reason"
+            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))
+        elif not one.reason:
             own.append(
                 _finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason; add why behind the bracket")
             )
@@ -60,6 +68,8 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
             left = [finding for finding in left if finding not in hit]
             if code not in RULES:
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
+            elif code in NEVER_SUPPRESSED:
+                own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code} cannot be suppressed, it must be mended"))
             elif not hit and code in ran:
                 message = f"{code} has nothing to suppress on line {one.of_line}"
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))

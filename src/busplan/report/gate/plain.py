@@ -1,9 +1,14 @@
 """Findings as lines: for people, for editors, and for GitHub's log."""
 
 from collections.abc import Iterator
+from typing import Final
+from unicodedata import category, east_asian_width
 
 from busplan.rules.finding import Finding
 from busplan.rules.report import CheckReport
+
+_WIDEST: Final = 160
+"""Of a line that is longer, `full` shows what stands around the finding."""
 
 
 def printable(text: str) -> str:
@@ -30,15 +35,33 @@ def _full(report: CheckReport) -> Iterator[str]:
     for one in report.located:
         number = str(one.finding.line)
         margin = " " * len(number)
-        before = one.source[: one.finding.column - 1]
-        # Tabs stay tabs in front of the caret, so that it stands below its column at any tab width.
-        indent = "".join("\t" if character == "\t" else " " for character in before)
-        source = "".join(one if one.isprintable() or one == "\t" else " " for one in one.source)
+        source, before = _shown(one.source, one.finding.column - 1)
+        indent = "".join(map(_space, before))
         yield f"{finding_line(one.path, one.finding)}"
         yield f"{margin} |"
         yield f"{number} | {source}"
         yield f"{margin} | {indent}^ {one.finding.rule} ({one.finding.severity})"
         yield ""
+
+
+def _shown(source: str, offset: int) -> tuple[str, str]:
+    """Give a line as it is shown, and what of it stands before an offset."""
+    harmless = "".join(one if one.isprintable() or one == "\t" else " " for one in source)
+    if len(harmless) <= _WIDEST:
+        return harmless, harmless[:offset]
+    start = max(0, min(offset - _WIDEST // 2, len(harmless) - _WIDEST))
+    before = f"{'...' if start else ''}{harmless[start:offset]}"
+    after = harmless[offset : start + _WIDEST]
+    return f"{before}{after}{'...' if start + _WIDEST < len(harmless) else ''}", before
+
+
+def _space(character: str) -> str:
+    """As much space as a character takes; a tab stays one, so that its width does not matter."""
+    if character == "\t":
+        return character
+    if category(character) in ("Mn", "Me"):
+        return ""
+    return "  " if east_asian_width(character) in "WF" else " "
 
 
 def as_github(report: CheckReport) -> str:
@@ -56,9 +79,10 @@ def _github(report: CheckReport) -> Iterator[str]:
             "title": f"{finding.code} {finding.rule}",
         }
         said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
-        yield f"::{finding.severity} {said}::{_escaped(printable(finding.message), property_=False)}"
+        yield f"::{finding.severity} {said}::{_escaped(finding.message, property_=False)}"
 
 
 def _escaped(text: str, *, property_: bool) -> str:
     text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    return text.replace(":", "%3A").replace(",", "%2C") if property_ else text
+    # What GitHub has no escape for commands no terminal either.
+    return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)

@@ -6,6 +6,7 @@ OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0.
 """
 
 import json
+import os
 from pathlib import Path, PurePath
 from typing import Any, Final
 from urllib.parse import quote
@@ -76,11 +77,8 @@ def _result(one: Located) -> dict[str, Any]:
 
 
 def _artifact(path: str) -> dict[str, str]:
-    """Place of a file relative to the working folder, wherever it lies below it."""
-    absolute = Path(path).is_absolute()
-    if absolute:
-        try:
-            path = str(Path(path).relative_to(Path.cwd()))
-        except ValueError:
-            return {"uri": Path(path).as_uri()}
-    return {"uri": quote(PurePath(path).as_posix()), "uriBaseId": "%SRCROOT%"}
+    """Place of a file: relative to the working folder where it lies below it, which its name then says."""
+    pure = PurePath(path)
+    if pure.is_absolute() or ".." in pure.parts:
+        return {"uri": Path(path).resolve().as_uri()}
+    return {"uri": quote(os.fsencode(pure.as_posix())), "uriBaseId": "%SRCROOT%"}

@@ -1,0 +1,103 @@
+"""The execution time that fits measured ones best: a table or a line, plain or robust."""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from statistics import fmean, linear_regression, median
+from typing import Final, Literal
+
+from busplan.errors import BusplanError
+from busplan.profile.bus import LinearExecution, TableExecution
+
+Form = Literal["table", "linear"]
+Method = Literal["mean", "median", "least squares", "Theil-Sen"]
+Groups = Mapping[int, Sequence[float]]
+"""T_exec of the measurements at each payload [us]."""
+
+METHODS: Final[Mapping[tuple[Form, bool], Method]] = {
+    ("table", False): "mean",
+    ("table", True): "median",
+    ("linear", False): "least squares",
+    ("linear", True): "Theil-Sen",
+}
+"""What the fit of a form is, plain and robust."""
+
+_TIME_DECIMALS: Final = 3
+_PER_BYTE_DECIMALS: Final = 6
+"""A nanosecond, also over the largest payload."""
+
+
+def fit_execution(
+    groups: Groups, form: Form, *, robust: bool, grade: Literal["measured", "derived"], source: str
+) -> LinearExecution | TableExecution:
+    """Execution time that fits T_exec by payload, in whole nanoseconds.
+
+    Parameters
+    ----------
+    groups
+        T_exec of the measurements at each payload [us].
+    form
+        "table" or "linear".
+    robust
+        Median at each payload for the mean, the line of Theil and Sen for that of least squares.
+    grade
+        How the execution time is known.
+    source
+        What to call the measurements in messages.
+
+    Raises
+    ------
+    BusplanError
+        A line through one payload, or with a negative part.
+    """
+    if form == "table":
+        times_us = {size: round(time_us, _TIME_DECIMALS) for size, time_us in middles(groups, robust=robust).items()}
+        return TableExecution(
+            kind="table", payload_bytes=tuple(times_us), time_us=tuple(times_us.values()), grade=grade
+        )
+    if len(groups) == 1:
+        raise BusplanError(f"{source}: all payloads are {min(groups)} bytes: a line needs two, or use --form table")
+    base_us, per_byte_us = theil_sen(groups) if robust else least_squares(groups)
+    base_us, per_byte_us = round(base_us, _TIME_DECIMALS), round(per_byte_us, _PER_BYTE_DECIMALS)
+    if base_us < 0 or per_byte_us < 0:
+        line = f"{base_us:g} us + {per_byte_us:g} us/byte * payload"
+        ways = "--form table" if robust else "--form table, or --robust if there are outliers"
+        raise BusplanError(f"{source}: the line is {line}, and no part of an execution time is negative: use {ways}")
+    return LinearExecution(kind="linear", base_us=base_us, per_byte_us=per_byte_us, grade=grade)
+
+
+def middles(groups: Groups, *, robust: bool) -> dict[int, float]:
+    """Mean or median at each payload [us], by payload."""
+    middle = median if robust else fmean
+    return {size: middle(groups[size]) for size in sorted(groups)}
+
+
+def least_squares(groups: Groups) -> tuple[float, float]:
+    """Base [us] and slope [us/byte] of the line of least squares over all measurements.
+
+    Examples
+    --------
+    >>> least_squares({4: [40.0, 42.0], 8: [45.0]})
+    (37.0, 1.0)
+    """
+    points = [(size, value) for size, values in groups.items() for value in values]
+    slope, base = linear_regression(*zip(*points, strict=True))
+    return base, slope
+
+
+def theil_sen(groups: Groups) -> tuple[float, float]:
+    """Base [us] and slope [us/byte] of the line of Theil and Sen through the median at each payload.
+
+    The slope is the median of the slopes between any two payloads, the base the median of what it leaves.
+
+    References
+    ----------
+    P. K. Sen, "Estimates of the regression coefficient based on Kendall's tau", JASA 63 (1968).
+
+    Examples
+    --------
+    >>> theil_sen({4: [40.0], 8: [44.0], 12: [48.0, 48.0, 900.0], 16: [700.0], 20: [56.0]})
+    (36.0, 1.0)
+    """
+    points = list(middles(groups, robust=True).items())
+    slope = median((y2 - y1) / (x2 - x1) for (x1, y1), (x2, y2) in combinations(points, 2))
+    return median(y - slope * x for x, y in points), slope

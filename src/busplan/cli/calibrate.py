@@ -1,0 +1,105 @@
+"""`busplan calibrate`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from busplan.cli.apply import apply_changes, require_own_file
+from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, NodesOption, ProfileArgument, bus_changes
+from busplan.cli.output import emit, emit_text, say
+from busplan.errors import BusplanError
+
+
+def calibrate_command(
+    profile: ProfileArgument,
+    measurements: Annotated[
+        str,
+        typer.Argument(
+            help="CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.",
+            show_default=False,
+        ),
+    ],
+    form: Annotated[
+        Literal["table", "linear"] | None,
+        typer.Option(
+            "--form",
+            help="table: T_exec at each payload; linear: base and us per byte.  [default: as the profile has it]",
+            show_default=False,
+        ),
+    ] = None,
+    timing: Annotated[
+        Literal["paper", "standard"] | None,
+        typer.Option(
+            "--timing",
+            help="Timing model that says what the packets take.  [default: the one that decides in the profile]",
+            show_default=False,
+        ),
+    ] = None,
+    robust: Annotated[
+        bool,
+        typer.Option(
+            "--robust",
+            help="Let no outlier pull: the median at each payload instead of the mean; the line of Theil and Sen "
+            "through these medians instead of least squares.",
+        ),
+    ] = False,
+    nodes: NodesOption = None,
+    gap_count: GapCountOption = None,
+    apply: Annotated[
+        bool,
+        typer.Option(
+            "--apply", help="Write [node.execution] into the profile's file in place, with a comment where it is from."
+        ),
+    ] = False,
+    format_: FormatOption = "table",
+) -> None:
+    """Find the execution time T_exec of a node from measured latencies.
+
+    The CSV file has a header and the columns payload_bytes and latency_us (T_lant, from the request to its last
+    acknowledge, in us), a line for each measurement; repetitions are welcome, lines that begin with # are comments. A
+    column transaction says read or write (write without it).
+
+    T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
+    where the bench was not as the profile. With a column request_and_acknowledge_us, the measured T1+T2, T_exec is
+    T_lant - 2 (T1+T2) as measured, and the report shows how far the timing model is from it. Measurements far from the
+    others are named by their line. Times in us. A report: it exits 0 whatever the figures are.
+
+    Example: busplan calibrate paper-two-node table-1.csv --form linear
+    """
+    if profile == measurements == "-":
+        raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
+    if apply:
+        require_own_file(profile)
+    from busplan.analysis.calibration import calibrate
+    from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
+    from busplan.profile.shipped import load, locate_measurements
+    from busplan.profile.toml import override, read_bytes
+    from busplan.report import calibration as report
+
+    bench = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    path, name, shipped = locate_measurements(measurements)
+    result = calibrate(
+        bench,
+        parse_measurements(read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES), name=name),
+        source=name,
+        timing_model=timing,
+        form=form,
+        robust=robust,
+        # The shipped example holds published figures: what is computed from them is derived.
+        grade="derived" if shipped else "measured",
+    )
+    if apply:
+        note = report.provenance(result, source=Path(name).name)
+        apply_changes(profile, report.execution_changes(result.execution), notes={report.SECTION: note})
+        say(f"wrote [{report.SECTION}] of {profile}; comments of yours beside it are as they were")
+    if format_ == "table":
+        emit(report.calibration_lines(result, source=name))
+        return
+    from busplan.report import documents, text
+
+    emit_text(
+        text.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))
+        if format_ == "json"
+        else text.to_csv(documents.with_profile(bench.name, report.calibration_rows(result)))
+    )

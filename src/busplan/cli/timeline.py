@@ -1,0 +1,205 @@
+"""`busplan timeline`."""
+
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final, Literal
+
+import typer
+
+from busplan.cli.options import (
+    BUS_OPTIONS,
+    GapCountOption,
+    NodesOption,
+    ProfileArgument,
+    bus_changes,
+    periods_us,
+    time_us,
+)
+from busplan.cli.output import emit, emit_text, say, write_file
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.analysis.schedule import Schedule
+    from busplan.timing import TransactionKind
+
+TimelineFormat = Literal["table", "json", "csv", "mermaid", "svg", "png"]
+
+_SUFFIXES: Final[dict[str, TimelineFormat]] = {
+    ".txt": "table",
+    ".json": "json",
+    ".csv": "csv",
+    ".mmd": "mermaid",
+    ".svg": "svg",
+    ".png": "png",
+}
+_PIPE_COLUMNS: Final = 80
+_TRANSACTION: Final = re.compile(r"\s*(?P<kind>read|write)\s*:\s*(?P<node>[0-9]{1,9})\s*")
+
+
+def timeline_command(
+    profile: ProfileArgument,
+    from_: Annotated[
+        str | None,
+        typer.Option(
+            "--from",
+            metavar="TIME",
+            help="Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.",
+            show_default=False,
+        ),
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            "--to",
+            metavar="TIME",
+            help="Show the cycle up to this time, with its unit; beyond its end means its end.",
+            show_default=False,
+        ),
+    ] = None,
+    transaction: Annotated[
+        str | None,
+        typer.Option(
+            "--transaction",
+            metavar="read:N|write:N",
+            help="Show one transaction of one node with its gaps, as read:1; --from and --to may narrow it further.",
+            show_default=False,
+        ),
+    ] = None,
+    period: Annotated[
+        str | None,
+        typer.Option(
+            "--period",
+            metavar="TIME",
+            help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s.",
+            show_default=False,
+        ),
+    ] = None,
+    nodes: NodesOption = None,
+    gap_count: GapCountOption = None,
+    timing: Annotated[
+        Literal["paper", "standard"] | None,
+        typer.Option(
+            "--timing",
+            help="Timing model: the paper's equations as published, or the standard's clock and packets. "
+            "A cycle has one.  [default: the profile's bus.timing_model, which decides]",
+            show_default=False,
+        ),
+    ] = None,
+    format_: Annotated[
+        TimelineFormat | None,
+        typer.Option(
+            "--format",
+            help="Form of the document. png needs the extra plot, and --output.  "
+            "[default: what the name of --output says, else table]",
+            show_default=False,
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write it to FILE instead of standard output: .svg, .png, .mmd (mermaid), .json, .csv or .txt.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Show one communication cycle as events, node by node and to scale.
+
+    The synchronous packet, a read and then a write of every node with each arbitration, packet, acknowledge, execution
+    and gap, the non-periodic window, and what is left of the slice. It is the second way to the time that capacity
+    gives in closed form. A cycle that overruns its slice is drawn whole, and said. Every node is charged the hops of
+    the farthest. Times are in us. A report: it exits 0 whatever the figures are.
+
+    Example: busplan timeline paper-4ms --transaction read:1
+    """
+    chosen = _format(format_, output)
+    from_us = None if from_ is None else time_us(from_, option="--from")
+    to_us = None if to is None else time_us(to, option="--to")
+    if from_us is not None and to_us is not None and from_us >= to_us:
+        raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
+    from busplan.analysis.schedule import schedule, zoom
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    asked_us = periods_us([period], plan) if period is not None else None
+    if asked_us is not None:
+        plan = override(plan, {"cycle.period_us": asked_us[0]})
+    one = None if transaction is None else _transaction(transaction, nodes=plan.bus.nodes)
+    shown = zoom(schedule(plan, model=timing), from_us=from_us, to_us=to_us, transaction=one)
+    _write(shown, chosen, output)
+
+
+def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineFormat:
+    """The form that is asked for, by name or by the file's ending; what cannot be drawn is said before any work."""
+    chosen = format_
+    if chosen is None:
+        chosen = "table" if output is None else _SUFFIXES.get(output.suffix.lower())
+    if chosen is None:
+        raise BusplanError(f"--output {output}: expected a name ending in {', '.join(_SUFFIXES)}, or --format")
+    if chosen == "png":
+        if output is None:
+            raise BusplanError("--format png: a picture does not go to standard output; give -o FILE.png")
+        from busplan.report.plot import require_matplotlib
+
+        require_matplotlib("--format png")
+    return chosen
+
+
+def _transaction(text: str, *, nodes: int) -> "tuple[TransactionKind, int]":
+    match = _TRANSACTION.fullmatch(text)
+    if match is None or not 1 <= int(match["node"]) <= nodes:
+        raise BusplanError(
+            f"--transaction {text}: expected read or write and a node from 1 to {nodes}, as read:1 or write:{nodes}"
+        )
+    return ("read" if match["kind"] == "read" else "write"), int(match["node"])
+
+
+def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> None:
+    if chosen == "table" and output is None:
+        from busplan.report.timeline.terminal import timeline_lines
+
+        emit(timeline_lines(shown, width=_columns()))
+    elif output is None:
+        emit_text(_text(shown, chosen))
+    else:
+        if chosen == "png":
+            from busplan.report.timeline.png import timeline_png
+
+            content = timeline_png(shown)
+        else:
+            content = _text(shown, chosen).encode()
+        write_file(output, content, overwrite=True)
+        say(f"wrote {output}")
+
+
+def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
+    """The document in one of the forms that are text."""
+    if chosen == "table":
+        from busplan.report.timeline.terminal import timeline_lines
+
+        return "".join(f"{line.text}\n" for line in timeline_lines(shown, width=_PIPE_COLUMNS))
+    if chosen == "svg":
+        from busplan.report.timeline.svg import timeline_svg
+
+        return timeline_svg(shown)
+    if chosen == "mermaid":
+        from busplan.report.timeline.mermaid import timeline_mermaid
+
+        return timeline_mermaid(shown)
+    from busplan.report import text
+    from busplan.report.timeline.documents import timeline_document, timeline_rows
+
+    return text.to_json(timeline_document(shown)) if chosen == "json" else text.to_csv(timeline_rows(shown))
+
+
+def _columns() -> int:
+    """Width of the terminal; in a pipe the drawing is the same wherever it runs."""
+    if sys.stdout is None or not sys.stdout.isatty():
+        return _PIPE_COLUMNS
+    from shutil import get_terminal_size
+
+    return get_terminal_size((_PIPE_COLUMNS, 24)).columns

@@ -1,0 +1,219 @@
+"""Measured latencies from CSV text: every problem of the file at its line and column, all at once."""
+
+import re
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+from typing import Final, NamedTuple
+
+from busplan.errors import PlacedError, PlacedProblem, ProblemKind
+from busplan.profile.document import Lines
+from busplan.profile.sections import MAX_COUNT, MAX_TIME_US
+from busplan.timing import TRANSACTION_KINDS, TransactionKind
+
+MAX_MEASUREMENTS_BYTES: Final = 20_000_000
+"""About a million measurements. More is some other file."""
+
+REQUIRED_COLUMNS: Final = ("payload_bytes", "latency_us")
+OPTIONAL_COLUMNS: Final = ("transaction", "request_and_acknowledge_us")
+_COLUMNS: Final = (*REQUIRED_COLUMNS, *OPTIONAL_COLUMNS)
+_EXPECTED: Final = f"expected {','.join(REQUIRED_COLUMNS)} and, where known, {','.join(OPTIONAL_COLUMNS)}"
+
+_MOST_SHOWN: Final = 50
+_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_OTHER_DELIMITER: Final = re.compile(r"[;\t|]|(?<=[a-z]) +(?=[a-z])")
+_DELIMITER_NAMES: Final = {"\t": "tabs", ";": "semicolons", "|": "bars"}
+_QUANTITY: Final = re.compile(r"(?P<quantity>payload|latency|request_and_acknowledge)(?P<unit>.*)")
+_TIMES: Final = {
+    **dict.fromkeys(("", "usec", "µs", "μs"), ""),  # the micro sign, and the Greek letter that looks like it
+    **dict.fromkeys(("ms", "msec"), "multiply by 1000"),
+    **dict.fromkeys(("s", "sec"), "multiply by 1000000"),
+    "ns": "divide by 1000",
+}
+_SIZES: Final = {"": "", "byte": "", "b": "", "bits": "divide by 8", "quadlets": "multiply by 4"}
+"""How to get from a unit that people write to ours; nothing where it may be ours."""
+
+
+class Measurement(NamedTuple):
+    """One measured transaction, or the mean of many."""
+
+    line: int
+    """Where it stands, counted from 1."""
+    transaction: TransactionKind
+    payload_bytes: int
+    latency_us: float
+    """T_lant, measured."""
+    request_and_acknowledge_us: float | None
+    """T1 + T2, where measured."""
+
+
+class _Cell(NamedTuple):
+    """One value of a line, without space and quotes around it."""
+
+    text: str
+    column: int
+
+
+def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
+    r"""Read measurements from the bytes of a CSV file.
+
+    The first line that is neither empty nor a comment (#) is the header. Columns are payload_bytes and latency_us, and
+    where known transaction (read or write; write without it) and request_and_acknowledge_us, the measured T1 + T2; in
+    any order. Commas between values, a point in numbers.
+
+    Parameters
+    ----------
+    content
+        The file.
+    name
+        What to call it in messages.
+
+    Returns
+    -------
+    tuple
+        Measurements in the order of the file, at least one.
+
+    Raises
+    ------
+    PlacedError
+        Anything that is wrong with the file, with its place.
+
+    Examples
+    --------
+    >>> parse_measurements(b"payload_bytes,latency_us\n4,48.7\n", name="bench.csv")[0].latency_us
+    48.7
+    """
+    rows = list(_rows(_decoded(content, name=name)))
+    if not rows:
+        raise PlacedError(name, (PlacedProblem(1, 1, "missing-key", f"no header; {_EXPECTED}"),))
+    line, header = rows[0]
+    problems = list(_header_problems(line, header))
+    if problems:
+        raise PlacedError(name, tuple(problems))
+    columns = [cell.text for cell in header]
+    found = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows[1:]]
+    problems = sorted(one for each in found if isinstance(each, list) for one in each)
+    if problems:
+        raise PlacedError(name, tuple(problems[:_MOST_SHOWN]), hidden=max(0, len(problems) - _MOST_SHOWN))
+    measurements = tuple(each for each in found if isinstance(each, Measurement))
+    if not measurements:
+        raise PlacedError(name, (PlacedProblem(line, 1, "missing-key", "no measurement below the header"),))
+    return measurements
+
+
+def _decoded(content: bytes, *, name: str) -> str:
+    if len(content) > MAX_MEASUREMENTS_BYTES:
+        message = f"the file is larger than {MAX_MEASUREMENTS_BYTES:,} bytes; give fewer repetitions"
+        raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = content[: error.start].decode("utf-8-sig")
+        line, column = Lines(before + "?").line_and_column(len(before))
+        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; save it as CSV in UTF-8"
+        raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
+
+
+def _rows(text: str) -> Iterator[tuple[int, list[_Cell]]]:
+    """Lines that hold values, with their number."""
+    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
+        values = line.partition("#")[0]
+        if values.strip():
+            yield number, list(_cells(values))
+
+
+def _cells(values: str) -> Iterator[_Cell]:
+    column = 1
+    for written in values.split(","):
+        text = written.strip()
+        start = column + len(written) - len(written.lstrip())
+        quoted = len(text) > 1 and text[0] == text[-1] == '"'
+        yield _Cell(text[1:-1].strip() if quoted else text, start)
+        column += len(written) + 1
+
+
+def _header_problems(line: int, header: Sequence[_Cell]) -> Iterator[PlacedProblem]:
+    def problem(cell: _Cell, message: str, kind: ProblemKind = "unknown-key") -> PlacedProblem:
+        return PlacedProblem(line, cell.column, kind, message)
+
+    names = [cell.text for cell in header]
+    other = _OTHER_DELIMITER.search(names[0])
+    if other and len(names) == 1:
+        delimiter = _DELIMITER_NAMES.get(other.group(), "spaces")
+        message = f"{delimiter} between the columns; expected commas, and a point in numbers: 4,48.7"
+        yield problem(header[0], message, "syntax")
+        return
+    if all(_NUMBER.fullmatch(name) for name in names):
+        yield problem(header[0], f"the first line has no names of columns; {_EXPECTED}", "missing-key")
+        return
+    for index, cell in enumerate(header):
+        if cell.text in names[:index]:
+            yield problem(cell, f"column {cell.text} is there twice", "inconsistent")
+        elif cell.text not in _COLUMNS:
+            yield problem(cell, f"column {_shown(cell.text)}: {_meant(cell.text)}")
+    for name in REQUIRED_COLUMNS:
+        # A column under another name or in another unit has had its say.
+        if name not in names and not any(_is_about(other, name) for other in names if other not in _COLUMNS):
+            yield problem(header[0], f"column {name} is missing; {_EXPECTED}", "missing-key")
+
+
+def _is_about(written: str, name: str) -> bool:
+    return written.strip().lower().startswith(name.partition("_")[0])
+
+
+def _meant(written: str) -> str:
+    """Say what to do about a column that is none of ours."""
+    match = _QUANTITY.fullmatch(written.strip().lower())
+    if match:
+        quantity = match["quantity"]
+        name = next(one for one in _COLUMNS if one.startswith(quantity))
+        unit = match["unit"].strip(" _-.,()[]/")
+        units = _SIZES if quantity == "payload" else _TIMES
+        own = name.rpartition("_")[2]
+        if units.get(unit):
+            return f"its unit looks like {unit}; give {own} in a column {name} ({units[unit]})"
+        if unit in units or unit == own:
+            return f"call it {name} if it is in {own}"
+    close = get_close_matches(written.lower(), _COLUMNS, n=1)
+    return f"unknown; did you mean {close[0]}?" if close else f"unknown; {_EXPECTED}"
+
+
+def _measurement(
+    line: int, values: dict[str, _Cell], cells: Sequence[_Cell], columns: Sequence[str]
+) -> Measurement | list[PlacedProblem]:
+    """Make a measurement of one line, or say all that is wrong with it."""
+    if len(cells) != len(columns):
+        hint = "; is there a decimal comma? Write 48.7" if len(cells) > len(columns) else ""
+        message = f"{len(cells)} value{'s' * (len(cells) > 1)} for {len(columns)} columns{hint}"
+        return [PlacedProblem(line, 1, "inconsistent", message)]
+    problems: list[PlacedProblem] = []
+
+    def refuse(name: str, kind: ProblemKind, message: str) -> None:
+        cell = values[name]
+        problems.append(PlacedProblem(line, cell.column, kind, f"{name} {_shown(cell.text)}: {message}"))
+
+    def number(name: str, *, most: float) -> float:
+        text = values[name].text
+        value = float(text) if _NUMBER.fullmatch(text) else None
+        if value is None:
+            refuse(name, "wrong-type", "expected a number with a point, as 48.7")
+        elif not 0 < value <= most:
+            refuse(name, "out-of-range", f"must be greater than 0 and no more than {most:,.12g}")
+        elif name == "payload_bytes" and not value.is_integer():
+            refuse(name, "wrong-type", "must be a whole number")
+        return value or 0.0
+
+    payload_bytes = number("payload_bytes", most=MAX_COUNT)
+    latency_us = number("latency_us", most=MAX_TIME_US)
+    half_name = "request_and_acknowledge_us"
+    half_us = number(half_name, most=MAX_TIME_US) if half_name in values else None
+    kind = values["transaction"].text.lower() if "transaction" in values else "write"
+    transaction = next((one for one in TRANSACTION_KINDS if one == kind), None)
+    if transaction is None:
+        refuse("transaction", "out-of-range", "expected read or write")
+        return problems
+    return problems or Measurement(line, transaction, int(payload_bytes), latency_us, half_us)
+
+
+def _shown(text: str) -> str:
+    """Show a value as written, kept short."""
+    return repr(text if len(text) <= 40 else f"{text[:40]}...")  # noqa: PLR2004

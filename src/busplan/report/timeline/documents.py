@@ -1,0 +1,45 @@
+"""A timeline as plain data: what `--format json` and `--format csv` write."""
+
+from busplan.analysis.schedule import Schedule, totals
+from busplan.report.documents import Document, Row, document
+from busplan.report.timeline.kinds import KINDS
+from busplan.report.words import warnings
+
+
+def event_rows(plan: Schedule) -> list[Row]:
+    """One row an event of the window."""
+    return [
+        {**event._asdict(), "duration_us": event.duration_us, "equation": KINDS[event.kind].equation}
+        for event in plan.events
+    ]
+
+
+def timeline_rows(plan: Schedule) -> list[Row]:
+    """Rows for CSV: profile and model in front."""
+    head = {"profile": plan.profile.name, "timing_model": plan.figures.timing_model}
+    return [{**head, **row} for row in event_rows(plan)]
+
+
+def timeline_document(plan: Schedule) -> Document:
+    """Answer of `busplan timeline`: the figures are those of the whole cycle, events and totals those of the window."""
+    figures = plan.figures
+    return document(
+        "timeline",
+        profile=plan.profile.name,
+        timing_model=figures.timing_model,
+        period_us=figures.period_us,
+        nodes=figures.nodes,
+        hops=figures.hops,
+        gap_count=figures.gap_count,
+        required_us=figures.required_us,
+        available_us=figures.available_us,
+        margin_us=figures.margin_us,
+        exceeded=list(figures.exceeded),
+        fits=figures.fits,
+        gap_count_safe=figures.gap_count_safe,
+        warnings=warnings(plan.profile, nodes=figures.nodes, most=0),
+        from_us=plan.from_us,
+        to_us=plan.to_us,
+        events=event_rows(plan),
+        totals=[one._asdict() for one in totals(plan)],
+    )

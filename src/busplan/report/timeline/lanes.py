@@ -1,0 +1,144 @@
+"""What every drawing of a timeline shares: its words, its lanes and its scale."""
+
+from collections.abc import Sequence
+from math import ceil, floor, log10
+from typing import Final, NamedTuple
+
+from busplan.analysis.schedule import Event, EventKind, Schedule
+from busplan.report.lines import plural, us
+from busplan.report.timeline.kinds import event_label, event_title
+from busplan.report.words import period, story
+from busplan.timing import TransactionKind
+
+MOST_EVENT_LANES: Final = 20
+"""Up to this many events are drawn in a row each; more of them in a row for each node. One node's whole cycle is 20."""
+
+
+class Lane(NamedTuple):
+    """One row of a drawing."""
+
+    label: str
+    events: tuple[Event, ...]
+
+
+class Tick(NamedTuple):
+    """One mark of a scale."""
+
+    at_us: float
+    label: str
+
+
+class Stretch(NamedTuple):
+    """Neighbouring events that belong together at a coarse look: one transaction of a cycle, or one bus event."""
+
+    kind: EventKind | TransactionKind
+    event: Event
+    """From its start to its end."""
+
+
+def headline(plan: Schedule) -> str:
+    """Say whether the cycle fits, and under which model."""
+    figures = plan.figures
+    subject = f"{plan.profile.name} at {period(figures.period_us)}"
+    return f"{subject}: {story(figures, plan.profile)} ({figures.timing_model} model)."
+
+
+def subject(plan: Schedule) -> str:
+    """Say what is shown: how many nodes, and which part of the cycle."""
+    figures = plan.figures
+    bus = f"{plural(figures.nodes, 'node')}, {plural(figures.hops, 'hop')}, gap count {figures.gap_count}"
+    return f"{bus}; {us(plan.from_us)} to {us(plan.to_us)} us of the cycle"
+
+
+def overruns(plan: Schedule) -> bool:
+    """Whether the cycle takes more than its slice."""
+    return "time" in plan.figures.exceeded
+
+
+def beyond(plan: Schedule) -> Event:
+    """What of a cycle that overruns lies beyond its slice."""
+    return plan.cycle_events[-1]._replace(start_us=plan.figures.available_us, end_us=plan.end_us)
+
+
+def strip_title(plan: Schedule) -> str:
+    """Say what the strip above the lanes shows."""
+    slice_us = us(plan.figures.available_us)
+    if overruns(plan):
+        return f"The cycle of {us(plan.end_us)} us, beyond its slice of {slice_us} us"
+    return f"The slice of {slice_us} us"
+
+
+def drawn_window(plan: Schedule) -> Schedule:
+    """The part that the lanes show: without a window, what the cycle uses; the strip above shows what it leaves."""
+    return plan._replace(to_us=plan.used_us) if plan.is_whole else plan
+
+
+def has_event_lanes(plan: Schedule) -> bool:
+    """Whether there are so few events that each has its own lane."""
+    return len(plan.events) <= MOST_EVENT_LANES
+
+
+def node_lanes(plan: Schedule) -> tuple[Lane, ...]:
+    """A lane for the bus, and one for each node that is at work in the window."""
+    lanes: dict[str, list[Event]] = {}
+    for event in plan.events:
+        lanes.setdefault("bus" if event.node is None else f"node {event.node}", []).append(event)
+    # The bus lane first, wherever the window begins; the nodes follow in the order of their turns.
+    order = sorted(lanes, key=lambda label: (label != "bus", int(label.split()[-1]) if label != "bus" else 0))
+    return tuple(Lane(label, tuple(lanes[label])) for label in order)
+
+
+def only_owner(plan: Schedule) -> str | None:
+    """Name the transaction that all events of the window belong to, if there is one."""
+    owners = {(event.transaction, event.node) for event in plan.events}
+    ((kind, node), *others) = owners
+    return None if others or node is None else f"{kind} of node {node}"
+
+
+def event_lanes(plan: Schedule) -> tuple[Lane, ...]:
+    """A lane for each event; whose it is, is said where it is not the same for all."""
+    write = event_title if only_owner(plan) is None else event_label
+    return tuple(Lane(write(event), (event,)) for event in plan.events)
+
+
+def stretches(events: Sequence[Event]) -> tuple[Stretch, ...]:
+    """Put the events of each transaction together."""
+    found: list[Stretch] = []
+    owner: tuple[object, object] | None = None
+    for event in events:
+        if event.node is not None and (event.node, event.transaction) == owner:
+            whole = found[-1].event._replace(end_us=event.end_us)
+            found[-1] = found[-1]._replace(event=whole)
+            continue
+        owner = (event.node, event.transaction)
+        found.append(Stretch(event.transaction or event.kind, event))
+    return tuple(found)
+
+
+def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
+    """Round marks inside a window, 1, 2 or 5 times a power of ten apart.
+
+    Parameters
+    ----------
+    from_us, to_us
+        The window [us].
+    most
+        Most marks, 1 or more.
+
+    Examples
+    --------
+    >>> [tick.label for tick in ticks(0.4, 51.0, most=6)]
+    ['10', '20', '30', '40', '50']
+    >>> [tick.label for tick in ticks(0.0, 0.3, most=4)]
+    ['0.0', '0.1', '0.2', '0.3']
+    """
+    # A step that is longer than this meets the window no more often than `most`, wherever the window begins.
+    smallest_us = (to_us - from_us) / most * (1 + 1e-6)
+    magnitude = floor(log10(smallest_us))
+    factor, power = next(
+        (one, magnitude + add) for add in (0, 1) for one in (1, 2, 5) if one * 10.0 ** (magnitude + add) > smallest_us
+    )
+    step_us = factor * 10.0**power
+    first, last = ceil(from_us / step_us - 1e-9), floor(to_us / step_us + 1e-9)
+    decimals = max(0, -power)
+    return tuple(Tick(number * step_us, f"{number * step_us:.{decimals}f}") for number in range(first, last + 1))

@@ -1,0 +1,209 @@
+"""Calibration: what the model put in comes out again, against NumPy and SciPy where there is a choice."""
+
+from collections.abc import Callable
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import theilslopes
+
+from busplan.analysis.calibration import Calibration, calibrate
+from busplan.analysis.latency import phases
+from busplan.errors import BusplanError
+from busplan.profile.bus import LinearExecution, TableExecution
+from busplan.profile.measurements import Measurement, parse_measurements
+from busplan.profile.model import Profile
+from busplan.profile.shipped import load, locate_measurements
+from busplan.timing import TRANSACTION_KINDS, TimingModelName
+
+Make = Callable[..., Profile]
+MODELS: tuple[TimingModelName, ...] = ("paper", "standard")
+
+
+def table_1() -> tuple[Measurement, ...]:
+    return parse_measurements(locate_measurements("table-1.csv").path.read_bytes(), name="table-1.csv")
+
+
+def written(rows: list[tuple[int, float]]) -> list[Measurement]:
+    return [Measurement(line, "write", size, value, None) for line, (size, value) in enumerate(rows, start=2)]
+
+
+def of_execution(
+    profile: Profile, rows: list[tuple[int, float]], model: TimingModelName = "standard"
+) -> list[Measurement]:
+    """Measurements whose T_exec is known."""
+    plain = profile.model_copy(
+        update={
+            "node": profile.node.model_copy(
+                update={"execution": LinearExecution(kind="linear", base_us=0, per_byte_us=0)}
+            )
+        }
+    )
+    return written(
+        [(size, value + phases(plain, "write", model=model, payload_bytes=size).latency_us) for size, value in rows]
+    )
+
+
+def run(profile: Profile, measurements: list[Measurement] | tuple[Measurement, ...], **options: object) -> Calibration:
+    return calibrate(profile, measurements, source="m.csv", **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.parametrize("model", [None, *MODELS])
+def test_table_1_gives_the_table_of_the_shipped_profile(robust: bool, model: TimingModelName | None) -> None:
+    bench = load("paper-two-node").profile
+    result = run(bench, table_1(), robust=robust, timing_model=model, grade="derived")
+    assert result.execution == bench.node.execution
+    assert (result.way, result.rms_residual_us, result.outliers) == ("measured-halves", 0, ())
+
+
+def test_what_the_model_leaves_of_table_1_is_measured_less_equation_13() -> None:
+    bench = load("paper-two-node").profile
+    result = run(bench, table_1())
+    for fit in result.payloads:
+        modelled = phases(bench, "write", model="paper", payload_bytes=fit.payload_bytes).request_and_acknowledge_us
+        assert fit.request_and_acknowledge_us is not None
+        assert fit.unexplained_us == pytest.approx(fit.request_and_acknowledge_us - modelled, abs=1e-12)
+    assert result.payloads[0].unexplained_us == pytest.approx(6 - 3.1849619, abs=1e-6)
+
+
+@given(data=st.data())
+def test_latencies_of_a_profile_give_its_own_execution_time(
+    any_profile: st.SearchStrategy[Profile], data: st.DataObject
+) -> None:
+    profile = data.draw(any_profile)
+    model = data.draw(st.sampled_from(MODELS))
+    sizes = data.draw(st.lists(st.integers(1, profile.bus.max_payload_bytes), min_size=2, max_size=8, unique=True))
+    measurements = [
+        Measurement(line, kind, size, phases(profile, kind, model=model, payload_bytes=size).latency_us, None)
+        for line, (size, kind) in enumerate(((size, kind) for size in sizes for kind in TRANSACTION_KINDS), start=2)
+    ]
+    own = profile.node.execution
+    for robust in (False, True):
+        line = run(profile, measurements, timing_model=model, robust=robust).execution
+        assert isinstance(line, LinearExecution)
+        assert isinstance(own, LinearExecution)
+        assert line.base_us == pytest.approx(own.base_us, abs=2e-3)
+        assert line.per_byte_us == pytest.approx(own.per_byte_us, abs=2e-6)
+        result = run(profile, measurements, timing_model=model, robust=robust, form="table")
+        assert isinstance(result.execution, TableExecution)
+        assert result.execution.payload_bytes == tuple(sorted(sizes))
+        assert result.execution.time_us == pytest.approx([own.execution_us(size) for size in sorted(sizes)], abs=1e-3)
+        assert all(abs(fit.read_less_write_us or 0) < 1e-5 for fit in result.payloads)
+        assert not result.outliers
+
+
+points = st.lists(st.tuples(st.integers(1, 2048), st.floats(0, 500)), min_size=2, max_size=30)
+
+
+@given(points=points)
+def test_lines_agree_with_numpy_and_scipy(make: Make, points: list[tuple[int, float]]) -> None:
+    profile = make()
+    measurements = of_execution(profile, points)
+    sizes = sorted({size for size, _ in points})
+    if len(sizes) == 1:
+        with pytest.raises(BusplanError, match=r"all payloads are .* bytes: a line needs two, or use --form table"):
+            run(profile, measurements)
+        return
+    slope, base = np.polyfit([size for size, _ in points], [value for _, value in points], 1)
+    medians = [float(np.median([value for one, value in points if one == size])) for size in sizes]
+    sen = theilslopes(medians, sizes, method="joint").slope
+    sen_base = float(np.median(np.array(medians) - sen * np.array(sizes)))
+    for robust, one, other in ((False, base, slope), (True, sen_base, sen)):
+        if round(one, 3) < 0 or round(other, 6) < 0:
+            with pytest.raises(BusplanError, match="no part of an execution time is negative"):
+                run(profile, measurements, robust=robust)
+            continue
+        line = run(profile, measurements, robust=robust).execution
+        assert isinstance(line, LinearExecution)
+        assert (line.base_us, line.per_byte_us) == pytest.approx((one, other), abs=2e-3)
+
+
+@given(points=points)
+def test_figures_by_payload_and_residuals_agree_with_numpy(make: Make, points: list[tuple[int, float]]) -> None:
+    result = run(make(), of_execution(make(), points), form="table")
+    for fit in result.payloads:
+        own = np.array([value for size, value in points if size == fit.payload_bytes])
+        assert fit.measurements == len(own)
+        assert fit.execution_us == pytest.approx(own.mean(), abs=1e-5)
+        assert fit.range_us == pytest.approx(np.ptp(own), abs=1e-5)
+        assert fit.fitted_us == round(fit.execution_us, 3)
+        if len(own) > 1:
+            assert fit.deviation_us == pytest.approx(own.std(ddof=1), abs=1e-5)
+        else:
+            assert fit.deviation_us is None
+    residuals = np.array([one.residual_us for one in result.residuals])
+    assert result.rms_residual_us == pytest.approx(np.sqrt((residuals**2).mean()))
+    assert abs(result.largest.residual_us) == pytest.approx(abs(residuals).max())
+
+
+@pytest.mark.parametrize("form", ["table", "linear"])
+def test_outliers_are_named_and_do_not_pull_a_robust_fit(make: Make, form: str) -> None:
+    random = Random(1)
+    rows = [(size, 30 + 0.35 * size + random.gauss(0, 0.2)) for size in (4, 64, 256, 1024) for _ in range(9)]
+    bad = {3: 900.0, 17: 1.0, 35: 700.0}
+    spoilt = [(size, bad.get(index, value)) for index, (size, value) in enumerate(rows)]
+    profile = make()
+    plain, robust, clean = (
+        run(profile, of_execution(profile, data), form=form, robust=one)
+        for data, one in ((spoilt, False), (spoilt, True), (rows, False))
+    )
+    assert {one.line for one in plain.outliers} == {one.line for one in robust.outliers} == {5, 19, 37}
+    assert len(clean.outliers) == 0
+    for size in (4, 64, 256, 1024):
+        assert robust.execution.execution_us(size) == pytest.approx(clean.execution.execution_us(size), abs=0.5)
+        if form == "table" and size in (4, 64, 1024):
+            assert abs(plain.execution.execution_us(size) - clean.execution.execution_us(size)) > 5
+
+
+@pytest.mark.parametrize("form", ["table", "linear"])
+def test_wide_but_even_scatter_has_no_outliers(make: Make, form: str) -> None:
+    rows = [(size, 100.0 + size + away) for size in (4, 64) for away in (-20, -10, 0, 10, 20)]
+    assert run(make(), of_execution(make(), rows), form=form).outliers == ()
+
+
+def test_steps_of_a_timer_are_no_outliers(make: Make) -> None:
+    rows = [(4, 48.0)] * 20 + [(4, 48.1)]
+    assert run(make(), of_execution(make(), rows), form="table").outliers == ()
+
+
+def test_a_latency_below_its_packets_is_refused_each_with_its_line(make: Make) -> None:
+    need = phases(
+        make(node__execution__base_us=0.0, node__execution__per_byte_us=0.0), "write", model="standard", payload_bytes=4
+    )
+    with pytest.raises(BusplanError) as raised:
+        run(make(), written([(4, 50.0), (4, 0.05), (4, need.latency_us - 1e-6), (4, need.latency_us)]))
+    needed = f"is below the {need.latency_us:.3f} us that the packets alone take in the standard model"
+    assert raised.value.problems == (
+        f"m.csv:3: latency 0.05 us at 4 bytes {needed}",
+        f"m.csv:4: latency {need.latency_us:g} us at 4 bytes {needed}",
+    )
+
+
+def test_latencies_in_ms_are_asked_about(make: Make) -> None:
+    with pytest.raises(BusplanError, match="every latency is too short: is latency_us in us"):
+        run(make(), written([(4, 0.0487), (16, 0.0489)]))
+
+
+def test_a_latency_below_its_own_halves_is_refused(make: Make) -> None:
+    with pytest.raises(
+        BusplanError, match=r"m.csv:2: latency 11 us at 4 bytes is below the 12.000 us that twice its T1"
+    ):
+        run(make(), [Measurement(2, "write", 4, 11.0, 6.0)])
+
+
+def test_a_payload_that_no_packet_carries_is_refused(make: Make) -> None:
+    with pytest.raises(BusplanError, match=r"m.csv:2: payload 513 bytes is over the 512 bytes of S100"):
+        run(make(bus__speed="S100"), written([(513, 500.0)]))
+
+
+def test_the_profile_gives_form_model_and_distance(make: Make) -> None:
+    own = {"kind": "table", "payload_bytes": [4, 64], "time_us": [30.0, 50.0]}
+    near, far = (
+        run(make(node__execution=own, bus__nodes=nodes, bus__timing_model="paper"), written([(12, 60)]))
+        for nodes in (1, 8)
+    )
+    assert (near.timing_model, near.execution.kind, near.way, near.method) == ("paper", "table", "timing-model", "mean")
+    assert near.payloads[0].packets_us < far.payloads[0].packets_us

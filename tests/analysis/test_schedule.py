@@ -1,0 +1,187 @@
+"""The schedule against the closed form, against exact arithmetic, and against what a schedule is."""
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.capacity import figures
+from busplan.analysis.latency import BOTH_MODELS, phases
+from busplan.analysis.schedule import MOST_NODES, schedule, totals, zoom
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.shipped import load, shipped_names
+from busplan.timing import TRANSACTION_KINDS
+
+Maker = Callable[..., Profile]
+Exact = Callable[[Profile, str, int], Fraction]
+SOME = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+MOST_REQUIRED_US = 1e6
+
+
+@SOME
+@given(data=st.data())
+def test_the_last_event_ends_at_the_closed_forms_required_time(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile], exact: Exact
+) -> None:
+    profile = data.draw(any_profile)
+    for model in BOTH_MODELS:
+        plan = schedule(profile, model=model)
+        assert plan.figures == figures(profile, model=model)
+        assert plan.figures.required_us < MOST_REQUIRED_US
+        assert abs(plan.used_us - plan.figures.required_us) <= 1e-9
+        # The addition itself is better than that: a unit in the last place of the exact sum of rounded phases.
+        assert abs(plan.used_us - float(exact(profile, model, profile.bus.nodes))) <= 1e-9
+
+
+@SOME
+@given(data=st.data())
+def test_events_touch_and_cover_the_slice_or_overrun_it(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    plan = schedule(data.draw(any_profile))
+    events = plan.events
+    assert events[0].start_us == 0
+    assert all(one.end_us == other.start_us for one, other in pairwise(events))
+    assert all(one.start_us < one.end_us for one in events)
+    idle = [one for one in events if one.kind == "idle"]
+    if "time" in plan.figures.exceeded:
+        assert idle == []
+        assert plan.end_us > plan.figures.available_us
+    elif idle:
+        assert idle == [events[-1]]
+        assert plan.end_us == plan.figures.available_us
+        assert idle[0].duration_us == pytest.approx(plan.figures.margin_us, abs=1e-9)
+
+
+@pytest.mark.parametrize("model", BOTH_MODELS)
+@pytest.mark.parametrize("name", shipped_names())
+def test_every_phase_of_a_shipped_profile_stands_in_the_order_of_the_protocol(name: str, model: Any) -> None:
+    profile = load(name).profile
+    plan = schedule(profile, model=model)
+    wanted: list[tuple[object, ...]] = [("sync", None, None, None)]
+    for kind in ("read", "write"):
+        for node in range(1, profile.bus.nodes + 1):
+            wanted += [
+                ("arbitration", node, kind, "request"),
+                ("request_data", node, kind, "request"),
+                ("acknowledge", node, kind, "request"),
+                ("execution", node, kind, None),
+                ("arbitration", node, kind, "response"),
+                ("response_data", node, kind, "response"),
+                ("acknowledge", node, kind, "response"),
+                ("subaction_gap", node, kind, None),
+                ("arbitration_reset_gap", node, kind, None),
+            ]
+    if profile.cycle.nonperiodic_us:
+        wanted.append(("nonperiodic", None, None, None))
+    wanted.append(("idle", None, None, None))
+    assert [one[:4] for one in plan.events] == wanted
+    read = phases(profile, "read", model=model, payload_bytes=profile.payload.read_bytes)
+    first = plan.events[1:10]
+    assert sum(one.duration_us for one in first[:7]) == pytest.approx(read.latency_us)
+    assert sum(one.duration_us for one in first[7:]) == pytest.approx(read.gaps_us)
+
+
+def test_figure_4_of_the_paper_by_hand(make: Maker) -> None:
+    # One node, no gap count, S400: hop 0.023 + 14 / 393.216; 32 bytes a packet; 34.2 us of execution.
+    profile = make(bus__nodes=1, bus__gap_count=0, cycle__period_us=400.0)
+    hop_us = 0.023 + 14 / 393.216
+    lengths = [0.3]
+    for _ in range(2):
+        arbitration, data, acknowledge = hop_us + 1.63, hop_us + 256 / 393.216, hop_us + 0.25
+        packet = [arbitration, data, acknowledge]
+        lengths += [*packet, 34.2, *packet, 29 / 393.216, 53 / 393.216]
+    plan = schedule(profile, model="paper")
+    assert [one.duration_us for one in plan.events[:-1]] == pytest.approx(lengths)
+    assert plan.events[-1].end_us == 200.0
+
+
+@pytest.mark.parametrize("nodes", [62, MOST_NODES])
+def test_no_rounding_builds_up_over_many_events(make: Maker, nodes: int) -> None:
+    profile = make(bus__nodes=nodes, bus__max_hops=7, cycle__period_us=1e6)
+    lengths = [profile.cycle.sync.sync_us(nodes)]
+    for kind in TRANSACTION_KINDS:
+        one = phases(profile, kind, model="paper", payload_bytes=12)
+        both = (one.arbitration_us, one.acknowledge_us) * 2
+        single = (one.request_data_us, one.execution_us, one.response_data_us)
+        lengths += nodes * [*both, *single, one.subaction_gap_us, one.arbitration_reset_gap_us]
+    used_us = schedule(profile, model="paper").used_us
+    assert abs(used_us - math.fsum(lengths)) <= math.ulp(used_us)
+
+
+def test_a_slice_that_is_filled_exactly_has_nothing_left(make: Maker) -> None:
+    needed_us = figures(make(), model="standard").required_us
+    for rounding in (-5e-13, 0.0, 5e-13):
+        plan = schedule(make(cycle__period_us=needed_us * 2 * (1 + rounding)))
+        assert plan.figures.fits
+        assert plan.cycle_events[-1].kind == "arbitration_reset_gap"
+    assert schedule(make(cycle__period_us=needed_us * 2 * (1 + 5e-12))).events[-1].kind == "idle"
+
+
+def test_what_takes_no_time_is_no_event(make: Maker) -> None:
+    profile = make(cycle__sync={"ping_us": 0.0, "ping_per_node_us": 0.0}, node__execution__base_us=0.0)
+    assert schedule(profile).events[0].kind == "arbitration"
+    assert schedule(make(cycle__nonperiodic_us=7.5)).events[-2].kind == "nonperiodic"
+
+
+def test_the_window_cuts_events_at_its_edges(make: Maker) -> None:
+    plan = schedule(make())
+    part = zoom(plan, from_us=10.0, to_us=100.0)
+    assert (part.events[0].start_us, part.events[-1].end_us) == (10.0, 100.0)
+    assert not part.is_whole
+    assert plan.is_whole
+    assert zoom(plan, to_us=1e6) == plan
+    assert part.figures == plan.figures
+    assert sum(one.duration_us for one in part.events) == pytest.approx(90.0)
+    shares = totals(part)
+    assert sum(one.share for one in shares) == pytest.approx(1.0)
+    assert sum(one.events for one in shares) == len(part.events)
+
+
+@pytest.mark.parametrize("kind", ["read", "write"])
+def test_a_window_on_one_transaction_holds_it_alone(make: Maker, kind: Any) -> None:
+    plan = schedule(make(bus__nodes=3))
+    part = zoom(plan, transaction=(kind, 2))
+    assert {(one.transaction, one.node) for one in part.events} == {(kind, 2)}
+    assert part.events == tuple(one for one in plan.events if (one.transaction, one.node) == (kind, 2))
+    cut = zoom(plan, transaction=(kind, 2), from_us=part.from_us + 1)
+    assert (cut.from_us, cut.to_us) == (part.from_us + 1, part.to_us)
+
+
+def test_totals_are_the_terms_of_the_closed_form(make: Maker) -> None:
+    plan = schedule(make(bus__nodes=5, cycle__nonperiodic_us=12.0))
+    found = {one.kind: one.total_us for one in totals(plan)}
+    closed = plan.figures
+    assert found["arbitration"] == pytest.approx(closed.cycle_arbitration_us)
+    assert found["request_data"] + found["response_data"] == pytest.approx(closed.cycle_data_us)
+    assert found["acknowledge"] == pytest.approx(closed.cycle_acknowledge_us)
+    assert found["execution"] == pytest.approx(closed.cycle_execution_us)
+    assert found["subaction_gap"] + found["arbitration_reset_gap"] == pytest.approx(closed.cycle_gaps_us)
+    assert (found["sync"], found["nonperiodic"]) == pytest.approx((closed.sync_us, 12.0))
+    assert found["idle"] == pytest.approx(closed.margin_us)
+
+
+@pytest.mark.parametrize(
+    ("window", "message"),
+    [
+        ({"from_us": 2000.0}, "the window from 2000 us shows nothing: the cycle runs from 0 to 2000 us"),
+        ({"from_us": 5.0, "to_us": 5.0}, "the window from 5 us to 5 us shows nothing"),
+        ({"transaction": ("read", 2), "to_us": 1.0}, "to 1 us shows nothing: the read of node 2 runs from "),
+        ({"transaction": ("read", 3)}, "read:3: no such transaction"),
+    ],
+)
+def test_an_empty_window_is_refused(make: Maker, window: dict[str, Any], message: str) -> None:
+    with pytest.raises(BusplanError, match=message):
+        zoom(schedule(make()), **window)
+
+
+def test_a_million_nodes_are_refused(make: Maker) -> None:
+    assert len(schedule(make(bus__nodes=MOST_NODES, bus__max_hops=3)).events) > 18 * MOST_NODES
+    with pytest.raises(BusplanError, match="1000000: a timeline shows up to 1000 nodes; one bus carries 62"):
+        schedule(make(bus__nodes=1_000_000))

@@ -1,0 +1,603 @@
+"""`busplan check`, `rule` and `schema` as processes: exit codes, streams, files, and what other programs read."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).resolve().parents[2]
+CLEAN = (ROOT / "tests/rules/examples/BP001/valid.toml").read_text(encoding="utf-8")
+WARNS = CLEAN.replace('"optimal"', "63")
+FAILS = CLEAN.replace("period_us = 4000", "period_us = 300")
+BROKEN = CLEAN.replace("nodes = 2", "nodes = ")
+FORMATS = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
+PROGRAM = [sys.executable, "-m", "busplan"]
+
+Run = subprocess.CompletedProcess[str]
+
+
+def environment(**more: str) -> dict[str, str]:
+    kept = {key: value for key, value in os.environ.items() if not key.startswith(("BUSPLAN", "_BUSPLAN", "FORCE_"))}
+    return {**kept, **more}
+
+
+def busplan(*arguments: object, cwd: Path, stdin: str | None = None, **env: str) -> Run:
+    return subprocess.run(
+        [*PROGRAM, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        cwd=cwd,
+        input=stdin,
+        env=environment(**env),
+        check=False,
+        timeout=60,
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "p").mkdir()
+    for name, text in (("clean", CLEAN), ("fails", FAILS), ("warns", WARNS)):
+        (tmp_path / "p" / f"{name}.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "p" / "other.toml").write_text("[project]\n", encoding="utf-8")
+    return tmp_path
+
+
+# Exit codes and streams
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (["p/clean.toml"], 0),
+        (["p/clean.toml", "--fail-on", "warning"], 0),
+        (["p/warns.toml"], 0),
+        (["p/warns.toml", "--fail-on", "error"], 0),
+        (["p/warns.toml", "--fail-on", "warning"], 1),
+        (["p/warns.toml", "--fail-on", "warning", "--exit-zero"], 0),
+        (["p/fails.toml"], 1),
+        (["p/fails.toml", "--fail-on", "warning"], 1),
+        (["p/fails.toml", "--exit-zero"], 0),
+        (["p"], 1),
+        (["paper-4ms", "--no-circle"], 0),
+        (["p", "gone.toml"], 2),
+        (["p", "gone.toml", "--exit-zero"], 2),
+        (["gone.toml"], 2),
+        ([], 2),
+        (["p", "--jobs", "0"], 2),
+        (["p", "--format", "xml"], 2),
+        (["p", "--fail-on", "info"], 2),
+        (["p", "--update-baseline"], 2),
+        (["p", "--baseline", "gone.json"], 2),
+        (["p", "--baseline", "p/clean.toml"], 2),
+        (["p", "-o", "no/where.txt"], 2),
+        (["p", "-o", "p"], 2),
+    ],
+)
+def test_exit_codes(folder: Path, arguments: list[str], code: int) -> None:
+    run = busplan("check", *arguments, cwd=folder)
+    assert run.returncode == code, run.stderr
+    assert "Traceback" not in run.stderr
+    assert "itself failed" not in run.stderr
+    assert code == 0 or run.stdout or run.stderr
+
+
+def test_findings_go_to_stdout_and_the_summary_to_stderr(folder: Path) -> None:
+    run = busplan("check", "p", cwd=folder)
+    assert [line.partition(" ")[0] for line in run.stdout.splitlines()] == ["p/fails.toml:11:1:", "p/warns.toml:7:1:"]
+    assert run.stdout.splitlines()[0].startswith("p/fails.toml:11:1: BP101 cycle.period_us: the cycle needs ")
+    assert run.stderr == "checked 3 profiles: 1 error, 1 warning\n"
+
+
+def test_clean_is_silent_on_stdout(folder: Path) -> None:
+    run = busplan("check", "p/clean.toml", cwd=folder)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "checked 1 profile: 0 errors, 0 warnings\n")
+
+
+def test_one_broken_file_does_not_stop_the_others(folder: Path) -> None:
+    (folder / "p" / "broken.toml").write_text(BROKEN, encoding="utf-8")
+    (folder / "p" / "bytes.toml").write_bytes(b"schema_version = 1\n\xff\n")
+    os.mkfifo(folder / "pipe.toml")
+    given = ["gone.toml", "p", "pipe.toml", "none"]
+    (folder / "none").mkdir()
+    run = busplan("check", *given, cwd=folder)
+    assert run.returncode == 2
+    assert [re.match(r"p/(\w+)\.toml:\d+:\d+: (BP\d+) ", line).groups() for line in run.stdout.splitlines()] == [  # type: ignore[union-attr]
+        ("broken", "BP001"),
+        ("bytes", "BP001"),
+        ("fails", "BP101"),
+        ("warns", "BP110"),
+    ]
+    said = run.stderr.splitlines()
+    assert [line.partition(": ")[0] for line in said[:3]] == ["gone.toml", "pipe.toml", "none"]
+    assert "no such file" in said[0]
+    assert "is a named pipe" in said[1]
+    assert "no profile below this folder" in said[2]
+    assert said[3:] == ["checked 5 profiles: 3 errors, 1 warning; 3 could not be checked"]
+    for one in json.loads(busplan("check", *given, "--format", "json", cwd=folder).stdout)["files"]:
+        assert (one["status"] == "error") == (one["path"] in ("gone.toml", "pipe.toml", "none"))
+        assert ("failure" in one) == (one["status"] == "error")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read anything")
+def test_an_unreadable_file_is_a_failure(folder: Path) -> None:
+    (folder / "p" / "clean.toml").chmod(0)
+    run = busplan("check", "p", cwd=folder)
+    assert run.returncode == 2
+    assert "p/clean.toml: cannot be read: Permission denied" in run.stderr
+    assert "p/fails.toml:11:1" in run.stdout
+
+
+def test_quiet_keeps_failures_and_nothing_else(folder: Path) -> None:
+    assert busplan("check", "p", "-q", cwd=folder).stderr == ""
+    assert busplan("check", "p", "-q", "--baseline", "b.json", "--update-baseline", cwd=folder).stderr == ""
+    run = busplan("check", "p", "gone.toml", "--quiet", cwd=folder)
+    assert (run.returncode, len(run.stderr.splitlines())) == (2, 1)
+    assert "gone.toml: no such file" in run.stderr
+
+
+def test_verbose_names_what_is_fine_and_what_is_skipped(folder: Path) -> None:
+    run = busplan("check", "p", "-v", cwd=folder)
+    assert run.stderr.splitlines() == [
+        "p/other.toml: skipped, claims no schema_version",
+        "p/clean.toml: ok",
+        "checked 3 profiles: 1 error, 1 warning",
+    ]
+
+
+def test_standard_input(folder: Path) -> None:
+    run = busplan("check", "-", cwd=folder, stdin=FAILS)
+    assert (run.returncode, run.stdout[:15]) == (1, "<stdin>:11:1: B")
+    run = busplan("check", "-", "--stdin-filename", "p/a b.toml", cwd=folder, stdin=FAILS)
+    assert (run.returncode, run.stdout[:17]) == (1, "p/a b.toml:11:1: ")
+    assert busplan("check", "-", cwd=folder, stdin=CLEAN).returncode == 0
+    assert busplan("check", "-", cwd=folder, stdin="").returncode == 1
+
+
+def test_standard_input_is_read_whatever_the_number_of_jobs(folder: Path) -> None:
+    given = ["check", "p/clean.toml", "-", "p/warns.toml"]
+    one, two = (busplan(*given, "--jobs", jobs, cwd=folder, stdin=FAILS) for jobs in (1, 2))
+    assert one.returncode == two.returncode == 1
+    assert one.stdout == two.stdout
+    assert [line.partition(":")[0] for line in one.stdout.splitlines()] == ["<stdin>", "p/warns.toml"]
+
+
+def test_a_shells_process_substitution_is_read(folder: Path) -> None:
+    run = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m busplan check <(sleep 0.2; cat p/fails.toml) -q"],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=environment(),
+        check=False,
+        timeout=60,
+    )
+    assert run.returncode == 1, run.stderr
+    assert re.match(r"/dev/fd/\d+:11:1: BP101 ", run.stdout)
+
+
+def test_an_output_file_is_the_report_and_stdout_is_empty(folder: Path) -> None:
+    for format_ in FORMATS:
+        shown = busplan("check", "p", "--format", format_, cwd=folder)
+        written = busplan("check", "p", "--format", format_, "-o", "report.out", cwd=folder)
+        assert (written.returncode, written.stdout, written.stderr) == (1, "", shown.stderr)
+        assert (folder / "report.out").read_text(encoding="utf-8") == shown.stdout
+    assert sorted(path.name for path in folder.iterdir()) == ["p", "report.out"]
+
+
+def test_a_closed_stdout_is_no_verdict(folder: Path) -> None:
+    run = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m busplan check p >&-"],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=environment(),
+        check=False,
+        timeout=60,
+    )
+    assert (run.returncode, "standard output is closed" in run.stderr) == (2, True)
+
+
+def test_the_environment_sets_the_default_format(folder: Path) -> None:
+    assert json.loads(busplan("check", "p", cwd=folder, BUSPLAN_FORMAT="json").stdout)["command"] == "check"
+    text = busplan("check", "p", "--format", "text", cwd=folder, BUSPLAN_FORMAT="json").stdout
+    assert (
+        text == busplan("check", "p", cwd=folder).stdout == busplan("check", "p", cwd=folder, BUSPLAN_FORMAT="").stdout
+    )
+    run = busplan("check", "p", cwd=folder, BUSPLAN_FORMAT="yaml")
+    assert (run.returncode, run.stdout) == (2, "")
+    assert "yaml" in run.stderr
+    # It is this command's: others have formats of their own.
+    assert busplan("rule", cwd=folder, BUSPLAN_FORMAT="yaml").returncode == 0
+
+
+def test_github_has_the_plain_report_on_stderr(folder: Path) -> None:
+    plain = busplan("check", "p", cwd=folder)
+    run = busplan("check", "p", "--format", "github", cwd=folder)
+    assert run.stdout.splitlines()[0].startswith("::error file=p/fails.toml,line=11,col=1,title=BP101 slice-overrun::")
+    assert run.stderr == plain.stdout + plain.stderr
+    assert busplan("check", "p", "--format", "github", "-q", cwd=folder).stderr == plain.stdout
+
+
+def test_any_number_of_jobs_gives_the_same_bytes(folder: Path) -> None:
+    (folder / "p" / "bytes.toml").write_bytes(b"schema_version = 1\n\xff\n")
+    circle = CLEAN + "[servo]\nposition_gain_per_s = 30000\n"
+    for number in range(8):
+        (folder / "p" / f"{number}.toml").write_text((FAILS, WARNS, circle, BROKEN)[number % 4], encoding="utf-8")
+    given = ["check", "p/warns.toml", "gone.toml", "p", "paper-1ms"]
+    for format_ in FORMATS:
+        one, two = (busplan(*given, "--no-circle", "--format", format_, "--jobs", jobs, cwd=folder) for jobs in (1, 2))
+        assert one.returncode == 2
+        assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
+        assert one.stdout
+    one, two, many = (busplan(*given, "--jobs", jobs, cwd=folder) for jobs in (1, 2, 50))
+    assert "BP202" in one.stdout
+    assert (one.stdout, one.stderr) == (two.stdout, two.stderr) == (many.stdout, many.stderr)
+
+
+def test_the_circle_can_be_left_out(folder: Path) -> None:
+    (folder / "circle.toml").write_text(CLEAN + "[servo]\nposition_gain_per_s = 30000\n", encoding="utf-8")
+    assert busplan("check", "circle.toml", cwd=folder).returncode == 1
+    assert busplan("check", "circle.toml", "--no-circle", cwd=folder).returncode == 0
+
+
+def test_names_that_command_the_terminal_do_not(tmp_path: Path) -> None:
+    (tmp_path / "a\x1b[31m\n::error::b.toml").write_text(FAILS, encoding="utf-8")
+    (tmp_path / os.fsdecode(b"\xff.toml")).write_text(FAILS, encoding="utf-8")
+    for format_ in FORMATS:
+        run = busplan("check", ".", "--format", format_, cwd=tmp_path)
+        assert run.returncode == 1, run.stderr
+        assert "\x1b" not in run.stdout + run.stderr
+        assert not re.search(r"^::error::b", run.stdout + run.stderr, re.MULTILINE)
+        written = busplan("check", ".", "--format", format_, "-o", "out", cwd=tmp_path)
+        assert (tmp_path / "out").read_text(encoding="utf-8") == run.stdout
+        assert written.returncode == 1
+    run = busplan("check", ".", "--baseline", "b.json", "--update-baseline", cwd=tmp_path)
+    assert run.returncode == 1
+    assert busplan("check", ".", "--baseline", "b.json", cwd=tmp_path).stdout.count("BP301") == 0
+    assert len(json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))["profiles"]) == 2
+
+
+# Baseline
+
+
+def test_a_baseline_is_recorded_and_held(folder: Path) -> None:
+    recorded = busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    assert recorded.returncode == 1  # what else is wrong is said as always
+    assert recorded.stderr.splitlines()[0] == "recorded 3 profiles in b.json"
+    assert busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder).returncode == 0
+    (folder / "p" / "clean.toml").write_text(CLEAN.replace("axes = 4", "axes = 3"), encoding="utf-8")
+    for path in ("p/clean.toml", "./p/clean.toml", folder / "p" / "clean.toml"):
+        run = busplan("check", path, "--baseline", "b.json", cwd=folder)
+        assert run.returncode == 1
+        assert run.stdout.startswith("p/clean.toml:8:1: BP301 bus.nodes: max_axes under the paper timing fell to ")
+    assert busplan("check", "p/clean.toml", "--baseline", "b.json", "--update-baseline", cwd=folder).returncode == 0
+    assert busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder).returncode == 0
+
+
+def test_an_update_keeps_what_was_not_checked(folder: Path) -> None:
+    busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    before = json.loads((folder / "b.json").read_text(encoding="utf-8"))["profiles"]
+    (folder / "p" / "clean.toml").write_text(CLEAN.replace("axes = 4", "axes = 3"), encoding="utf-8")
+    (folder / "p" / "warns.toml").write_text(BROKEN, encoding="utf-8")
+    (folder / "p" / "new.toml").write_text(CLEAN, encoding="utf-8")
+    given = ["p/clean.toml", "p/warns.toml", "p/new.toml", "gone.toml"]
+    assert busplan("check", *given, "--baseline", "b.json", "--update-baseline", cwd=folder).returncode == 2
+    after = json.loads((folder / "b.json").read_text(encoding="utf-8"))["profiles"]
+    assert list(after) == ["p/clean.toml", "p/fails.toml", "p/new.toml", "p/warns.toml"]
+    assert after["p/clean.toml"] != before["p/clean.toml"]
+    assert after["p/warns.toml"] == before["p/warns.toml"]
+    assert after["p/fails.toml"] == before["p/fails.toml"]
+
+
+def test_what_is_no_baseline_is_never_overwritten(folder: Path) -> None:
+    for content in ("{", '{"schema": 2, "command": "baseline", "profiles": {}}', "[project]\n"):
+        (folder / "b.json").write_text(content, encoding="utf-8")
+        for more in ([], ["--update-baseline"]):
+            run = busplan("check", "p", "--baseline", "b.json", *more, cwd=folder)
+            assert (run.returncode, run.stdout) == (2, "")
+            assert "remove it, and record one with --update-baseline" in run.stderr
+        assert (folder / "b.json").read_text(encoding="utf-8") == content
+
+
+# Killed while it writes
+
+BLOCK = """
+import os, sys, time
+from pathlib import Path
+import busplan.__main__
+def block(*_):
+    print("blocked", file=sys.stderr, flush=True)
+    time.sleep(60)
+{patch}
+sys.argv = ["busplan", *sys.argv[1:]]
+busplan.__main__.main()
+"""
+PATCHES = {
+    "before it is on the disk": "os.fsync = block",
+    "before it has its name": "Path.replace = block",
+    "before anything is written": "os.urandom = block",
+}
+
+
+@pytest.mark.parametrize("when", PATCHES)
+@pytest.mark.parametrize("what", ["report", "baseline"])
+def test_a_kill_leaves_the_old_file_whole(folder: Path, what: str, when: str) -> None:
+    options = ["-o", "report"] if what == "report" else ["--baseline", "baseline", "--update-baseline"]
+    busplan("check", "p/clean.toml", *options, "--format", "json", cwd=folder)
+    old = (folder / what).read_bytes()
+    assert old
+    with subprocess.Popen(
+        [sys.executable, "-c", BLOCK.format(patch=PATCHES[when]), "check", "p", *options, "--format", "json"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        env=environment(),
+    ) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == b"blocked\n"
+        assert (folder / what).read_bytes() == old
+        process.send_signal(signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    assert (folder / what).read_bytes() == old
+    assert busplan("check", "p", *options, "--format", "json", cwd=folder).returncode == 1
+    assert (folder / what).read_bytes() != old
+
+
+def test_a_kill_at_any_time_leaves_one_file_or_the_other(folder: Path) -> None:
+    given = ["--baseline", "baseline", "--update-baseline", "-o", "report", "--format", "sarif"]
+    wholes: dict[str, set[bytes]] = {"baseline": set(), "report": set()}
+    for paths in (["p/clean.toml"], ["p"]):
+        start = time.perf_counter()
+        busplan("check", *paths, *given, cwd=folder)
+        seconds = time.perf_counter() - start
+        for name, whole in wholes.items():
+            whole.add((folder / name).read_bytes())
+    (folder / "baseline").write_bytes(min(wholes["baseline"], key=len))
+    for number in range(12):
+        with subprocess.Popen(
+            [*PROGRAM, "check", "p", *given],
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=environment(),
+        ) as process:
+            # Most of the time is start-up: the last third is when files are written.
+            time.sleep(seconds * (0.65 + 0.4 * number / 12))
+            process.kill()
+        for name, whole in wholes.items():
+            assert (folder / name).read_bytes() in whole
+
+
+# rule and schema
+
+
+def test_rule_lists_and_explains(tmp_path: Path) -> None:
+    listed = busplan("rule", cwd=tmp_path)
+    assert listed.returncode == 0
+    codes = re.findall(r"^(BP\d+) ", listed.stdout, re.MULTILINE)
+    assert len(codes) == 25
+    for code in ("BP110", "bp110"):
+        page = busplan("rule", code, cwd=tmp_path)
+        assert page.returncode == 0
+        assert page.stdout.startswith("BP110 gap-count-wasteful (warning): ")
+        assert "# busplan: ignore[BP110] reason" in page.stdout
+    document = json.loads(busplan("rule", "--format", "json", cwd=tmp_path).stdout)
+    assert (document["schema"], document["command"]) == (1, "rule")
+    assert [rule["code"] for rule in document["rules"]] == codes
+    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * 25
+    (one,) = json.loads(busplan("rule", "BP110", "--format", "json", cwd=tmp_path).stdout)["rules"]
+    assert one in document["rules"]
+
+
+@pytest.mark.parametrize("code", ["BP999", "", "110"])
+def test_an_unknown_rule_is_exit_2(tmp_path: Path, code: str) -> None:
+    run = busplan("rule", code, cwd=tmp_path)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert "no such rule; there are BP001, " in run.stderr
+
+
+def test_the_file_rules_do_not_promise_a_suppression(tmp_path: Path) -> None:
+    assert "cannot be suppressed" in busplan("rule", "BP001", cwd=tmp_path).stdout
+    assert "# busplan: ignore" not in busplan("rule", "BP005", cwd=tmp_path).stdout
+
+
+def test_the_committed_schema_is_what_the_program_prints(tmp_path: Path) -> None:
+    run = busplan("schema", cwd=tmp_path)
+    assert run.returncode == 0
+    assert run.stdout == (ROOT / "profiles" / "busplan.schema.json").read_text(encoding="utf-8"), (
+        "run: busplan schema > profiles/busplan.schema.json"
+    )
+
+
+def test_shipped_profiles_name_their_schema_and_are_clean() -> None:
+    profiles = sorted((ROOT / "profiles").glob("*.toml"))
+    assert profiles
+    for path in profiles:
+        with path.open(encoding="utf-8") as file:
+            assert file.readline() == "#:schema ./busplan.schema.json\n"
+    run = busplan("check", "profiles", "--fail-on", "warning", "--jobs", "2", cwd=ROOT)
+    assert (run.returncode, run.stdout) == (0, ""), run.stdout
+    assert run.stderr == f"checked {len(profiles)} profiles: 0 errors, 0 warnings\n"
+
+
+# Shell completion, by the protocol of the scripts that `--show-completion` prints
+
+
+def completed(line: str, *, cwd: Path) -> list[str]:
+    words = str(len(line.split(" ")) - 1)
+    run = busplan(cwd=cwd, _BUSPLAN_COMPLETE="complete_bash", COMP_WORDS=line, COMP_CWORD=words)
+    assert run.returncode == 0, run.stderr
+    return run.stdout.split()
+
+
+def test_completion_of_names_codes_and_values(tmp_path: Path) -> None:
+    assert completed("busplan check paper-", cwd=tmp_path) == [
+        "paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node",
+    ]  # fmt: skip
+    assert completed("busplan check paper-4ms paper-1", cwd=tmp_path) == ["paper-1ms"]
+    assert completed("busplan rule BP11", cwd=tmp_path) == ["BP110", "BP111", "BP112"]
+    assert completed("busplan check --format s", cwd=tmp_path) == ["sarif"]
+    assert completed("busplan check --fail-on ", cwd=tmp_path) == ["error", "warning"]
+    # Nothing of ours: the shell goes on to files.
+    assert completed("busplan check ./pro", cwd=tmp_path) == []
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_completion_in_other_shells(tmp_path: Path, shell: str) -> None:
+    for line, word in (("busplan check paper-1", "paper-1ms"), ("busplan rule BP11", "BP112")):
+        run = busplan(
+            cwd=tmp_path,
+            _BUSPLAN_COMPLETE=f"complete_{shell}",
+            _TYPER_COMPLETE_ARGS=line,
+            _TYPER_COMPLETE_FISH_ACTION="get-args",
+        )
+        assert run.returncode == 0
+        assert word in run.stdout
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_completion_in_a_real_bash(tmp_path: Path) -> None:
+    script = f"""
+        eval "$({sys.executable} -m busplan --show-completion bash)"
+        busplan() {{ {sys.executable} -m busplan "$@"; }}
+        COMP_WORDS=(busplan rule BP30) COMP_CWORD=2
+        _busplan_completion "{Path(sys.executable).parent / "busplan"}"
+        echo "${{COMPREPLY[@]}}"
+    """
+    run = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, cwd=tmp_path, env=environment(), check=False, timeout=60
+    )
+    assert run.stdout == "BP301\n", run.stderr
+
+
+# What others run
+
+
+def parsed(name: str) -> Any:
+    return YAML(typ="safe").load((ROOT / name).read_text(encoding="utf-8"))
+
+
+def program_folder(folder: Path) -> Path:
+    """A folder for PATH whose `busplan` is the one under test."""
+    folder.mkdir(parents=True)
+    (folder / "busplan").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m busplan "$@"\n', encoding="utf-8")
+    (folder / "busplan").chmod(0o755)
+    return folder
+
+
+def test_the_pre_commit_hook_checks_profiles_and_nothing_else(folder: Path) -> None:
+    (hook,) = parsed(".pre-commit-hooks.yaml")
+    assert {"id", "name", "entry", "language"} <= set(hook)
+    assert (hook["language"], hook["types"]) == ("python", ["toml"])
+    repository = folder / "repository"
+    shutil.copytree(folder / "p", repository / "machine" / "profiles")
+    shutil.copytree(ROOT / "profiles", repository / "profiles")
+    for name in ("pyproject.toml", "other/profiles.toml"):
+        (repository / name).parent.mkdir(exist_ok=True)
+        (repository / name).write_text("[project]\n", encoding="utf-8")
+    # As pre-commit does: files by their pattern and type, many of them in one call from the top of the repository.
+    everything = sorted(path.relative_to(repository).as_posix() for path in repository.rglob("*.toml"))
+    files = [name for name in everything if re.search(hook["files"], name)]
+    assert not {"pyproject.toml", "other/profiles.toml"} & set(files)
+    assert {"profiles/paper-1ms.toml", "machine/profiles/fails.toml"} <= set(files)
+    path = f"{program_folder(folder / 'bin')}{os.pathsep}{os.environ['PATH']}"
+
+    def run(*names: str) -> Run:
+        return subprocess.run(
+            [*hook["entry"].split(), *names],
+            capture_output=True,
+            text=True,
+            cwd=repository,
+            env=environment(PATH=path),
+            check=False,
+            timeout=60,
+        )
+
+    shipped = [name for name in files if name.startswith("profiles/")]
+    assert run(*shipped).returncode == 0
+    failed = run(*shipped, "machine/profiles/fails.toml")
+    assert failed.returncode == 1
+    assert failed.stdout.startswith("machine/profiles/fails.toml:11:1: BP101 ")
+
+
+def action_step(number: int, folder: Path, *, path: str, **inputs: str) -> Run:
+    """Run one step of the action as the runner does: inputs put in, then bash with its usual flags."""
+    action = parsed("action.yml")
+    given = {name: one["default"] for name, one in action["inputs"].items()} | inputs
+    step = action["runs"]["steps"][number]
+    assert step["shell"] == "bash"
+
+    def put_in(text: str) -> str:
+        return re.sub(r"\$\{\{ inputs\.(\w+) \}\}", lambda match: given[match[1]], text)
+
+    assert "${{" not in step["run"], "inputs must come by the environment: in the script they could be commands"
+    return subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step["run"]],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=environment(
+            PATH=path,
+            RUNNER_TEMP=str(folder / "runner temp"),
+            GITHUB_ACTION_PATH=str(ROOT),
+            **{name: put_in(value) for name, value in step.get("env", {}).items()},
+        ),
+        check=False,
+        timeout=60,
+    )
+
+
+def test_the_action_is_one() -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.github-actions", ROOT / "action.yml"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert run.returncode == 0, run.stdout
+
+
+def test_the_action_checks_and_annotates(folder: Path) -> None:
+    program_folder(folder / "runner temp" / "busplan" / "bin")
+    run = action_step(1, folder, path=os.environ["PATH"])
+    assert run.returncode == 1
+    assert run.stdout.startswith("::error file=p/fails.toml,line=11,col=1,title=BP101 slice-overrun::")
+    assert "p/warns.toml:7:1: BP110" in run.stderr
+    run = action_step(1, folder, path=os.environ["PATH"], paths="p/clean.toml p/warns.toml", args="--fail-on warning")
+    assert (run.returncode, run.stdout[:28]) == (1, "::warning file=p/warns.toml,")
+    assert action_step(1, folder, path=os.environ["PATH"], paths="p/clean.toml").returncode == 0
+    assert action_step(1, folder, path=os.environ["PATH"], paths="gone.toml").returncode == 2
+    hostile = action_step(1, folder, path=os.environ["PATH"], paths="p/clean.toml; touch owned $(touch owned)")
+    assert hostile.returncode == 2
+    assert not (folder / "owned").exists()
+
+
+def test_the_action_installs_into_a_folder_of_its_own(folder: Path) -> None:
+    # The install itself takes a network and half a minute: here a python3 that writes down what it is asked for.
+    stub = folder / "stub"
+    stub.mkdir()
+    (stub / "python3").write_text(
+        '#!/bin/bash\nprintf "%s\\n" "$@" >> log\n'
+        'if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; fi\n',
+        encoding="utf-8",
+    )
+    (stub / "python3").chmod(0o755)
+    run = action_step(0, folder, path=f"{stub}{os.pathsep}{os.environ['PATH']}")
+    assert run.returncode == 0, run.stderr
+    temporary = folder / "runner temp" / "busplan"
+    assert (folder / "log").read_text(encoding="utf-8").splitlines() == [
+        "-m", "venv", str(temporary), "-m", "pip", "install", "--quiet", str(ROOT),
+    ]  # fmt: skip
+    assert (ROOT / "pyproject.toml").is_file()

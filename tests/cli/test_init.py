@@ -1,0 +1,202 @@
+"""`busplan init`: a new profile, as a whole or not at all, and never over an old one unasked."""
+
+import errno
+import os
+import stat
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from busplan.cli.output import write_file
+from busplan.errors import BusplanError
+
+Run = Callable[..., Any]
+Refused = Callable[..., str]
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """All files of a folder, hidden ones too, with what they hold."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def name_in(path: Path) -> object:
+    return tomllib.loads(path.read_text(encoding="utf-8"))["name"]
+
+
+# --- as a process -----------------------------------------------------------------------------------------
+
+
+def test_init_writes_a_commented_profile_that_the_next_command_takes(run: Run, tmp_path: Path) -> None:
+    done = run("init", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "wrote my-machine.toml; next: busplan capacity my-machine.toml\n"
+    assert list(files(tmp_path)) == ["my-machine.toml"]
+    text = (tmp_path / "my-machine.toml").read_text(encoding="utf-8")
+    assert text.count("#") >= 5
+    shipped = run("capacity", "paper-4ms")
+    own = run("capacity", "my-machine.toml", cwd=tmp_path)
+    assert own.stdout == shipped.stdout.replace("paper-4ms", "my-machine")
+
+
+def test_init_starts_from_the_shipped_profile_that_is_asked_for(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    done = run("init", "sub/press.toml", "--from", "paper-dma", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert name_in(tmp_path / "sub" / "press.toml") == "press"
+    assert "assumption" in (tmp_path / "sub" / "press.toml").read_text(encoding="utf-8")
+
+
+def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: Path) -> None:
+    target = tmp_path / "mine.toml"
+    target.write_bytes(b"old")
+    for name in ("mine", "mine.toml", "./mine"):
+        assert refused("init", name, cwd=tmp_path).endswith(
+            "mine.toml: already there; give another name, or --force to overwrite it"
+        )
+    assert files(tmp_path) == {"mine.toml": b"old"}
+    assert run("init", "mine", "--force", cwd=tmp_path).returncode == 0
+    assert list(files(tmp_path)) == ["mine.toml"]
+    assert name_in(target) == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("init", "x", "--from", "nope"), "--from nope: no shipped profile; shipped are paper-1ms, paper-4ms"),
+        (("init", "a\nb"), r"'a\nb': no name for a profile; expected 1 to 100 printable characters"),
+        (("init", "\x1b[31m"), r"'\x1b[31m': no name for a profile"),
+        (("init", "x" * 101), "'xxx"),
+        (("init", "missing/x"), "missing/x.toml: cannot be written: there is no folder /"),
+        (("init", "file/x"), "file/x.toml: cannot be written: Not a directory"),
+        (("init", "/proc/x"), "/proc/x.toml: cannot be written: "),
+        (("init", "folder.toml"), "folder.toml: already there"),
+        (("init", "folder.toml", "--force"), "folder.toml: cannot be written: Is a directory"),
+    ],
+    ids=lambda value: repr(" ".join(value))[:30] if isinstance(value, tuple) else None,
+)
+def test_init_refuses_what_it_cannot_write(
+    refused: Refused, tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    (tmp_path / "file").write_bytes(b"kept")
+    (tmp_path / "folder.toml").mkdir()
+    message = refused(*arguments, cwd=tmp_path)
+    assert message.startswith(said)
+    assert "\n" not in message
+    assert files(tmp_path) == {"file": b"kept"}
+    assert list((tmp_path / "folder.toml").iterdir()) == []
+
+
+def test_init_refuses_a_folder_that_is_not_ones_own(refused: Refused, tmp_path: Path) -> None:
+    if os.geteuid() == 0:
+        pytest.skip("root writes everywhere")
+    tmp_path.chmod(0o500)
+    assert refused("init", "x", cwd=tmp_path) == "x.toml: cannot be written: Permission denied"
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", ".toml", "..toml", "sub/", "sub/.", "sub/.toml", "sub//", "/"])
+def test_init_refuses_a_path_without_a_name(refused: Refused, tmp_path: Path, name: str) -> None:
+    (tmp_path / "sub").mkdir()
+    said = f"{name!r}: no name for a profile; expected a name or a path, as press-line"
+    assert refused("init", name, cwd=tmp_path) == said
+    assert list(tmp_path.rglob("*")) == [tmp_path / "sub"]
+
+
+@pytest.mark.parametrize(
+    "name", ["größe 日本", "[bold]x[/bold]".replace("/", "|"), 'say "hi"', "-x", "a.b", "$(touch y)"]
+)
+def test_init_keeps_an_unusual_name_as_written(run: Run, tmp_path: Path, name: str) -> None:
+    assert run("init", "--", name, cwd=tmp_path).returncode == 0
+    assert list(files(tmp_path)) == [f"{name}.toml"]
+    assert name_in(tmp_path / f"{name}.toml") == name
+
+
+# --- writing a file ---------------------------------------------------------------------------------------
+
+
+def no_space(_descriptor: int) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_disk_that_fills_up_leaves_what_was_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwrite: bool
+) -> None:
+    (tmp_path / "old").write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", no_space)
+    with pytest.raises(BusplanError, match="cannot be written: No space left on device"):
+        write_file(tmp_path / ("old" if overwrite else "new"), b"new", overwrite=overwrite)
+    assert files(tmp_path) == {"old": b"old"}
+
+
+def test_an_interrupt_while_writing_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_descriptor: int) -> None:
+        raise KeyboardInterrupt
+
+    (tmp_path / "old").write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_file(tmp_path / "old", b"new", overwrite=True)
+    assert files(tmp_path) == {"old": b"old"}
+
+
+def test_a_name_taken_a_moment_ago_is_not_overwritten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def meanwhile(_descriptor: int) -> None:
+        (tmp_path / "x").write_bytes(b"theirs")
+
+    monkeypatch.setattr(os, "fsync", meanwhile)
+    with pytest.raises(BusplanError, match="already there"):
+        write_file(tmp_path / "x", b"ours", overwrite=False)
+    assert files(tmp_path) == {"x": b"theirs"}
+
+
+def test_a_file_system_without_hard_links_is_written_to_and_still_not_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_links(_source: Path, _target: Path) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", no_links)
+    write_file(tmp_path / "x", b"one", overwrite=False)
+    with pytest.raises(BusplanError, match="already there"):
+        write_file(tmp_path / "x", b"two", overwrite=False)
+    assert files(tmp_path) == {"x": b"one"}
+
+
+def test_a_link_stays_a_link_and_its_target_is_written(tmp_path: Path) -> None:
+    (tmp_path / "target").write_bytes(b"old")
+    (tmp_path / "link").symlink_to("target")
+    with pytest.raises(BusplanError, match="already there"):
+        write_file(tmp_path / "link", b"new", overwrite=False)
+    write_file(tmp_path / "link", b"new", overwrite=True)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o755])
+def test_a_file_that_is_overwritten_keeps_its_rights(tmp_path: Path, mode: int) -> None:
+    (tmp_path / "x").touch()
+    (tmp_path / "x").chmod(mode)
+    write_file(tmp_path / "x", b"new", overwrite=True)
+    assert files(tmp_path) == {"x": b"new"}
+    assert stat.S_IMODE((tmp_path / "x").stat().st_mode) == mode
+
+
+@pytest.mark.parametrize("name", ["pipe", "link"])
+def test_what_is_no_regular_file_is_not_replaced(tmp_path: Path, name: str) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("pipe")
+    with pytest.raises(BusplanError) as caught:
+        write_file(tmp_path / name, b"new", overwrite=True)
+    assert str(caught.value) == f"{tmp_path / name}: cannot be written: is no regular file"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "pipe"]
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_a_new_file_has_the_rights_of_any_new_file(tmp_path: Path) -> None:
+    (tmp_path / "usual").touch()
+    write_file(tmp_path / "ours", b"x", overwrite=False)
+    write_file(tmp_path / "ours", b"y", overwrite=True)
+    assert (tmp_path / "ours").stat().st_mode == (tmp_path / "usual").stat().st_mode

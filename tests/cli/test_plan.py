@@ -1,0 +1,143 @@
+"""`busplan plan` as a process: exit codes, documents, files that are written as a whole or not at all."""
+
+import json
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+PROFILE = """\
+# our machine
+schema_version = 1
+name = "mine"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+nodes = 2        # as built
+gap_count = 63   # power-up
+[cycle]
+period_us = 1000
+[payload]
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+[node.execution]
+kind = "linear"
+base_us = 30
+per_byte_us = 0.35
+"""
+RUN = "from busplan.cli import run; run()"
+KILLED_WHILE_WRITING = f"import os; os.fsync = lambda _: os.kill(os.getpid(), 9); {RUN}"
+KILLED_BEFORE_RENAME = (
+    f"import os, pathlib; kill = lambda *_: os.kill(os.getpid(), 9); pathlib.Path.replace = kill; os.link = kill; {RUN}"
+)
+
+
+@pytest.fixture
+def profile(tmp_path: Path) -> Path:
+    path = tmp_path / "mine.toml"
+    path.write_text(PROFILE, encoding="utf-8")
+    return path
+
+
+def busplan(*arguments: object, cwd: Path, code: str = RUN, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code, "plan", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        input=stdin,
+        check=False,
+        timeout=60,
+    )
+
+
+def test_apply_changes_the_values_and_nothing_else(profile: Path) -> None:
+    run = busplan(profile.name, "--axes", 15, "--apply", "--format", "json", cwd=profile.parent)
+    assert run.returncode == 0
+    document = json.loads(run.stdout)
+    assert document["goal"] == {"nodes": 4, "axes": 16}
+    assert document["recommended_changes"] == {"bus.nodes": 4, "bus.gap_count": 10}
+    assert run.stderr == "changed mine.toml: bus.nodes = 4, bus.gap_count = 10\n"
+    expected = PROFILE.replace("nodes = 2 ", "nodes = 4 ").replace("gap_count = 63 ", "gap_count = 10 ")
+    assert profile.read_text(encoding="utf-8") == expected
+    again = busplan(profile.name, "--apply", cwd=profile.parent)
+    assert (again.returncode, again.stderr) == (0, "mine.toml: nothing to change, left as it is\n")
+
+
+def test_a_new_file_holds_the_plan_and_the_old_one_stays(profile: Path) -> None:
+    new = profile.parent / "new.toml"
+    run = busplan("-", "--nodes", 4, "--period", "900us", "-o", new.name, cwd=profile.parent, stdin=PROFILE)
+    assert (run.returncode, run.stderr) == (0, "wrote new.toml\n")
+    data = tomllib.loads(new.read_text(encoding="utf-8"))
+    assert (data["bus"]["nodes"], data["cycle"]["period_us"]) == (4, 900)
+    assert "servo" not in data
+    again = busplan("mine.toml", "-o", new.name, cwd=profile.parent)
+    assert (again.returncode, again.stdout) == (2, "")
+    assert "--force" in again.stderr
+    assert busplan("mine.toml", "-o", new.name, "--force", cwd=profile.parent).returncode == 0
+    assert tomllib.loads(new.read_text(encoding="utf-8"))["bus"]["nodes"] == 2
+    assert profile.read_text(encoding="utf-8") == PROFILE
+
+
+@pytest.mark.parametrize("option", [["--apply"], ["-o", "new.toml", "--force"], ["-o", "new.toml"]])
+def test_without_a_plan_nothing_is_written(profile: Path, option: list[str]) -> None:
+    before = sorted(profile.parent.iterdir())
+    run = busplan(profile.name, "--gap-count", 3, *option, cwd=profile.parent)
+    assert run.returncode == 1
+    assert "NO PLAN" in run.stdout
+    assert "not written" in run.stderr
+    assert sorted(profile.parent.iterdir()) == before
+    assert profile.read_text(encoding="utf-8") == PROFILE
+
+
+@pytest.mark.parametrize("code", [KILLED_WHILE_WRITING, KILLED_BEFORE_RENAME])
+@pytest.mark.parametrize("option", [["--apply"], ["-o", "mine.toml", "--force"], ["-o", "new.toml"]])
+def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path, option: list[str], code: str) -> None:
+    run = busplan(profile.name, "--nodes", 4, *option, cwd=profile.parent, code=code)
+    assert run.returncode == -signal.SIGKILL
+    assert profile.read_text(encoding="utf-8") == PROFILE
+    assert not (profile.parent / "new.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["paper-1ms", "--apply"], "busplan init"),
+        (["-", "--apply"], "-o NEW.toml"),
+        (["mine.toml", "--nodes", "2", "--axes", "8"], "give one of them"),
+        (["mine.toml", "--apply", "-o", "x.toml"], "give one of them"),
+        (["mine.toml", "--force"], "goes with -o"),
+        (["mine.toml", "--nodes", "0"], "--nodes 0"),
+        (["mine.toml", "--axes", "0"], "--axes"),
+        (["mine.toml", "--gap-count", "64"], "--gap-count 64"),
+        (["mine.toml", "--period", "1"], "--period 1"),
+        (["mine.toml", "-o", "no/such/folder.toml"], "no folder"),
+        (["none.toml"], "no such file"),
+    ],
+)
+def test_what_cannot_be_done_is_said(profile: Path, arguments: list[str], words: str) -> None:
+    run = busplan(*arguments, cwd=profile.parent)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert words in run.stderr
+    assert "Traceback" not in run.stderr
+    assert profile.read_text(encoding="utf-8") == PROFILE
+
+
+def test_the_circle_is_asked_for_and_can_be_left_out(tmp_path: Path) -> None:
+    circle = "[servo]\nposition_gain_per_s = 50\n[circle]\nradius_mm = 20\nfeed_mm_per_min = 3000\nramp_periods = 20\n"
+    (tmp_path / "mine.toml").write_text(PROFILE + circle, encoding="utf-8")
+    run = busplan("mine.toml", "--format", "json", cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (0, "")
+    options = json.loads(run.stdout)["options"]
+    assert all(option["circle_passed"] is True for option in options)
+    assert next(one for one in options if one["title"] == "smallest period")["period_us"] % 100 == 0
+    loaded = f"import atexit, sys; atexit.register(lambda: print('numpy' in sys.modules, file=sys.stderr)); {RUN}"
+    without = busplan("mine.toml", "--no-circle", "--format", "csv", cwd=tmp_path, code=loaded)
+    # The equations need no numpy, and nobody waits for it.
+    assert (without.returncode, without.stderr) == (0, "False\n")
+    assert without.stdout.startswith("profile,title,changes,recommended,")

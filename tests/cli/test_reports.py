@@ -1,0 +1,422 @@
+"""The reports as processes: their documents, their options, their exit codes."""
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from busplan import __version__
+
+Run = Callable[..., Any]
+Refused = Callable[..., str]
+
+NUMBER = (int, float)
+
+# The JSON contract: key to type. A number may be written without a fraction.
+TRANSACTION: dict[str, Any] = {
+    "timing_model": str,
+    "transaction": str,
+    "payload_bytes": int,
+    "hops": int,
+    "arbitration_us": NUMBER,
+    "request_us": NUMBER,
+    "response_us": NUMBER,
+    "acknowledge_us": NUMBER,
+    "execution_us": NUMBER,
+    "latency_us": NUMBER,
+    "request_and_acknowledge_us": NUMBER,
+    "response_and_acknowledge_us": NUMBER,
+    "gaps_us": NUMBER,
+}
+FIGURES: dict[str, Any] = {
+    "timing_model": str,
+    "period_us": NUMBER,
+    "nodes": int,
+    "axes": int,
+    "available_us": NUMBER,
+    "required_us": NUMBER,
+    "time_slice_us": NUMBER,
+    "required_time_slice_us": NUMBER,
+    "read_latency_us": NUMBER,
+    "write_latency_us": NUMBER,
+    "gaps_us": NUMBER,
+    "subaction_gap_us": NUMBER,
+    "arbitration_reset_gap_us": NUMBER,
+    "sync_us": NUMBER,
+    "nonperiodic_us": NUMBER,
+    "utilisation": NUMBER,
+    "margin_us": NUMBER,
+    "nodes_eq11": NUMBER,
+    "max_nodes": int,
+    "max_axes": int,
+    "limited_by": str,
+    "min_period_us": NUMBER,
+    "fits": bool,
+}
+
+
+def strictly(text: str) -> Any:
+    """Read one JSON document and nothing else, without the numbers that JSON does not know."""
+
+    def no_constant(name: str) -> None:
+        raise AssertionError(f"{name} is no JSON")
+
+    return json.loads(text, parse_constant=no_constant)
+
+
+def check_types(row: dict[str, Any], contract: dict[str, Any]) -> None:
+    for key, kind in contract.items():
+        assert key in row
+        assert isinstance(row[key], kind), key
+        assert isinstance(row[key], bool) == (kind is bool), key
+
+
+def document(run: Run, *arguments: str) -> Any:
+    done = run(*arguments, "--format", "json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("}\n")
+    return strictly(done.stdout)
+
+
+def rows(run: Run, *arguments: str) -> list[dict[str, str]]:
+    done = run(*arguments, "--format", "csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    return list(csv.DictReader(io.StringIO(done.stdout, newline=""), strict=True))
+
+
+def cell(value: object) -> str:
+    """A JSON value as CSV has it."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return " ".join(value) if isinstance(value, list) else str(value)
+
+
+# --- latency ----------------------------------------------------------------------------------------------
+
+
+def test_latency_as_json_holds_the_contract(run: Run) -> None:
+    found = document(run, "latency", "paper-4ms")
+    assert (found["schema"], found["command"], found["profile"]) == (1, "latency", "paper-4ms")
+    assert [(one["transaction"], one["timing_model"]) for one in found["transactions"]] == [
+        ("read", "paper"),
+        ("read", "standard"),
+        ("write", "paper"),
+        ("write", "standard"),
+    ]
+    for one in found["transactions"]:
+        check_types(one, TRANSACTION)
+        assert (one["payload_bytes"], one["hops"]) == (12, 2)
+
+
+def test_phases_add_up_to_the_latency(run: Run) -> None:
+    for one in document(run, "latency", "paper-dma", "--payload", "4,5,2048")["transactions"]:
+        halves = one["request_and_acknowledge_us"], one["response_and_acknowledge_us"]
+        assert halves == pytest.approx(
+            (one["request_us"] + one["acknowledge_us"], one["response_us"] + one["acknowledge_us"])
+        )
+        assert one["latency_us"] == pytest.approx(sum(halves) + one["execution_us"])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("latency", "paper-4ms"),
+        ("latency", "paper-dma", "--payload", "4,5,2048", "--timing", "standard"),
+        ("capacity", "paper-4ms"),
+        ("capacity", "paper-1ms", "--period", "100us", "--period", "4ms", "--nodes", "63"),
+    ],
+    ids=" ".join,
+)
+def test_csv_has_the_profile_the_keys_and_the_figures_of_json(run: Run, arguments: tuple[str, ...]) -> None:
+    found = document(run, *arguments)
+    of_json = found["transactions" if arguments[0] == "latency" else "results"]
+    of_csv = rows(run, *arguments)
+    assert [{"profile": arguments[1], **{key: cell(value) for key, value in row.items()}} for row in of_json] == of_csv
+    assert list(of_csv[0]) == ["profile", *of_json[0]]
+
+
+def test_payloads_are_reported_in_the_order_they_were_asked_for(run: Run) -> None:
+    found = document(run, "latency", "paper-two-node", "--payload", "16,4,1024", "--timing", "paper")
+    assert [(one["payload_bytes"], one["transaction"]) for one in found["transactions"]] == [
+        (size, kind) for size in (16, 4, 1024) for kind in ("read", "write")
+    ]
+
+
+def test_the_farthest_node_and_the_gap_count_follow_the_options(run: Run) -> None:
+    found = document(run, "latency", "paper-4ms", "--nodes", "5", "--gap-count", "optimal")
+    assert {(one["nodes"], one["hops"], one["gap_count"]) for one in found["transactions"]} == {(5, 5, 13)}
+
+
+def test_latency_as_a_table_names_the_equation_of_every_row(run: Run) -> None:
+    done = run("latency", "paper-4ms", "--payload", "4,16")
+    assert (done.returncode, done.stderr) == (0, "")
+    table_rows = re.findall(r"(?m)^(?!-|phase| ).*\d\.\d{3}.*$", done.stdout)
+    assert len(table_rows) == 2 * 14
+    assert all(re.search(r"\(\d+\)|measured", row) for row in table_rows)
+
+
+def test_a_payload_over_the_speeds_limit_is_warned_of_and_computed(run: Run) -> None:
+    done = run("latency", "paper-dma", "--payload", "4,3000")
+    assert done.returncode == 0
+    assert done.stdout.splitlines()[-1] == "Warning: over the 2048 bytes of S400: 3000."
+
+
+# --- capacity ---------------------------------------------------------------------------------------------
+
+
+def test_capacity_as_json_holds_the_contract(run: Run) -> None:
+    found = document(run, "capacity", "paper-4ms")
+    assert (found["schema"], found["command"], found["profile"]) == (1, "capacity", "paper-4ms")
+    assert [one["timing_model"] for one in found["results"]] == ["paper", "standard"]
+    for one in found["results"]:
+        check_types(one, FIGURES)
+        assert one["limited_by"] in ("time", "hops", "nodes", "payload")
+        assert one["fits"] is True
+
+
+@pytest.mark.parametrize(
+    ("arguments", "exceeded", "limited_by"),
+    [
+        (("paper-4ms", "--nodes", "1000000"), "hops nodes time", "hops"),
+        (("paper-4ms", "--nodes", "17"), "hops", "hops"),
+        (("paper-4ms", "--period", "1us"), "time", "time"),
+        (("paper-4ms", "--period", "1000s"), "", "hops"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_a_report_exits_0_whatever_its_verdict_is(
+    run: Run, arguments: tuple[str, ...], exceeded: str, limited_by: str
+) -> None:
+    one = document(run, "capacity", *arguments)["results"][0]
+    assert set(one["exceeded"]) == set(exceeded.split())
+    assert one["fits"] is (not exceeded)
+    assert one["limited_by"] == limited_by
+    check_types(one, FIGURES)
+
+
+def test_a_payload_over_the_limit_loads_and_leaves_no_node(run: Run) -> None:
+    found = run("capacity", "-", "--format", "json", stdin=profile_text(read_bytes="2049"))
+    assert (found.returncode, found.stderr) == (0, "")
+    one = strictly(found.stdout)["results"][0]
+    assert (one["max_nodes"], one["max_axes"], one["limited_by"], one["fits"]) == (0, 0, "payload", False)
+
+
+def test_periods_are_reported_in_the_order_they_were_asked_for(run: Run) -> None:
+    periods = ("--period", "4ms", "--period", "250us", "--period", "0.001s", "--period", "4ms")
+    found = document(run, "capacity", "paper-4ms", *periods, "--timing", "standard")
+    assert [one["period_us"] for one in found["results"]] == [4000, 250, 1000, 4000]
+    assert {one["timing_model"] for one in found["results"]} == {"standard"}
+
+
+def test_a_period_replaces_the_profiles(run: Run) -> None:
+    one = document(run, "capacity", "paper-4ms", "--period", "1ms")["results"][0]
+    other = document(run, "capacity", "paper-1ms")["results"][0]
+    assert one == other
+
+
+def test_nodes_and_gap_count_replace_the_profiles(run: Run) -> None:
+    one = document(run, "capacity", "paper-4ms", "--nodes", "3", "--gap-count", "8")["results"][1]
+    optimal = document(run, "capacity", "paper-4ms", "--nodes", "3", "--gap-count", "optimal")["results"][1]
+    assert (one["nodes"], one["axes"], one["gap_count"]) == (3, 12, 8)
+    assert {key for key in one if one[key] != optimal[key]} <= {"max_nodes", "max_axes", "limited_by"}
+
+
+def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
+    done = run("capacity", "paper-4ms")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.match(
+        r"paper-4ms at 4 ms: fits, 1794\.083 us to spare, 10\.3% of 2000\.000 us used "
+        r"\(paper model; standard agrees\)\.\nLargest term: execution",
+        done.stdout,
+    )
+
+
+def test_models_that_disagree_are_the_headline(run: Run) -> None:
+    done = run("capacity", "paper-4ms", "--period", "500us")
+    assert done.returncode == 0
+    assert done.stdout.startswith("paper-4ms at 500 us: THE MODELS DISAGREE. paper: fits, ")
+    assert not any(verdict["models_agree"] for verdict in verdicts(run, "paper-4ms", "--period", "500us"))
+
+
+def verdicts(run: Run, *arguments: str) -> Any:
+    return document(run, "capacity", *arguments)["verdicts"]
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv"])
+@pytest.mark.parametrize("period", ["0.001us", "1000s"])
+def test_the_smallest_and_the_largest_of_periods_are_reported(run: Run, form: str, period: str) -> None:
+    done = run("capacity", "paper-4ms", "--period", period, "--format", form)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not re.search(r"\b(inf|nan)\b", done.stdout, re.IGNORECASE)
+
+
+# --- the other commands -----------------------------------------------------------------------------------
+
+
+def test_paper_shows_published_beside_computed(run: Run) -> None:
+    done = run("paper")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Table I: T1+T2, theory" in done.stdout
+    found = document(run, "paper")
+    assert (found["schema"], found["command"]) == (1, "paper")
+    theory = [one for one in found["figures"] if one["method"] == "eq (15)"]
+    assert len(theory) == 8
+    for one in theory:
+        assert f"{one['computed']:.2f}" == f"{one['published']:.2f}"
+        assert one["residual"] == pytest.approx(one["computed"] - one["published"])
+    assert [{key: cell(value) for key, value in one.items()} for one in found["figures"]] == rows(run, "paper")
+
+
+def test_profiles_lists_what_every_command_takes_by_name(run: Run) -> None:
+    done = run("profiles")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = document(run, "profiles")
+    names = [one["name"] for one in found["profiles"]]
+    assert names == ["paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]
+    assert re.findall(r"(?m)^(paper-\S+): \d", done.stdout) == names
+    assert [one["name"] for one in rows(run, "profiles")] == names
+    assert all(math.isfinite(one["period_us"]) for one in found["profiles"])
+
+
+@pytest.mark.parametrize("name", ["paper-1ms", "paper-dma", "paper-optimal-gap", "paper-two-node"])
+def test_every_shipped_profile_has_both_reports(run: Run, name: str) -> None:
+    for command in ("latency", "capacity"):
+        done = run(command, name)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert name in done.stdout
+
+
+def test_version_and_help_go_to_stdout(run: Run) -> None:
+    version = run("--version")
+    assert (version.returncode, version.stdout, version.stderr) == (0, f"busplan {__version__}\n", "")
+    for arguments in (("--help",), ("-h",)):
+        done = run(*arguments)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert all(
+            f"\n  {command}  " in done.stdout for command in ("latency", "capacity", "paper", "profiles", "init")
+        )
+        assert "Exit codes: 0 done, 1 the plan fails, 2 could not" in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize("command", ["latency", "capacity", "paper", "profiles", "init"])
+def test_every_command_has_its_own_help_with_an_example(run: Run, command: str) -> None:
+    done = run(command, "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Usage: busplan {command}" in done.stdout
+    assert f"Example: busplan {command}" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "Usage: busplan [OPTIONS] COMMAND"),
+        (("nope",), "No such command 'nope'"),
+        (("--nope",), "No such option"),
+        (("capacity",), "Missing argument"),
+        (("capacity", "paper-4ms", "paper-1ms"), "unexpected extra argument"),
+        (("capacity", "paper-4ms", "--nodes", "two"), "Invalid value for '--nodes'"),
+        (("capacity", "paper-4ms", "--timing", "neither"), "Invalid value for '--timing'"),
+        (("latency", "paper-4ms", "--format", "xml"), "Invalid value for '--format'"),
+        (("latency", "paper-4ms", "--period", "4ms"), "No such option"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_wrong_usage_exits_2_with_nothing_on_stdout(refused: Refused, arguments: tuple[str, ...], said: str) -> None:
+    assert said.casefold() in refused(*arguments).casefold()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("capacity", "paper-4ms", "--period", "4"), "--period 4: expected a time with its unit"),
+        (
+            ("capacity", "paper-4ms", "--period", "4ms", "--period", "0us"),
+            "--period 0us, in us 0.0: must be 0.001 or more",
+        ),
+        (("capacity", "paper-4ms", "--nodes", "0"), "--nodes 0: must be 1 or more"),
+        (("latency", "paper-4ms", "--nodes=-3"), "--nodes -3: must be 1 or more"),
+        (("capacity", "paper-4ms", "--gap-count", "64"), "--gap-count 64: expected a whole number from 0 to 63, or"),
+        (("latency", "paper-4ms", "--gap-count", "best"), "--gap-count best: expected a whole number from 0 to 63, or"),
+        (
+            ("latency", "paper-4ms", "--payload", "4;8"),
+            "--payload 4;8: expected payloads of 1 to 1,000,000 bytes between",
+        ),
+        (("latency", "paper-4ms", "--payload", "1025"), "payload 1025 bytes: outside the execution table of paper-4ms"),
+        (
+            ("capacity", "paper-4ms", "--period", "1e9s"),
+            "--period 1e9s, in us 1000000000000000.0: must be 1,000,000,000",
+        ),
+        (("capacity", "paper-4ms", "--period", "1e-320us"), "--period 1e-320us, in us 1e-320: must be 0.001 or more"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
+)
+def test_a_wrong_value_is_named_with_its_option(refused: Refused, arguments: tuple[str, ...], said: str) -> None:
+    message = refused(*arguments)
+    assert message.startswith(said)
+    assert "\n" not in message
+
+
+def test_two_wrong_options_are_told_at_once(refused: Refused) -> None:
+    said = refused("capacity", "paper-4ms", "--nodes", "0", "--gap-count", "64").splitlines()
+    assert sorted(line.partition(":")[0] for line in said) == ["--gap-count 64", "--nodes 0"]
+
+
+# --- profiles of one's own --------------------------------------------------------------------------------
+
+
+def profile_text(*, name: str = '"mine"', read_bytes: str = "12") -> str:
+    return f"""\
+schema_version = 1
+name = {name}
+bus = {{ kind = "ieee1394", speed = "S400", nodes = 2 }}
+cycle.period_us = 4000
+payload = {{ read_bytes = {read_bytes}, write_bytes = 12 }}
+node = {{ axes = 4, execution = {{ kind = "linear", base_us = 30, per_byte_us = 0.35 }} }}
+"""
+
+
+def test_a_profile_comes_from_standard_input(run: Run) -> None:
+    for command in ("capacity", "latency"):
+        done = run(command, "-", "--format", "json", stdin=profile_text())
+        assert (done.returncode, done.stderr) == (0, "")
+        assert strictly(done.stdout)["profile"] == "mine"
+
+
+def test_a_profile_comes_from_a_file_with_the_same_answer(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "größe x.toml").write_text(profile_text(), encoding="utf-8")
+    done = run("capacity", "größe x.toml", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stdout == run("capacity", "-", stdin=profile_text()).stdout
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "[bold]x[/]",
+        "[/]",
+        "[link=file:///etc]x[/link]",
+        ":smile:",
+        "a \"b\" 'c'",
+        "größe 日本 \U0001f600",
+        "a,b;c",
+        "%s {0}",
+        "\\n",
+    ],
+)
+def test_a_name_is_shown_as_written_in_every_form(run: Run, name: str) -> None:
+    text = profile_text(name=json.dumps(name, ensure_ascii=False))
+    for command in ("capacity", "latency"):
+        table = run(command, "-", stdin=text)
+        assert (table.returncode, table.stderr) == (0, "")
+        assert name in table.stdout
+    found = run("capacity", "-", "--format", "json", stdin=text)
+    assert strictly(found.stdout)["profile"] == name
+    assert name in strictly(found.stdout)["verdicts"][0]["text"]

@@ -1,0 +1,282 @@
+"""Where the program writes: colours, encodings, full disks, closed pipes, and what it loads to do so."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import IO, Any
+
+import pytest
+
+Run = Callable[..., Any]
+OnTerminal = Callable[..., tuple[int, str]]
+
+ESCAPE = "\x1b"
+COLOURS = tuple(f"{ESCAPE}[{style}{colour}m" for style in ("", "1;") for colour in range(30, 38))
+REPORTS = [("capacity", "paper-4ms"), ("latency", "paper-4ms"), ("paper",), ("profiles",)]
+QUICK = [("capacity", "paper-4ms"), ("profiles",), ("capacity", "paper-4ms", "--format", "json")]
+
+
+def on_full_disk() -> IO[bytes]:
+    return Path("/dev/full").open("wb")
+
+
+# --- the program as its users call it ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [*REPORTS, ("--help",), ("--version",), ("capacity", "nope"), ("nope",), ("capacity", "paper-4ms", "--nodes", "0")],
+    ids=" ".join,
+)
+def test_a_process_says_what_the_command_line_says(run: Run, arguments: tuple[str, ...]) -> None:
+    # The other tests call the command line without a process where none is needed.
+    inside, process = run(*arguments), run(*arguments, env={})
+    assert (process.returncode, process.stdout, process.stderr) == (inside.returncode, inside.stdout, inside.stderr)
+
+
+# --- colours ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("arguments", [*REPORTS, ("--help",), ("capacity", "nope")], ids=" ".join)
+def test_a_pipe_gets_no_escape_codes(run: Run, arguments: tuple[str, ...]) -> None:
+    done = run(*arguments)
+    assert ESCAPE not in done.stdout + done.stderr
+
+
+def test_a_terminal_gets_colours_and_under_no_color_none(on_terminal: OnTerminal, tmp_path: Path) -> None:
+    for arguments in (("capacity", "paper-4ms"), ("capacity", "paper-4ms", "--period", "1us")):
+        code, shown = on_terminal(*arguments, cwd=tmp_path)
+        assert code == 0
+        assert any(colour in shown for colour in COLOURS)
+        code, shown = on_terminal(*arguments, cwd=tmp_path, env={"NO_COLOR": "1"})
+        assert code == 0
+        assert not any(colour in shown for colour in COLOURS)
+    assert ESCAPE not in on_terminal("capacity", "paper-4ms", cwd=tmp_path, env={"TERM": "dumb"})[1]
+
+
+def test_a_terminal_and_a_pipe_get_the_same_figures(run: Run, on_terminal: OnTerminal, tmp_path: Path) -> None:
+    for arguments in REPORTS:
+        _, shown = on_terminal(*arguments, cwd=tmp_path, env={"TERM": "dumb", "COLUMNS": "40"})
+        assert shown.split() == run(*arguments).stdout.split()
+
+
+def test_a_narrow_terminal_cuts_no_row_of_figures(run: Run, on_terminal: OnTerminal, tmp_path: Path) -> None:
+    _, shown = on_terminal("latency", "paper-4ms", cwd=tmp_path, env={"TERM": "dumb", "COLUMNS": "20"})
+    rows = [line for line in run("latency", "paper-4ms").stdout.splitlines() if "(" in line]
+    assert len(rows) > 10
+    assert set(rows) <= set(shown.splitlines())
+
+
+def test_documents_for_programs_have_no_colours_even_on_a_terminal(on_terminal: OnTerminal, tmp_path: Path) -> None:
+    code, shown = on_terminal("capacity", "paper-4ms", "--format", "json", cwd=tmp_path)
+    assert code == 0
+    assert json.loads(shown)["command"] == "capacity"
+
+
+def test_markup_in_a_name_is_shown_as_written_on_a_terminal(on_terminal: OnTerminal, tmp_path: Path) -> None:
+    names = ["[bold]x[/]", "[link=x]y[/]", ":smile:"]
+    for name in names:
+        (tmp_path / "x.toml").write_text(PROFILE.replace("NAME", name), encoding="utf-8")
+        code, shown = on_terminal("capacity", "x.toml", cwd=tmp_path, env={"COLUMNS": "200"})
+        assert code == 0
+        assert f"{name} at 4 ms" in shown
+
+
+PROFILE = """\
+schema_version = 1
+name = "NAME"
+bus = { kind = "ieee1394", speed = "S400", nodes = 2 }
+cycle.period_us = 4000
+payload = { read_bytes = 12, write_bytes = 12 }
+node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 } }
+"""
+
+
+# --- encodings --------------------------------------------------------------------------------------------
+
+
+def test_a_stream_of_ascii_gets_escapes_instead_of_a_failure(run: Run) -> None:
+    text, ascii_only = PROFILE.replace("NAME", "größe 日本"), {"PYTHONIOENCODING": "ascii"}
+    done = run("capacity", "-", stdin=text, env=ascii_only)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(r"gr\u00f6\u00dfe \u65e5\u672c at 4 ms: fits")
+    done = run("capacity", "größe.toml", env=ascii_only)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith(r"gr\u00f6\u00dfe.toml: no such file")
+    for arguments in REPORTS:
+        assert run(*arguments, env=ascii_only).returncode == 0
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252"])
+def test_json_on_a_stream_without_utf8_is_json(run: Run, tmp_path: Path, encoding: str) -> None:
+    name = "größe 日本 \U0001f600 \\"
+    text = PROFILE.replace("NAME", name.replace("\\", "\\\\"))
+    path = tmp_path / "out.json"
+    with path.open("wb") as file:
+        done = run("capacity", "-", "--format", "json", stdin=text, env={"PYTHONIOENCODING": encoding}, stdout=file)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(path.read_text(encoding=encoding))["profile"] == name
+
+
+# --- streams that do not take it --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *QUICK,
+        ("latency", "paper-4ms", "--format", "csv"),
+        ("--version",),
+    ],
+    ids=" ".join,
+)
+def test_a_full_disk_is_said_and_exits_2(run: Run, arguments: tuple[str, ...]) -> None:
+    with on_full_disk() as full:
+        done = run(*arguments, stdout=full)
+    assert (done.returncode, done.stderr) == (2, "standard output cannot be written: No space left on device\n")
+
+
+def test_a_full_disk_is_said_of_help_too(run: Run) -> None:
+    with on_full_disk() as full:
+        done = run("--help", stdout=full)
+    assert (done.returncode, done.stderr) == (2, "cannot write: No space left on device\n")
+
+
+@pytest.fixture
+def closed_pipe() -> Iterator[int]:
+    """The writing end of a pipe that nobody reads."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    yield writing
+    os.close(writing)
+
+
+@pytest.mark.parametrize("arguments", QUICK, ids=" ".join)
+def test_a_reader_that_has_gone_is_no_reason_to_complain(
+    run: Run, closed_pipe: int, arguments: tuple[str, ...]
+) -> None:
+    done = run(*arguments, stdout=closed_pipe)
+    assert done.stderr == ""
+    assert done.returncode == 2
+
+
+def test_a_reader_of_help_that_has_gone_is_no_verdict(run: Run, closed_pipe: int) -> None:
+    done = run("--help", stdout=closed_pipe)
+    assert (done.returncode, done.stderr) == (2, "")
+
+
+CLOSED = """
+import os, sys
+os.execvp("sh", ["sh", "-c", 'exec "$0" -m busplan "$@" >&-', sys.executable, *sys.argv[1:]])
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [*QUICK, ("--version",)],
+    ids=" ".join,
+)
+def test_a_closed_standard_output_is_said_and_exits_2(run: Run, arguments: tuple[str, ...]) -> None:
+    done = run(*arguments, python=("-c", CLOSED))
+    assert (done.returncode, done.stderr) == (2, "standard output is closed\n")
+
+
+def test_help_on_a_closed_standard_output_is_no_failure_of_the_program(run: Run) -> None:
+    done = run("--help", python=("-c", CLOSED))
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"), [(("capacity", "nope"), 2), (("nope",), 2), (("capacity", "paper-4ms"), 0)]
+)
+def test_a_closed_standard_error_changes_no_exit_code_and_no_document(
+    run: Run, arguments: tuple[str, ...], code: int
+) -> None:
+    done = run(*arguments, python=("-c", CLOSED.replace(">&-", "2>&-")))
+    assert (done.returncode, done.stderr) == (code, "")
+    assert done.stdout == run(*arguments).stdout
+
+
+def test_a_standard_error_that_takes_nothing_changes_no_exit_code(tmp_path: Path) -> None:
+    for arguments, code in ((["capacity", "nope"], 2), (["nope"], 2), (["init", "x"], 0)):
+        with on_full_disk() as full:
+            done = subprocess.run(
+                [sys.executable, "-m", "busplan", *arguments],
+                check=False,
+                cwd=tmp_path,
+                stdout=subprocess.PIPE,
+                stderr=full,
+            )
+        assert (done.returncode, done.stdout) == (code, b"")
+
+
+def test_an_interrupt_exits_130_without_a_traceback(tmp_path: Path) -> None:
+    # Whoever runs the tests in the background may ignore interrupts, and children inherit that.
+    program = "import signal; signal.signal(2, signal.default_int_handler); from busplan.__main__ import main; main()"
+    with subprocess.Popen(
+        [sys.executable, "-c", program, "capacity", "-"],
+        cwd=tmp_path,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        assert process.stdin is not None
+        # More than a pipe holds, less than a profile may: when it is written, the program has begun to read.
+        process.stdin.write(b"#" * 90_000)
+        process.stdin.flush()
+        # A signal between two reads waits for the next: so does whoever presses Ctrl-C, and presses it again.
+        for _ in range(10):
+            process.send_signal(signal.SIGINT)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(timeout=1)
+                break
+        assert process.returncode == 130
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.read() == b""
+        assert b"Traceback" not in process.stderr.read()
+
+
+# --- what is loaded ---------------------------------------------------------------------------------------
+
+WITNESS = """
+import sys
+from busplan.__main__ import main
+sys.argv[0] = "busplan"
+try:
+    main()
+finally:
+    sys.stderr.write(" ".join(sys.modules))
+"""
+
+
+def modules(run: Run, *arguments: str) -> set[str]:
+    """All modules that one run has loaded, and their packages."""
+    done = run(*arguments, python=("-c", WITNESS))
+    assert done.returncode == 0
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_what_needs_no_profile_loads_nothing_heavy(run: Run, option: str) -> None:
+    loaded = modules(run, option)
+    assert "typer" in loaded
+    assert not loaded & {"numpy", "pydantic", "rich", "tomllib", "tomli_w", "csv", "json", "matplotlib"}
+    assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.report"))}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("capacity", "paper-4ms"), ("latency", "paper-4ms"), ("capacity", "paper-4ms", "--format", "json"), ("profiles",)],
+    ids=" ".join,
+)
+def test_reports_load_no_numpy_and_a_good_profile_no_places(run: Run, arguments: tuple[str, ...]) -> None:
+    loaded = modules(run, *arguments)
+    assert "pydantic" in loaded
+    assert not loaded & {"numpy", "rich", "tomli_w", "matplotlib", "scipy"}
+    assert not loaded & {"busplan.profile.positions", "busplan.profile.problems"}

@@ -1,0 +1,148 @@
+"""`busplan timeline` as a process: contract, options together, files, errors."""
+
+import csv
+import fcntl
+import io
+import json
+import os
+import pty
+import struct
+import subprocess
+import sys
+import termios
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+
+def busplan(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    environment = {key: value for key, value in os.environ.items() if key not in ("FORCE_COLOR", "COLUMNS")}
+    return subprocess.run(
+        [sys.executable, "-m", "busplan", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env=environment,
+        check=False,
+        timeout=60,
+    )
+
+
+def test_json_holds_the_contract_and_agrees_with_capacity(tmp_path: Path) -> None:
+    options = ("--nodes", 7, "--gap-count", "optimal", "--period", "2ms")
+    run = busplan("timeline", "paper-1ms", *options, "--timing", "standard", "--format", "json", cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (0, "")
+    document = json.loads(run.stdout)
+    assert (document["schema"], document["command"], document["profile"]) == (1, "timeline", "paper-1ms")
+    assert document["timing_model"] == "standard"
+    for event in document["events"]:
+        assert {"kind", "node", "transaction", "start_us", "end_us"} <= set(event)
+        assert event["transaction"] in ("read", "write", None)
+        assert (event["node"] is None) == (event["transaction"] is None)
+    other = busplan("capacity", "paper-1ms", *options, "--timing", "standard", "--format", "json", cwd=tmp_path)
+    (figures,) = json.loads(other.stdout)["results"]
+    for key in ("required_us", "available_us", "margin_us", "fits", "gap_count", "period_us"):
+        assert document[key] == figures[key]
+    busy = [event for event in document["events"] if event["kind"] != "idle"]
+    assert abs(busy[-1]["end_us"] - figures["required_us"]) <= 1e-9
+    assert document["events"][-1]["end_us"] == figures["available_us"]
+
+
+def test_the_deciding_model_is_the_default_and_csv_has_the_same_events(tmp_path: Path) -> None:
+    run = busplan("timeline", "paper-4ms", "--format", "csv", "--from", "0.1ms", "--to", "150us", cwd=tmp_path)
+    rows = list(csv.DictReader(io.StringIO(run.stdout)))
+    assert {row["timing_model"] for row in rows} == {"paper"}
+    assert (float(rows[0]["start_us"]), float(rows[-1]["end_us"])) == (100.0, 150.0)
+    assert all(one["end_us"] == other["start_us"] for one, other in pairwise(rows))
+
+
+def test_every_form_goes_to_a_file_by_its_name(tmp_path: Path) -> None:
+    begins = {
+        "a.svg": b"<svg ",
+        "a.png": b"\x89PNG",
+        "a.mmd": b"gantt\n",
+        "a.json": b"{\n",
+        "a.csv": b"profile,",
+        "a.txt": b"paper-4ms at 4 ms: fits",
+    }
+    for name, start in begins.items():
+        run = busplan("timeline", "paper-4ms", "-o", name, "--transaction", "write:2", cwd=tmp_path)
+        assert (run.returncode, run.stdout, run.stderr) == (0, "", f"wrote {name}\n")
+        assert (tmp_path / name).read_bytes().startswith(start)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(begins)
+
+
+def test_a_form_may_be_named_whatever_the_file_is_called(tmp_path: Path) -> None:
+    assert busplan("timeline", "paper-4ms", "-o", "cycle", "--format", "mermaid", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "cycle").read_text(encoding="utf-8").startswith("gantt\n")
+
+
+def test_an_overrun_is_a_report_and_exits_0(tmp_path: Path) -> None:
+    run = busplan("timeline", "paper-4ms", "--period", "300us", cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "does not fit, 55.917 us short" in run.stdout
+    assert "!!!" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--from", "5"], "--from 5: expected a time with its unit, as 4ms, 250us or 0.001s"),
+        (["--to", "nan"], "--to nan: expected a time with its unit"),
+        (["--from", "9us", "--to", "9us"], "--from 9us --to 9us: the window must end after it begins"),
+        (["--from", "3ms"], "the window from 3000 us shows nothing: the cycle runs from 0 to 2000 us"),
+        (["--transaction", "read:3"], "--transaction read:3: expected read or write and a node from 1 to 2, as read:1"),
+        (["--transaction", "ping:1"], "--transaction ping:1: expected read or write"),
+        (["--transaction", "read:1", "--from", "1ms"], "shows nothing: the read of node 1 runs from 0.4 to 51.77"),
+        (["--period", "0s"], "--period 0s"),
+        (["--nodes", "1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
+        (["--format", "png"], "--format png: a picture does not go to standard output; give -o FILE.png"),
+        (["-o", "cycle.doc"], "--output cycle.doc: expected a name ending in .txt, .json, .csv, .mmd, .svg, .png"),
+        (["-o", "no/such/cycle.svg"], "there is no folder"),
+        (["--timing", "both"], "both"),
+    ],
+)
+def test_what_cannot_be_done_is_said_and_leaves_nothing(tmp_path: Path, arguments: list[str], message: str) -> None:
+    run = busplan("timeline", "paper-4ms", *arguments, cwd=tmp_path)
+    assert run.returncode == 2
+    assert message in run.stderr
+    assert "Traceback" not in run.stderr
+    assert run.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_drawing_takes_the_width_of_its_terminal(tmp_path: Path) -> None:
+    leader, follower = pty.openpty()
+    fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 117, 0, 0))
+    environment = {key: value for key, value in os.environ.items() if key not in ("COLUMNS", "LINES")}
+    command = [sys.executable, "-m", "busplan", "timeline", "paper-4ms"]
+    run = subprocess.Popen(command, stdout=follower, cwd=tmp_path, env={**environment, "NO_COLOR": "1"})
+    os.close(follower)
+    shown = b""
+    while True:
+        try:
+            block = os.read(leader, 65536)
+        except OSError:  # Linux says so when the other side is closed
+            break
+        if not block:
+            break
+        shown += block
+    os.close(leader)
+    assert run.wait(60) == 0
+    bars = [line for line in shown.decode().splitlines() if line.count("|") == 2]
+    assert {len(line) for line in bars} == {117}
+
+
+def test_no_numpy_and_no_matplotlib_but_for_png(tmp_path: Path) -> None:
+    program = (
+        "import sys; from busplan.__main__ import main\n"
+        "sys.argv[1:] = ['timeline', 'paper-4ms', '-o', 'a.svg']\n"
+        "try: main()\n"
+        "except SystemExit as leaving: assert not leaving.code\n"
+        "print(sorted({'numpy', 'matplotlib'} & set(sys.modules)))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path, check=False, timeout=60
+    )
+    assert run.stdout == "[]\n", run.stderr

@@ -1,0 +1,492 @@
+"""The profile's models: strict, frozen and closed; ranges, defaults, and what the sections compute."""
+
+import math
+from copy import deepcopy
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+
+from busplan.profile.bus import Cycle, Ieee1394Bus, LinearExecution, Node, Payload, Sync, TableExecution
+from busplan.profile.model import Profile
+
+TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
+
+
+def data(**changes: object) -> dict[str, Any]:
+    """Data of a smallest profile, with new values by key, two underscores for the dot; ... takes a key away."""
+    made: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "test",
+        "bus": {"kind": "ieee1394", "speed": "S400", "nodes": 2},
+        "cycle": {"period_us": 4000},
+        "payload": {"read_bytes": 12, "write_bytes": 12},
+        "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30, "per_byte_us": 0.35}},
+    }
+    for key, value in changes.items():
+        *tables, last = key.split("__")
+        table = made
+        for name in tables:
+            table = table.setdefault(name, {})
+        if value is ...:
+            del table[last]
+        else:
+            table[last] = deepcopy(value)
+    return made
+
+
+def profile(**changes: object) -> Profile:
+    return Profile.model_validate(data(**changes))
+
+
+def value_of(model: BaseModel, key: str) -> object:
+    value: object = model
+    for name in key.split("__"):
+        value = getattr(value, name)
+    return value
+
+
+def refused(**changes: object) -> list[str]:
+    """What is said of a profile that must not load."""
+    with pytest.raises(ValidationError) as caught:
+        profile(**changes)
+    return [
+        problem.message for details in caught.value.errors() for problem in details.get("ctx", {}).get("problems", ())
+    ] or [details["msg"] for details in caught.value.errors()]
+
+
+# --- strictness -------------------------------------------------------------------------------------------
+
+WHOLE = {
+    "bus__nodes": (1, 1_000_000),
+    "bus__max_hops": (1, 1_000_000),
+    "payload__read_bytes": (1, 1_000_000),
+    "payload__write_bytes": (1, 1_000_000),
+    "payload__overhead_bytes": (0, 1_000_000),
+    "node__axes": (1, 1_000_000),
+    "bus__gap_count": (0, 63),
+    "limits__min_spare_nodes": (0, 1_000_000),
+    "limits__min_spare_axes": (0, 1_000_000),
+}
+TIMES = {
+    "cycle__nonperiodic_us": (0, 1e9),
+    "cycle__sync__ping_us": (0, 1e9),
+    "cycle__sync__ping_per_node_us": (0, 1e9),
+    "node__execution__base_us": (0, 1e9),
+    "node__execution__per_byte_us": (0, 1e9),
+}
+SHARES = {"limits__max_utilisation": (0, 1)}
+ABOVE_ZERO = {"cycle__period_us": (1e-3, 1e9), "cycle__slice_ratio": (1e-6, 1), "bus__cable_length_m": (5e-324, 100)}
+NUMBERS = (*WHOLE, *TIMES, *SHARES, *ABOVE_ZERO)
+FRACTIONS = (*TIMES, *SHARES, *ABOVE_ZERO)
+OPTIONAL = {"bus__max_hops", "limits__max_utilisation", "limits__min_spare_nodes", "limits__min_spare_axes"}
+TEXTS = (
+    "name",
+    "description",
+    "bus__kind",
+    "bus__speed",
+    "bus__timing_model",
+    "node__execution__kind",
+    "node__execution__grade",
+)
+
+
+@pytest.mark.parametrize("key", NUMBERS)
+@pytest.mark.parametrize("value", ["1", "", b"1", True, False, [1], {"a": 1}, 1j], ids=repr)
+def test_a_number_is_nothing_but_a_number(key: str, value: object) -> None:
+    assert refused(**{key: value})
+
+
+@pytest.mark.parametrize("key", [key for key in NUMBERS if key not in OPTIONAL])
+def test_a_number_is_not_none(key: str) -> None:
+    assert refused(**{key: None})
+
+
+@pytest.mark.parametrize("key", sorted(OPTIONAL))
+def test_a_number_that_need_not_be_said_may_be_none(key: str) -> None:
+    assert value_of(profile(**{key: None}), key) is None
+
+
+@pytest.mark.parametrize("key", WHOLE)
+@pytest.mark.parametrize("value", [1.0, 1.5, math.nan, math.inf], ids=repr)
+def test_a_whole_number_is_no_float(key: str, value: float) -> None:
+    assert refused(**{key: value})
+
+
+@pytest.mark.parametrize("key", FRACTIONS)
+def test_a_whole_number_may_stand_for_a_float(key: str) -> None:
+    value = value_of(profile(**{key: 1}), key)
+    assert value == 1
+    assert type(value) is float
+
+
+@pytest.mark.parametrize("key", FRACTIONS)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, -5e-324], ids=repr)
+def test_a_float_is_finite_and_not_negative(key: str, value: float) -> None:
+    assert refused(**{key: value})
+
+
+@pytest.mark.parametrize("key", TEXTS)
+@pytest.mark.parametrize("value", [1, 1.0, True, None, b"x", ["x"], {"x": 1}], ids=repr)
+def test_a_text_is_nothing_but_a_text(key: str, value: object) -> None:
+    if key == "node__execution__grade" and value is None:
+        assert value_of(profile(**{key: None}), key) is None
+        return
+    assert refused(**{key: value})
+
+
+@pytest.mark.parametrize("key", ["bus", "cycle", "cycle__sync", "payload", "node", "node__execution"])
+@pytest.mark.parametrize("value", [1, "x", True, None, [], [{}]], ids=repr)
+def test_a_section_is_a_table(key: str, value: object) -> None:
+    assert refused(**{key: value})
+
+
+@pytest.mark.parametrize("key", ["", "bus__", "cycle__", "cycle__sync__", "payload__", "node__", "node__execution__"])
+def test_an_unknown_key_is_refused_in_every_section(key: str) -> None:
+    assert refused(**{f"{key}surprise": 1}) == ["Extra inputs are not permitted"]
+
+
+def test_a_key_of_the_other_form_of_execution_is_unknown() -> None:
+    assert refused(node__execution__time_us=[1]) == ["Extra inputs are not permitted"]
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        *("name", "schema_version", "bus", "bus__kind", "bus__speed", "bus__nodes", "cycle", "cycle__period_us"),
+        *("payload", "payload__read_bytes", "payload__write_bytes", "node", "node__axes", "node__execution"),
+        *("node__execution__base_us", "node__execution__per_byte_us"),
+    ],
+)
+def test_a_key_without_a_default_is_asked_for(key: str) -> None:
+    assert refused(**{key: ...}) == ["Field required"]
+
+
+def test_the_execution_time_is_asked_for_its_kind() -> None:
+    assert len(refused(node__execution__kind=...)) == 1
+
+
+@pytest.mark.parametrize("key", ["name", "bus__nodes", "cycle__period_us", "cycle__sync__ping_us", "node__axes"])
+def test_a_profile_is_frozen(key: str) -> None:
+    loaded = profile()
+    *tables, last = key.split("__")
+    owner = value_of(loaded, "__".join(tables)) if tables else loaded
+    with pytest.raises(ValidationError, match="frozen"):
+        setattr(owner, last, 1)
+    with pytest.raises(ValidationError, match="frozen"):
+        delattr(owner, last)
+
+
+def test_a_profile_keeps_nothing_of_the_data_it_was_made_of() -> None:
+    source = data(node__execution=TABLE)
+    loaded = Profile.model_validate(source)
+    source["node"]["execution"]["time_us"][0] = 0.0
+    assert isinstance(loaded.node.execution, TableExecution)
+    assert loaded.node.execution.time_us == (40.0, 34.0, 58.0)
+
+
+# --- ranges -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("key", "bounds"), [*WHOLE.items(), *TIMES.items(), *SHARES.items()])
+def test_a_range_holds_its_ends_and_nothing_beyond(key: str, bounds: tuple[float, float]) -> None:
+    low, high = bounds
+    for inside in (low, high):
+        assert value_of(profile(**{key: inside}), key) == inside
+    step = type(high)(1)
+    for outside in (type(high)(low) - step, high + step):
+        assert refused(**{key: outside})
+
+
+@pytest.mark.parametrize(("key", "bounds"), ABOVE_ZERO.items())
+def test_a_range_above_zero_holds_its_ends_and_no_zero(key: str, bounds: tuple[float, float]) -> None:
+    low, high = bounds
+    for inside in (low, high):
+        assert value_of(profile(**{key: inside}), key) == inside
+    for outside in (0, 0.0, -0.0, math.nextafter(low, -math.inf), math.nextafter(high, math.inf)):
+        assert refused(**{key: outside})
+
+
+@pytest.mark.parametrize("version", [0, 2, -1, "1", 1.5, None])
+def test_only_schema_version_1_is_known(version: object) -> None:
+    assert refused(schema_version=version)
+
+
+@pytest.mark.parametrize("version", [True, 1.0], ids=repr)
+def test_a_schema_version_is_a_whole_number(version: object) -> None:
+    assert refused(schema_version=version) == ["expected 1"]
+
+
+@pytest.mark.parametrize(
+    "name", ["x", "x" * 100, "größe", "日本", "[bold]x[/]", '"quoted"', "a\\b", "with space", "\U0001f600"]
+)
+def test_a_name_is_any_printable_text(name: str) -> None:
+    assert profile(name=name).name == name
+
+
+@pytest.mark.parametrize(
+    "name", ["", "x" * 101, "a\nb", "a\tb", "\x1b[31m", "\x00", "\x7f", "a\u2028b", "\u202e", "\u200b"], ids=ascii
+)
+def test_a_name_holds_nothing_that_a_terminal_would_obey(name: str) -> None:
+    assert refused(name=name)
+
+
+def test_a_description_may_have_lines_and_tabs_and_no_other_control() -> None:
+    assert profile(description="a\n\tb").description == "a\n\tb"
+    assert len(profile(description="x" * 2000).description) == 2000
+    assert refused(description="x" * 2001)
+    for control in ("\x1b", "\r", "\x00", "\x9b"):
+        assert refused(description=f"a{control}b") == ["must not hold control characters"]
+
+
+# --- defaults ---------------------------------------------------------------------------------------------
+
+
+def test_defaults_are_those_of_the_reference() -> None:
+    loaded = profile()
+    assert loaded.description == ""
+    assert (loaded.bus.gap_count, loaded.bus.max_hops, loaded.bus.cable_length_m) == (63, None, 4.5)
+    assert loaded.bus.timing_model == "standard"
+    assert (loaded.cycle.slice_ratio, loaded.cycle.nonperiodic_us) == (0.5, 0.0)
+    assert (loaded.cycle.sync.ping_us, loaded.cycle.sync.ping_per_node_us) == (0.3, 0.1)
+    assert loaded.payload.overhead_bytes == 20
+
+
+@pytest.mark.parametrize("grade", ["measured", "derived", "calibrated", "assumed", None])
+@pytest.mark.parametrize(
+    "execution", [{"kind": "linear", "base_us": 1, "per_byte_us": 0}, TABLE], ids=["linear", "table"]
+)
+def test_both_forms_of_execution_may_have_a_grade(execution: dict[str, object], grade: str | None) -> None:
+    assert profile(node__execution=execution).node.execution.grade is None
+    assert profile(node__execution={**execution, "grade": grade}).node.execution.grade == grade
+
+
+def test_every_default_is_a_value_that_the_schema_takes() -> None:
+    # Pydantic does not check defaults: a wrong one would load.
+    assert Profile.model_validate(profile().model_dump()) == profile()
+
+
+SECTIONS = (Profile, Ieee1394Bus, Cycle, Sync, Payload, Node, LinearExecution, TableExecution)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_example_is_a_value_that_the_schema_takes(section: type[BaseModel]) -> None:
+    # Messages about a missing key show the first one.
+    examples = {name: field.examples[0] for name, field in section.model_fields.items() if field.examples}
+    sections = {"bus": data()["bus"], "cycle": data()["cycle"], "payload": data()["payload"], "node": data()["node"]}
+    rest = {Profile: sections, Node: {"execution": data()["node"]["execution"]}}
+    assert section.model_validate({**examples, **rest.get(section, {})})
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_every_key_is_described(section: type[BaseModel]) -> None:
+    for name, field in section.model_fields.items():
+        assert field.description, name
+
+
+# --- the bus ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gap_count", [0, 5, 63, "optimal"])
+def test_a_gap_count_is_a_number_or_the_optimal_one(gap_count: int | str) -> None:
+    assert profile(bus__gap_count=gap_count).bus.gap_count == gap_count
+
+
+@pytest.mark.parametrize("gap_count", [-1, 64, 5.0, True, "63", "Optimal", "", None, [], math.nan], ids=repr)
+def test_any_other_gap_count_has_one_message_for_the_whole_union(gap_count: object) -> None:
+    assert refused(bus__gap_count=gap_count) == ['expected a whole number from 0 to 63, or "optimal"']
+
+
+@pytest.mark.parametrize("speed", ["S100", "S200", "S400"])
+def test_speeds_up_to_s400_are_known(speed: str) -> None:
+    assert profile(bus__speed=speed).bus.speed == speed
+
+
+@pytest.mark.parametrize("speed", ["S800", "S1600", "S3200"])
+def test_faster_speeds_are_refused_with_the_reason(speed: str) -> None:
+    (message,) = refused(bus__speed=speed)
+    assert message.startswith(f"{speed} arbitrates by BOSS, which has no gaps")
+    assert message.endswith('Expected "S100", "S200" or "S400"')
+
+
+@pytest.mark.parametrize("speed", ["s400", "400", "S50", "S400 ", ""])
+def test_what_is_no_speed_at_all_is_refused_without_that_reason(speed: str) -> None:
+    assert "BOSS" not in " ".join(refused(bus__speed=speed))
+
+
+def test_a_chain_has_as_many_hops_as_nodes_and_a_tree_as_many_as_it_says() -> None:
+    chain = profile(bus__nodes=5).bus
+    assert [chain.hops(nodes) for nodes in (1, 5, 62)] == [1, 5, 62]
+    tree = profile(bus__nodes=5, bus__max_hops=3).bus
+    assert [tree.hops(nodes) for nodes in (1, 5, 62)] == [3, 3, 3]
+
+
+# From the gap-count table of IEEE 1394a for cables of 4.5 m, by hand.
+@pytest.mark.parametrize(
+    ("hops", "gap_count"), [(1, 5), (2, 7), (3, 8), (16, 43), (22, 59), (23, 62), (24, 63), (500, 63)]
+)
+def test_the_optimal_gap_count_follows_the_hops(hops: int, gap_count: int) -> None:
+    assert profile(bus__gap_count="optimal").bus.gap_count_for(hops) == gap_count
+    assert profile(bus__gap_count="optimal", bus__max_hops=hops).bus.gap_count_for(1) == gap_count
+
+
+def test_a_gap_count_that_is_given_does_not_follow_the_hops() -> None:
+    assert profile(bus__gap_count=7).bus.gap_count_for(16) == 7
+
+
+def test_the_optimal_gap_count_is_refused_for_cables_the_table_does_not_know() -> None:
+    (message,) = refused(bus__gap_count="optimal", bus__cable_length_m=4.6)
+    assert "up to 4.5 m" in message
+    assert "cable_length_m is 4.6" in message
+    assert "give the gap count as a number" in message
+    assert profile(bus__gap_count="optimal", bus__cable_length_m=4.5)
+    assert profile(bus__gap_count=63, bus__cable_length_m=4.6)
+
+
+@pytest.mark.parametrize(
+    ("speed", "rate_mbit_s", "limit"), [("S100", 98.304, 512), ("S200", 196.608, 1024), ("S400", 393.216, 2048)]
+)
+def test_a_link_has_the_rate_and_the_limits_of_its_speed(speed: str, rate_mbit_s: float, limit: int) -> None:
+    bus = profile(bus__speed=speed, bus__gap_count=9, bus__cable_length_m=2).bus
+    assert tuple(bus.link(3)) == pytest.approx((rate_mbit_s, 9, 3, 2.0), rel=1e-15)
+    assert bus.max_payload_bytes == limit
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"bus__nodes": 17},
+        {"bus__nodes": 63},
+        {"bus__nodes": 1000, "bus__max_hops": 17},
+        {"payload__read_bytes": 2049},
+        {"payload__write_bytes": 999_999, "bus__speed": "S100"},
+    ],
+    ids=str,
+)
+def test_what_breaks_the_standards_limits_loads(changes: dict[str, object]) -> None:
+    loaded = profile(**changes)
+    for key, value in changes.items():
+        assert value_of(loaded, key) == value
+
+
+# --- the cycle --------------------------------------------------------------------------------------------
+
+
+def test_the_synchronous_packet_grows_with_each_further_node() -> None:
+    sync = Sync(ping_us=0.3, ping_per_node_us=0.1)
+    assert [sync.sync_us(nodes) for nodes in (1, 2, 11)] == pytest.approx([0.3, 0.4, 1.3])
+
+
+# --- execution times --------------------------------------------------------------------------------------
+
+
+def test_a_linear_execution_time_grows_with_the_payload() -> None:
+    execution = LinearExecution(kind="linear", base_us=30, per_byte_us=0.25)
+    assert [execution.execution_us(size) for size in (1, 4, 1000)] == [30.25, 31.0, 280.0]
+
+
+def table(payload_bytes: list[int], time_us: list[float]) -> TableExecution:
+    return TableExecution.model_validate({"kind": "table", "payload_bytes": payload_bytes, "time_us": time_us})
+
+
+def test_a_table_is_exact_at_its_points_and_linear_between_them() -> None:
+    execution = table([4, 16, 64], [40.0, 34.0, 58.0])
+    assert [execution.execution_us(size) for size in (4, 16, 64)] == [40.0, 34.0, 58.0]
+    assert [execution.execution_us(size) for size in (5, 10, 15)] == pytest.approx([39.5, 37.0, 34.5])
+    assert [execution.execution_us(size) for size in (17, 40, 63)] == pytest.approx([34.5, 46.0, 57.5])
+
+
+@given(
+    points=st.dictionaries(st.integers(0, 4096), st.floats(0, 1e6), min_size=1, max_size=8),
+    share=st.floats(0, 1),
+)
+def test_between_two_points_a_time_is_between_their_times(points: dict[int, float], share: float) -> None:
+    sizes = sorted(points)
+    execution = table(sizes, [points[size] for size in sizes])
+    for size in sizes:
+        assert execution.execution_us(size) == points[size]
+    size = round(sizes[0] + share * (sizes[-1] - sizes[0]))
+    below = max(known for known in sizes if known <= size)
+    above = min(known for known in sizes if known >= size)
+    low, high = sorted((points[below], points[above]))
+    assert low - 1e-9 * high <= execution.execution_us(size) <= high * (1 + 1e-9)
+
+
+def test_a_table_covers_its_range_and_nothing_beyond() -> None:
+    execution = table([4, 16], [40.0, 34.0])
+    assert [execution.covers(size) for size in (3, 4, 5, 16, 17)] == [False, True, True, True, False]
+    assert execution.range_bytes == "4 to 16 bytes"
+
+
+def test_a_table_of_one_point_knows_that_point() -> None:
+    execution = table([12], [36.5])
+    assert (execution.execution_us(12), execution.covers(11), execution.covers(13)) == (36.5, False, False)
+
+
+@pytest.mark.parametrize(
+    ("payload_bytes", "time_us", "messages"),
+    [
+        pytest.param(
+            [4, 16], [1.0], ["has 1 values and payload_bytes has 2: the two must be of one length"], id="times too few"
+        ),
+        pytest.param(
+            [4], [1.0, 2.0], ["has 2 values and payload_bytes has 1: the two must be of one length"], id="too many"
+        ),
+        pytest.param([16, 4], [1.0, 2.0], ["payloads must ascend, and this follows 16"], id="descending"),
+        pytest.param([4, 4], [1.0, 2.0], ["payloads must ascend, and this follows 4"], id="equal"),
+        pytest.param(
+            [4, 3, 8, 8],
+            [1.0],
+            [
+                "payloads must ascend, and this follows 4",
+                "payloads must ascend, and this follows 8",
+                "has 1 values and payload_bytes has 4: the two must be of one length",
+            ],
+            id="both at once",
+        ),
+    ],
+)
+def test_what_is_no_table_is_refused_with_all_its_faults(
+    payload_bytes: list[int], time_us: list[float], messages: list[str]
+) -> None:
+    execution = {"kind": "table", "payload_bytes": payload_bytes, "time_us": time_us}
+    assert refused(node__execution=execution) == messages
+
+
+@pytest.mark.parametrize("key", ["payload_bytes", "time_us"])
+@pytest.mark.parametrize(
+    "value", [[], ["4"], [True], [-1], [math.nan], [None], [[4]], "44", 4, None, {"a": 4}], ids=repr
+)
+def test_a_tables_columns_are_arrays_of_numbers(key: str, value: object) -> None:
+    assert refused(node__execution={"kind": "table", "payload_bytes": [4], "time_us": [4], key: value})
+
+
+def test_a_tables_payloads_are_whole_and_its_times_need_not_be() -> None:
+    assert refused(node__execution={"kind": "table", "payload_bytes": [4.0], "time_us": [4]})
+    assert table([4], [4]).time_us == (4.0,)
+
+
+@pytest.mark.parametrize(
+    ("read_bytes", "write_bytes", "count"), [(3, 12, 1), (12, 65, 1), (3, 65, 2), (4, 64, 0), (64, 4, 0)]
+)
+def test_a_payload_outside_the_table_is_refused_each_with_its_key(
+    read_bytes: int, write_bytes: int, count: int
+) -> None:
+    changes = {"node__execution": TABLE, "payload__read_bytes": read_bytes, "payload__write_bytes": write_bytes}
+    if not count:
+        assert profile(**changes)
+        return
+    messages = refused(**changes)
+    assert len(messages) == count
+    assert all("is outside the execution table, 4 to 64 bytes" in message for message in messages)
+
+
+def test_a_linear_execution_time_knows_every_payload() -> None:
+    assert profile(payload__read_bytes=1_000_000)
+
+
+def test_the_kind_of_bus_is_the_unions_tag() -> None:
+    assert refused(bus__kind="can")
+    assert isinstance(profile().bus, Ieee1394Bus)

@@ -1,0 +1,208 @@
+"""The profiles that come with busplan: how they are found, what they hold, and how a new one is made of them."""
+
+import difflib
+import tomllib
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+from busplan.errors import BusplanError
+from busplan.profile.bus import TableExecution
+from busplan.profile.shipped import load, locate, shipped_folder, shipped_names
+from busplan.profile.starter import starter_text
+from busplan.profile.toml import decode, validate
+
+NAMES = ["paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]
+
+# Table I, experiment, as printed: payload in bytes, T_lant and T1+T2 in us.
+TABLE_1 = [
+    (4, "48.7", "6"),
+    (16, "48.9", "6.3"),
+    (32, "57.9", "6.6"),
+    (64, "68.1", "7.5"),
+    (128, "99.9", "9.1"),
+    (256, "158.5", "11.5"),
+    (512, "246.0", "16.9"),
+    (1024, "460.0", "27.4"),
+]
+
+
+SCHEMA_LINE = "#:schema ./busplan.schema.json\n"
+"""Right in the shipped folder alone: a starter has none."""
+
+
+def text_of(name: str) -> str:
+    return (shipped_folder() / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def test_the_promised_profiles_are_shipped() -> None:
+    assert set(NAMES) <= set(shipped_names())
+    assert shipped_names() == sorted(shipped_names())
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_shipped_profile_loads_under_its_own_name(name: str) -> None:
+    loaded = load(name)
+    assert loaded.profile.name == name
+    assert loaded.profile.description.strip()
+    assert loaded.document.text == text_of(name)
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_shipped_profile_knows_the_place_of_every_value(name: str) -> None:
+    document = load(name).document
+    for path, place in document.places.items():
+        if isinstance(path[-1], str):
+            assert document.text[place.key_start : place.key_end] == path[-1]
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_shipped_profile_explains_its_keys(name: str) -> None:
+    assert text_of(name).count("#") >= 5
+    assert text_of(name).isascii()
+
+
+def test_the_profiles_of_the_experiment_differ_in_their_period_and_in_words_only() -> None:
+    slow, fast = load("paper-4ms").profile, load("paper-1ms").profile
+    assert (slow.cycle.period_us, fast.cycle.period_us) == (4000, 1000)
+    assert slow.bus == fast.bus
+    assert slow.payload == fast.payload
+    assert slow.node == fast.node
+    assert slow.cycle.model_copy(update={"period_us": 1000.0}) == fast.cycle
+
+
+def test_the_experiment_is_that_of_section_4() -> None:
+    plan = load("paper-4ms").profile
+    assert (plan.bus.speed, plan.bus.gap_count, plan.bus.nodes, plan.bus.max_hops) == ("S400", 63, 2, None)
+    assert (plan.bus.cable_length_m, plan.bus.timing_model) == (4.5, "paper")
+    assert (plan.cycle.slice_ratio, plan.cycle.sync.ping_us, plan.cycle.sync.ping_per_node_us) == (0.5, 0.3, 0.1)
+    assert (plan.payload.read_bytes, plan.payload.write_bytes, plan.payload.overhead_bytes) == (12, 12, 20)
+    assert plan.node.axes == 4
+
+
+def test_the_bench_is_that_of_table_1() -> None:
+    plan = load("paper-two-node").profile
+    assert (plan.bus.speed, plan.bus.gap_count, plan.bus.nodes) == ("S400", 63, 1)
+
+
+@pytest.mark.parametrize("name", ["paper-two-node", "paper-4ms", "paper-1ms", "paper-optimal-gap"])
+def test_execution_times_are_table_1_row_by_row(name: str) -> None:
+    execution = load(name).profile.node.execution
+    assert isinstance(execution, TableExecution)
+    assert list(execution.payload_bytes) == [size for size, _, _ in TABLE_1]
+    # Decimal, because the paper's figures are.
+    expected = [float(Decimal(latency) - 2 * Decimal(half)) for _, latency, half in TABLE_1]
+    assert list(execution.time_us) == expected
+
+
+def test_the_optimal_gap_profile_leaves_the_gap_count_to_the_table() -> None:
+    plan = load("paper-optimal-gap").profile
+    assert plan.bus.gap_count == "optimal"
+    assert plan.bus.gap_count_for(plan.bus.nodes) == 7
+
+
+def test_the_what_if_states_its_assumption() -> None:
+    plan = load("paper-dma").profile
+    assert plan.node.execution.execution_us(100) == pytest.approx(10 + 0.05 * 100)
+    assert "assumption" in plan.description
+
+
+# --- finding a profile ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working directory."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_shipped_name_means_the_shipped_profile(name: str, work: Path) -> None:
+    assert locate(name) == (shipped_folder() / f"{name}.toml", f"{name}.toml")
+    (work / name).write_text("not this one", encoding="utf-8")
+    (work / f"{name}.toml").write_text("nor this one", encoding="utf-8")
+    assert locate(name) == (shipped_folder() / f"{name}.toml", f"{name}.toml")
+
+
+@pytest.mark.parametrize("argument", ["./paper-4ms", "paper-4ms.toml", "./paper-4ms.toml", "sub/../paper-4ms"])
+def test_a_path_means_the_file_even_if_its_name_is_a_shipped_one(argument: str, work: Path) -> None:
+    (work / "sub").mkdir()
+    (work / argument).write_text(text_of("paper-4ms").replace('"paper-4ms"', '"mine"'), encoding="utf-8")
+    assert locate(argument) == (Path(argument), argument)
+    assert load(argument).profile.name == "mine"
+
+
+def test_an_absolute_path_is_a_path(work: Path) -> None:
+    path = work / "x"
+    path.touch()
+    assert locate(str(path)) == (path, str(path))
+
+
+@pytest.mark.parametrize("argument", ["paper-4ms.toml", "paper", "PAPER-4MS", "../paper-4ms", "paper-4ms/"])
+@pytest.mark.usefixtures("work")
+def test_what_is_neither_is_refused_with_the_shipped_names(argument: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        locate(argument)
+    assert str(caught.value).startswith(f"{argument}: no such file, and no shipped profile of that name; shipped are ")
+    assert all(name in str(caught.value) for name in NAMES)
+
+
+@pytest.mark.usefixtures("work")
+def test_an_empty_path_is_refused() -> None:
+    with pytest.raises(BusplanError, match=r"\A'': no such file, and no shipped profile of that name; "):
+        load("")
+
+
+def test_a_dash_is_standard_input_even_beside_a_file_of_that_name(work: Path) -> None:
+    (work / "-").touch()
+    assert locate("-") == (Path("-"), "<stdin>")
+
+
+@pytest.mark.parametrize("argument", ["a\0b", "x" * 5000], ids=["NUL", "too long"])
+def test_a_path_that_no_system_takes_is_refused_in_words(argument: str) -> None:
+    with pytest.raises(BusplanError, match=r"cannot be read|no such file"):
+        load(argument)
+
+
+def test_messages_of_a_file_call_it_as_it_was_called(work: Path) -> None:
+    (work / "sub").mkdir()
+    (work / "sub" / "x.toml").write_text("a", encoding="utf-8")
+    with pytest.raises(BusplanError, match=r"\Asub/x\.toml:1:2: "):
+        load("sub/x.toml")
+
+
+# --- a new profile ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("source", shipped_names())
+@pytest.mark.parametrize("name", ["mine", "[bold]x[/]", 'say "hi"', "back\\slash\\", "größe", "'", "x" * 100, "a # b"])
+def test_a_starter_differs_from_its_source_in_the_name_only(source: str, name: str) -> None:
+    text = starter_text(source, name=name)
+    source_text = text_of(source).removeprefix(SCHEMA_LINE)
+    changed = [line for line in difflib.ndiff(source_text.splitlines(), text.splitlines()) if line[:1] in "+-"]
+    assert len(changed) == 2
+    assert changed[0] == f'- name = "{source}"'
+    assert tomllib.loads(changed[1][2:]) == {"name": name}
+    assert validate(decode(text.encode(), name="x")) == load(source).profile.model_copy(update={"name": name})
+
+
+@pytest.mark.parametrize("source", shipped_names())
+def test_a_starter_under_its_own_name_is_the_source_without_the_line_of_the_schema(source: str) -> None:
+    assert text_of(source).startswith(SCHEMA_LINE)
+    assert SCHEMA_LINE + starter_text(source, name=source) == text_of(source)
+
+
+@pytest.mark.parametrize("name", ["", "x" * 101, "a\nb", "\x1b[31m", "\udcff", 'x"\nevil = 1 #'], ids=ascii)
+def test_a_starter_has_no_name_that_a_profile_cannot_have(name: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        starter_text("paper-4ms", name=name)
+    assert str(caught.value) == f"{name!r}: no name for a profile; expected 1 to 100 printable characters"
+
+
+@pytest.mark.parametrize("source", ["nope", "", "paper-4ms.toml", "../profiles/paper-4ms", "-"])
+def test_a_starter_comes_from_a_shipped_profile_only(source: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        starter_text(source, name="x")
+    assert str(caught.value).startswith(f"--from {source}: no shipped profile; shipped are paper-1ms, ")

@@ -1,0 +1,679 @@
+"""From bytes to a profile: every fault gives one clear message with its place, and nothing else ever happens."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from busplan.errors import BusplanError, PlacedError, PlacedProblem
+from busplan.profile.bus import TableExecution
+from busplan.profile.model import Profile
+from busplan.profile.shipped import shipped_folder
+from busplan.profile.toml import MAX_FILE_BYTES, decode, override, read_bytes, validate
+
+TEXT: Final = """\
+schema_version = 1
+name = "test"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+gap_count = 63
+nodes = 2
+[cycle]
+period_us = 4000
+slice_ratio = 0.5
+[cycle.sync]
+ping_us = 0.3
+[payload]
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+[node.execution]
+kind = "table"
+payload_bytes = [4, 16, 32]
+time_us = [36.7, 36.3, 44.7]
+"""
+
+
+def edited(*changes: tuple[str, str]) -> str:
+    """The text with some of it replaced; what is to be replaced must be there once."""
+    text = TEXT
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+def read(content: str | bytes) -> Profile:
+    return validate(decode(content.encode() if isinstance(content, str) else content, name="f.toml"))
+
+
+def problems(content: str | bytes) -> tuple[str, ...]:
+    """What is said of a file that must not load."""
+    with pytest.raises(BusplanError) as caught:
+        read(content)
+    assert str(caught.value) == "\n".join(caught.value.problems)
+    return caught.value.problems
+
+
+def the_problem(content: str | bytes) -> str:
+    """The only thing that is said of a file that must not load, on one line."""
+    (problem,) = problems(content)
+    assert "\n" not in problem
+    assert problem.isprintable()
+    return problem
+
+
+def test_the_text_of_these_tests_is_a_profile() -> None:
+    assert read(TEXT).name == "test"
+
+
+# --- one fault, one message -------------------------------------------------------------------------------
+
+FAULTS = {
+    "wrong type, text": ("nodes = 2", 'nodes = "2"', '7:1: bus.nodes = "2": expected a whole number'),
+    "wrong type, bool": ("nodes = 2", "nodes = true", "7:1: bus.nodes = true: expected a whole number"),
+    "wrong type, float": ("nodes = 2", "nodes = 2.0", "7:1: bus.nodes = 2.0: expected a whole number"),
+    "wrong type, date": (
+        *("nodes = 2", "nodes = 1979-05-27 07:32:00"),
+        "7:1: bus.nodes = 1979-05-27 07:32:00: expected a whole number",
+    ),
+    "wrong type, bool for a float": ("us = 4000", "us = false", "9:1: cycle.period_us = false: expected a number"),
+    "wrong type, number for a text": ('"test"', "7", "2:1: name = 7: expected a text in quotes"),
+    "unknown section": ("[bus]", "[buss]\n[bus]", "3:2: buss: unknown key; did you mean bus?"),
+    "nan": ("4000", "nan", "9:1: cycle.period_us = nan: must be finite"),
+    "inf": ("4000", "inf", "9:1: cycle.period_us = inf: must be finite"),
+    "minus inf": ("4000", "-inf", "9:1: cycle.period_us = -inf: must be finite"),
+    "nan, where zero is allowed": ("ping_us = 0.3", "ping_us = nan", "12:1: cycle.sync.ping_us = nan: must be finite"),
+    "overflow": ("4000", "1e400", "9:1: cycle.period_us = 1e400: must be finite"),
+    "negative": ("ping_us = 0.3", "ping_us = -0.3", "12:1: cycle.sync.ping_us = -0.3: must be 0 or more"),
+    "zero period": ("4000", "0", "9:1: cycle.period_us = 0: must be 0.001 or more"),
+    "zero nodes": ("nodes = 2", "nodes = 0", "7:1: bus.nodes = 0: must be 1 or more"),
+    "too large": ("slice_ratio = 0.5", "slice_ratio = 1.5", "10:1: cycle.slice_ratio = 1.5: must be 1 or less"),
+    "as written": ("nodes = 2", "nodes   =  0x00", "7:1: bus.nodes = 0x00: must be 1 or more"),
+    "unknown speed": ('"S400"', '"S500"', '5:1: bus.speed = "S500": expected "S100", "S200" or "S400"'),
+    "unknown grade of execution": (
+        *('kind = "table"', 'kind = "table"\ngrade = "guessed"'),
+        ('20:1: node.execution.grade = "guessed": expected "measured", "derived", "calibrated" or "assumed"'),
+    ),
+    "unknown kind of bus": ('"ieee1394"', '"can"', '4:1: bus.kind = "can": expected "ieee1394"'),
+    "S800": (
+        *('"S400"', '"S800"'),
+        ('5:1: bus.speed = "S800": S800 arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. '
+        'Expected "S100", "S200" or "S400"'),
+    ),
+    "gap count": (
+        *("gap_count = 63", "gap_count = 64"),
+        '6:1: bus.gap_count = 64: expected a whole number from 0 to 63, or "optimal"',
+    ),
+    "gap count in words": (
+        *("gap_count = 63", 'gap_count = "best"'),
+        '6:1: bus.gap_count = "best": expected a whole number from 0 to 63, or "optimal"',
+    ),
+    "unknown form of execution": (
+        *('"table"', '"cubic"'),
+        '19:1: node.execution.kind = "cubic": expected "table" or "linear"',
+    ),
+    "schema version": ("schema_version = 1", "schema_version = 2", "1:1: schema_version = 2: expected 1"),
+    "empty name": ('"test"', '""', '2:1: name = "": must not be empty'),
+    "escapes in the name": (
+        *('"test"', '"\\u001b[31m"'),
+        '2:1: name = "\\u001b[31m": must not hold control characters',
+    ),
+    "lengths of the table": (
+        *("[36.7, 36.3, 44.7]", "[36.7, 36.3]"),
+        ("21:1: node.execution.time_us = [36.7, 36.3]: has 2 values and payload_bytes has 3: "
+        "the two must be of one length"),
+    ),
+    "table does not ascend": (
+        *("[4, 16, 32]", "[4, 32, 16]"),
+        "20:25: node.execution.payload_bytes[2] = 16: payloads must ascend, and this follows 32",
+    ),
+    "empty table": (
+        *("[4, 16, 32]", "[]"),
+        "20:1: node.execution.payload_bytes = []: must not be empty",
+    ),
+    "element of the table": (
+        *("36.3,", '"36.3",'),
+        '21:18: node.execution.time_us[1] = "36.3": expected a number',
+    ),
+    "column of the table": (
+        *("[4, 16, 32]", "4"),
+        "20:1: node.execution.payload_bytes = 4: expected an array",
+    ),
+    "payload outside the table": (
+        *("read_bytes = 12", "read_bytes = 33"),
+        ("14:1: payload.read_bytes = 33: is outside the execution table, 4 to 32 bytes: measure it and add it to "
+        'node.execution, or use kind = "linear"'),
+    ),
+    "unknown key": ("[payload]", "[payload]\nxyz = 1", ("14:1: payload.xyz: unknown key; known here: read_bytes, "
+                    "write_bytes, overhead_bytes")),
+    "unknown key, nearly right": (
+        *("[node]", "[node]\nexes = 1"),
+        "17:1: node.exes: unknown key; did you mean axes?",
+    ),
+    "unknown key of the table": (
+        *('kind = "table"', 'kind = "table"\nbase_us = 1'),
+        "20:1: node.execution.base_us: unknown key; known here: grade, kind, payload_bytes, time_us",
+    ),
+    "missing key": (
+        *("nodes = 2\n", ""),
+        "3:2: bus.nodes: missing key. Distributed nodes N, host not counted; for example nodes = 2",
+    ),
+    "missing key of the table": (
+        *("time_us = [36.7, 36.3, 44.7]\n", ""),
+        ("18:7: node.execution.time_us: missing key. Execution time T_exec of each [us]; "
+        "for example time_us = [36.7, 36.3]"),
+    ),
+    "inline": (
+        *("[cycle.sync]\nping_us = 0.3", "sync = { ping_us = -1 }"),
+        "11:10: cycle.sync.ping_us = -1: must be 0 or more",
+    ),
+    "dotted": (
+        *("[cycle.sync]\nping_us = 0.3", "sync.ping_us = -1"),
+        "11:6: cycle.sync.ping_us = -1: must be 0 or more",
+    ),
+    "indented": ("nodes = 2", "\t  nodes = 0", "7:4: bus.nodes = 0: must be 1 or more"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "message"), FAULTS.values(), ids=FAULTS)
+def test_a_fault_gives_one_message_with_place_key_value_and_what_would_be_right(
+    old: str, new: str, message: str
+) -> None:
+    assert the_problem(edited((old, new))) == f"f.toml:{message}"
+
+
+@pytest.mark.parametrize(("old", "new", "message"), FAULTS.values(), ids=FAULTS)
+def test_places_and_words_are_the_same_under_windows(old: str, new: str, message: str) -> None:
+    content = b"\xef\xbb\xbf" + edited((old, new)).replace("\n", "\r\n").encode()
+    assert the_problem(content) == f"f.toml:{message}"
+
+
+@pytest.mark.parametrize(
+    ("section", "needed"),
+    [
+        ("bus", "kind, speed, nodes"),
+        ("cycle", "period_us"),
+        ("payload", "read_bytes, write_bytes"),
+        ("node", "axes, execution"),
+    ],
+)
+def test_a_missing_section_is_named_with_its_brackets_and_what_it_needs(section: str, needed: str) -> None:
+    text = re.sub(rf"(?s)\[{section}.*?(?=\n\[(?!{section})|\Z)\n?", "", TEXT)
+    assert the_problem(text) == f"f.toml:1:1: {section}: missing section [{section}]; it needs {needed}"
+
+
+def test_a_missing_section_inside_another_stands_at_that_other() -> None:
+    text = TEXT.partition("[node.execution]")[0]
+    assert the_problem(text) == (
+        "f.toml:16:2: node.execution: missing section [node.execution]; it needs kind, payload_bytes, time_us"
+    )
+
+
+@pytest.mark.parametrize("value", ["1", '"x"', "[]", "true"])
+def test_what_should_be_a_section_and_is_a_value_is_shown(value: str) -> None:
+    without = re.sub(r"(?s)\[bus\].*(?=\[cycle\])", "", TEXT)
+    assert the_problem(f"bus = {value}\n{without}") == f"f.toml:1:1: bus = {value}: expected a table"
+
+
+@pytest.mark.parametrize(("old", "subject"), [("[bus]", "3:3: bus"), ("[node.execution]", "18:8: node.execution")])
+def test_an_array_of_tables_is_no_section_and_has_no_value_to_show(old: str, subject: str) -> None:
+    assert the_problem(edited((old, f"[{old}]"))) == f"f.toml:{subject}: expected a table"
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        pytest.param(edited(('kind = "table"\n', "")), "18:7", id="header"),
+        pytest.param(TEXT.partition("[node.exec")[0] + "execution = {base_us = 1}", "18:1", id="inline"),
+    ],
+)
+def test_a_missing_kind_shows_no_value(text: str, place: str) -> None:
+    message = 'missing key; expected kind = "table" or kind = "linear"'
+    assert the_problem(text) == f"f.toml:{place}: node.execution.kind: {message}"
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        ("'a b'", '"a b"'),
+        ("'a.b'", '"a.b"'),
+        ("''", '""'),
+        ("12", "12"),
+        ("a-b_c", "a-b_c"),
+        ('"größe"', '"größe"'),
+        ("'\"'", '"\\""'),
+    ],
+)
+def test_an_unknown_key_is_shown_so_that_it_can_be_found(written: str, shown: str) -> None:
+    assert the_problem(f"{written} = 1\n{TEXT}").startswith(f"f.toml:1:1: {shown}: unknown key; ")
+
+
+def test_an_unknown_key_brings_no_control_characters_into_the_message() -> None:
+    assert the_problem(f'"\\u001b[31m\\n\\u2028\\u009b" = 1\n{TEXT}').isascii()
+
+
+def test_unknown_keys_inside_an_unknown_table_are_not_counted_up() -> None:
+    assert the_problem(f"{TEXT}\n[xyz]\na = 1\nb = 2\n[xyz.c]\n").startswith(
+        "f.toml:23:2: xyz: unknown key; known here"
+    )
+
+
+# --- the value as written ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("written", "shown"),
+    [
+        pytest.param('"' + "x" * 38 + '"', '"' + "x" * 38 + '"', id="forty characters are shown whole"),
+        pytest.param('"' + "x" * 39 + '"', '"' + "x" * 39 + "...", id="more are cut"),
+        pytest.param('"""a\nb\tc"""', '"""a b c"""', id="lines become spaces"),
+        pytest.param("'\u202e\u2028x'", "'  x'", id="what turns text around is not obeyed"),
+        pytest.param('"\\u0041\\n"', '"\\u0041\\n"', id="escapes stay escapes"),
+        pytest.param("{ a = 1,  b = [ 2 ] }", "{ a = 1,  b = [ 2 ] }", id="inline tables stay as they are"),
+        pytest.param("[ # x\n 1,\n]", "[ # x  1, ]", id="arrays over lines become one line"),
+        pytest.param("1_000.5", "1_000.5", id="numbers keep their underscores"),
+    ],
+)
+def test_a_value_is_shown_as_written_on_one_line(written: str, shown: str) -> None:
+    assert the_problem(edited(("nodes = 2", f"nodes = {written} # comment"))) == (
+        f"f.toml:7:1: bus.nodes = {shown}: expected a whole number"
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "shown", "wrong"),
+    [
+        ("9" * 400, "9" * 40 + "...", "must be 1,000,000 or less"),
+        ("0x" + "f" * 5000, "0x" + "f" * 38 + "...", "must be 1,000,000 or less"),
+        ("-" + "9" * 400, "-" + "9" * 39 + "...", "must be 1 or more"),
+    ],
+)
+def test_a_huge_integer_is_out_of_range_and_shown_short(written: str, shown: str, wrong: str) -> None:
+    assert the_problem(edited(("nodes = 2", f"nodes = {written}"))) == f"f.toml:7:1: bus.nodes = {shown}: {wrong}"
+
+
+def test_an_integer_that_python_does_not_convert_is_refused_at_its_place() -> None:
+    text = edited(("nodes = 2", f"nodes = {'9' * (sys.get_int_max_str_digits() + 1)}"))
+    assert the_problem(text) == "f.toml:7:9: not valid TOML: a number with too many digits"
+
+
+def test_a_huge_integer_for_a_float_is_out_of_range() -> None:
+    assert the_problem(edited(("4000", "9" * 400))) == (
+        f"f.toml:9:1: cycle.period_us = {'9' * 40}...: is a number too large for any quantity"
+    )
+
+
+# --- all faults of a file ---------------------------------------------------------------------------------
+
+
+def test_all_faults_of_a_file_come_at_once_and_in_the_order_of_their_places() -> None:
+    text = edited(
+        ('name = "test"', 'nme = "test"'),
+        ("nodes = 2", 'nodes = "2"'),
+        ("4000", "0"),
+        ("[payload]", "[paylod]"),
+        ("36.3", "-1"),
+        ("slice_ratio = 0.5", "slice_ratio = nan"),
+        ("axes = 4", "axes = 0"),
+    )
+    assert [re.sub(r"^f\.toml:(\d+:\d+: [^ :]+).*", r"\1", problem) for problem in problems(text)] == [
+        "1:1: name",
+        "1:1: payload",
+        "2:1: nme",
+        "7:1: bus.nodes",
+        "9:1: cycle.period_us",
+        "10:1: cycle.slice_ratio",
+        "13:2: paylod",
+        "17:1: node.axes",
+        "21:18: node.execution.time_us[1]",
+    ]
+
+
+@pytest.mark.parametrize(("count", "more"), [(50, []), (51, ["f.toml: and 1 more problems"])])
+def test_no_more_than_fifty_faults_are_listed(count: int, more: list[str]) -> None:
+    unknown = "".join(f"x{number} = 1\n" for number in range(count))
+    said = problems(unknown + TEXT)
+    assert [problem.partition(": ")[0] for problem in said[:50]] == [f"f.toml:{line}:1" for line in range(1, 51)]
+    assert list(said[50:]) == more
+
+
+def test_a_table_that_is_wrong_in_two_ways_says_both() -> None:
+    text = edited(("[4, 16, 32]", "[16, 4, 4, 64]"))
+    assert [problem.partition(": ")[0] for problem in problems(text)] == ["f.toml:20:22", "f.toml:20:25", "f.toml:21:1"]
+
+
+def test_both_payloads_outside_the_table_are_said() -> None:
+    text = edited(("read_bytes = 12", "read_bytes = 1"), ("write_bytes = 12", "write_bytes = 1024"))
+    assert [problem.partition(": ")[0] for problem in problems(text)] == ["f.toml:14:1", "f.toml:15:1"]
+
+
+@pytest.mark.parametrize("text", ["", "\n", "# a comment", "\ufeff", " \r\n\t"], ids=repr)
+def test_an_empty_file_is_told_all_that_is_missing(text: str) -> None:
+    assert [problem.split(": ")[:2] for problem in problems(text)] == [
+        ["f.toml:1:1", key] for key in ("schema_version", "name", "bus", "cycle", "payload", "node")
+    ]
+
+
+# --- what is no TOML --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        pytest.param("a = ", "1:5", id="no value"),
+        pytest.param("a = 1\nb = \nc = 1", "2:5", id="no value, further down"),
+        pytest.param("a = 1\r\nb = \r\nc = 1", "2:5", id="no value, Windows"),
+        pytest.param("a", "1:2", id="no equals sign"),
+        pytest.param("a = 1\na = 2", "2:6", id="twice"),
+        pytest.param("[a]\n[b]\n[a]\n", "3:3", id="table twice"),
+        pytest.param("a = [1,\n2,\n", "2:3", id="open array"),
+        pytest.param("a = [1,\r\n2,\r\n\r\n", "2:3", id="open array, Windows"),
+        pytest.param('a = """\nx\n', "2:2", id="open text"),
+        pytest.param('a = "x\nb = 1', "1:7", id="text over a line end"),
+        pytest.param('a = "\\q"', "1:8", id="no such escape"),
+        pytest.param("a = 1 b = 2", "1:7", id="two on a line"),
+        pytest.param("a = 1\rb = 2", "1:6", id="line ends of old Macs"),
+        pytest.param("\ufeffa = ", "1:5", id="after a byte order mark"),
+        pytest.param("é = 1", "1:1", id="a key that wants quotes"),
+        pytest.param('"é😀" = x', "1:8", id="columns count characters"),
+        pytest.param("\x00", "1:1", id="NUL"),
+        pytest.param("\ufeff\ufeff", "1:1", id="a second byte order mark"),
+    ],
+)
+def test_a_syntax_error_gives_one_message_with_its_place(text: str, place: str) -> None:
+    problem = the_problem(text)
+    line, column = map(int, place.split(":"))
+    match = re.match(r"f\.toml:(\d+):(\d+): not valid TOML: [a-z]", problem)
+    assert match, problem
+    assert int(match[1]) == line, problem
+    # Where exactly on the line is the standard library's affair.
+    assert abs(int(match[2]) - column) <= 2, problem
+
+
+@pytest.mark.parametrize("text", ["a = [", "a = 1\nb = {x = 1", 'a = """', "a = [\n\n\n"])
+def test_a_file_that_ends_too_early_is_told_so(text: str) -> None:
+    assert the_problem(text).endswith(", and the file ends")
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "byte"),
+    [
+        (b"\xff", "1:1", "0xff"),
+        (b"a = 1\nb = '\xe9'\n", "2:6", "0xe9"),
+        (b"a = 1\r\nb = '\xe9'\r\n", "2:6", "0xe9"),
+        ("é😀 = ".encode() + b"\x80", "1:6", "0x80"),
+        (b"a = 1\n\xc3", "2:1", "0xc3"),
+        (b"\xed\xa0\x80", "1:1", "0xed"),
+        ("a = 1".encode("utf-16"), "1:1", "0xff"),
+        (b"\x89PNG\r\n\x1a\n\x00", "1:1", "0x89"),
+    ],
+    ids=repr,
+)
+def test_a_file_that_is_no_utf8_is_told_where(content: bytes, place: str, byte: str) -> None:
+    assert the_problem(content) == (
+        f"f.toml:{place}: not a text file: byte {byte} is not UTF-8; a profile is TOML in UTF-8"
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "place"),
+    [(b"\xef\xbb\xbf\xff", "1:1"), (b"\xef\xbb\xbfa\n\xff", "2:1"), ("\ufeffé = '".encode() + b"\xff", "1:6")],
+    ids=repr,
+)
+def test_a_byte_order_mark_moves_no_place_of_a_wrong_byte(content: bytes, place: str) -> None:
+    assert the_problem(content).startswith(f"f.toml:{place}: not a text file: byte 0xff")
+
+
+def test_a_byte_order_mark_is_stepped_over() -> None:
+    assert read(b"\xef\xbb\xbf" + TEXT.encode()) == read(TEXT)
+
+
+def test_a_file_may_be_as_long_as_the_limit_and_no_longer() -> None:
+    comment = "#" * (MAX_FILE_BYTES - len(TEXT))
+    assert read(TEXT + comment).name == "test"
+    assert the_problem(f"{TEXT}{comment}#") == (
+        "f.toml:1:1: the file is larger than 100,000 bytes; a profile is a page of TOML"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        pytest.param("a = " + "[" * 90_000, "1:105", id="arrays"),
+        pytest.param("a = " + "[" * 2000 + "]" * 2000, "1:105", id="closed arrays"),
+        pytest.param("a = " + "{a=" * 2000, "1:305", id="inline tables"),
+        pytest.param("a = 1\nb = " + "[\n" * 2000, "102:1", id="arrays over lines"),
+        pytest.param("a = 1\nb = " + "[{a=" * 2000, None, id="both"),
+        pytest.param(f"a = [{'[{}],' * 200}]\nb = {'[' * 2000}", "2:105", id="after brackets that were closed"),
+    ],
+)
+def test_deep_nesting_is_refused_at_its_place(text: str, place: str | None) -> None:
+    problem = the_problem(text)
+    assert problem.endswith(": nested too deeply; a profile needs no more than two brackets inside each other")
+    if place is not None:
+        assert problem.startswith(f"f.toml:{place}: ")
+
+
+def test_nesting_that_the_standard_library_reads_is_an_unknown_key_like_any_other() -> None:
+    assert the_problem(f"a = {'[' * 200}{']' * 200}\n{TEXT}").startswith("f.toml:1:1: a: unknown key; ")
+
+
+def test_a_dotted_key_of_some_parts_is_an_unknown_key_like_any_other() -> None:
+    assert the_problem(f"{'.'.join('a' * 20)} = 1\n{TEXT}").startswith("f.toml:1:1: a: unknown key; ")
+
+
+@pytest.mark.parametrize("part", ["a", "'a'", '"a"', '""', r'"\""', r'"\\"'])
+@pytest.mark.parametrize("dot", [".", " . "])
+@pytest.mark.parametrize("parts", [21, 10_000])
+def test_a_dotted_key_of_many_parts_is_refused_before_it_costs_their_square(part: str, dot: str, parts: int) -> None:
+    parts = min(parts, 90_000 // len(part + dot))
+    written = dot.join([part] * parts)
+    message = "a key of more than 20 parts is no profile's"
+    assert the_problem(f"{TEXT}[t]\n{written} = 1\n") == f"f.toml:23:1: {message}"
+    assert the_problem(f"{TEXT}[{written}]\n") == f"f.toml:22:2: {message}"
+
+
+def test_what_is_wrong_with_a_file_comes_placed() -> None:
+    with pytest.raises(PlacedError) as caught:
+        read(edited(("nodes = 2", "nodes = 0")))
+    assert caught.value.placed == (
+        PlacedProblem(7, 1, "out-of-range", "bus.nodes = 0: must be 1 or more", "bus.nodes"),
+    )
+    for content in (b"\xff", b"#" * (MAX_FILE_BYTES + 1), b"a", b"a = " + b"[" * 2000, b"a." * 21 + b"a = 1"):
+        with pytest.raises(PlacedError) as caught:
+            decode(content, name="f.toml").data()
+        assert [problem.kind for problem in caught.value.placed] == ["syntax"]
+
+
+# --- reading files ----------------------------------------------------------------------------------------
+
+
+def test_a_file_is_read_no_further_than_a_profile_can_be_long(tmp_path: Path) -> None:
+    path = tmp_path / "large.toml"
+    with path.open("wb") as file:
+        file.truncate(10 * MAX_FILE_BYTES)
+    assert len(read_bytes(path, name="x")) == MAX_FILE_BYTES + 1
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("missing.toml", "x: no such file"),
+        (".", "x: is a directory; give a file"),
+        ("file/below.toml", "x: cannot be read: Not a directory"),
+        ("nul\0.toml", "x: cannot be read: "),
+        ("long" * 1000, "x: cannot be read: File name too long"),
+        ("loop", "x: cannot be read: Too many levels of symbolic links"),
+    ],
+    ids=lambda value: repr(value)[:20],
+)
+def test_what_cannot_be_read_says_why(path: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    Path("loop").symlink_to("loop")
+    with pytest.raises(BusplanError) as caught:
+        read_bytes(Path(path), name="x")
+    assert str(caught.value).startswith(message)
+
+
+# --- changes of a profile ---------------------------------------------------------------------------------
+
+
+def test_a_change_makes_a_new_profile_and_leaves_the_old() -> None:
+    before = read(TEXT)
+    after = override(before, {"bus.nodes": 5, "cycle.sync.ping_us": 1, "node.execution.time_us": (1, 2, 3)})
+    assert (after.bus.nodes, after.cycle.sync.ping_us, after.node.axes) == (5, 1.0, 4)
+    assert isinstance(after.node.execution, TableExecution)
+    assert after.node.execution.time_us == (1.0, 2.0, 3.0)
+    assert before == read(TEXT)
+
+
+def test_no_change_gives_the_profile_itself() -> None:
+    before = read(TEXT)
+    assert override(before, {}) is before
+
+
+def test_a_change_that_changes_nothing_gives_an_equal_profile() -> None:
+    assert override(read(TEXT), {"bus.nodes": 2}) == read(TEXT)
+
+
+@pytest.mark.parametrize(
+    ("changes", "origin", "messages"),
+    [
+        pytest.param({"bus.nodes": 0}, {"bus.nodes": "--nodes"}, ["--nodes 0: must be 1 or more"], id="option"),
+        pytest.param({"bus.nodes": 0}, None, ["bus.nodes 0: must be 1 or more"], id="key"),
+        pytest.param(
+            {"bus.nodes": 0, "bus.gap_count": "best"},
+            {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"},
+            ['--gap-count best: expected a whole number from 0 to 63, or "optimal"', "--nodes 0: must be 1 or more"],
+            id="two options",
+        ),
+        pytest.param(
+            {"payload.read_bytes": 64},
+            {"payload.read_bytes": "--read"},
+            [
+                (
+                    "--read 64: is outside the execution table, 4 to 32 bytes: measure it and add it to "
+                    'node.execution, or use kind = "linear"'
+                )
+            ],
+            id="found by the whole profile",
+        ),
+        pytest.param(
+            {"bus.speed": "S800"}, {"bus.speed": "--speed"}, ["--speed S800: S800 arbitrates by BOSS"], id="S800"
+        ),
+    ],
+)
+def test_a_change_that_is_refused_is_called_by_its_option(
+    changes: dict[str, object], origin: dict[str, str] | None, messages: list[str]
+) -> None:
+    with pytest.raises(BusplanError) as caught:
+        override(read(TEXT), changes, origin=origin)
+    found = sorted(caught.value.problems)
+    assert len(found) == len(messages)
+    assert all(problem.startswith(message) for problem, message in zip(found, messages, strict=True))
+
+
+def test_a_change_that_breaks_a_rule_of_another_key_names_that_key() -> None:
+    optimal = read(edited(("gap_count = 63", 'gap_count = "optimal"')))
+    with pytest.raises(BusplanError, match=r"\Abus\.gap_count: the table behind it holds for cables of up to 4\.5 m"):
+        override(optimal, {"bus.cable_length_m": 9.0}, origin={"bus.cable_length_m": "--cable"})
+
+
+# --- anything at all --------------------------------------------------------------------------------------
+
+SHIPPED = [path.read_bytes() for path in sorted(shipped_folder().glob("*.toml"))]
+
+
+def check_outcome(content: bytes) -> None:
+    """A profile, or messages whose places lie inside the file; anything else fails the test."""
+    said: tuple[str, ...] = ()
+    try:
+        loaded: Profile | None = read(content)
+    except BusplanError as error:
+        loaded = None
+        said = error.problems
+    assert isinstance(loaded, Profile) or said
+    lines = content.decode("utf-8-sig", errors="replace").replace("\r\n", "\n").split("\n")
+    for problem in said:
+        match = re.match(r"f\.toml:([1-9]\d*):([1-9]\d*): \S", problem)
+        assert match, problem
+        line, column = int(match[1]), int(match[2])
+        assert line <= len(lines), problem
+        assert column <= len(lines[line - 1]) + 1, problem
+        assert problem.isprintable(), ascii(problem)
+
+
+PIECES = st.sampled_from(
+    [
+        *(b"[", b"]", b"[[", b"]]", b"{", b"}", b'"', b"'", b'"""', b"'''", b"#", b"=", b".", b",", b" ", b"\t", b"-"),
+        *(b"\n", b"\r", b"\r\n", b"\\", b"\\u0000", b"\xc3\xa9", b"\xff", b"\xe2\x80\xa8", b"0x", b"nan", b"true"),
+        b"a.b = 1\n",
+    ]
+)
+VALUES = st.sampled_from(
+    [
+        *(b"nan", b"-1", b"0", b"1e999", b'""', b'"x"', b"true", b"[]", b"{}", b"[[1]]", b"[nan, -1]", b"[1, 1]"),
+        *(b"9" * 400, b"1979-05-27", b'"""\n"""', b"{kind = 1}", b'"S800"', b'"optimal"', b"'linear'"),
+    ]
+)
+
+
+@st.composite
+def mutations(draw: st.DrawFn) -> bytes:
+    """A shipped profile after some accidents."""
+    content = draw(st.sampled_from(SHIPPED))
+    for _ in range(draw(st.integers(1, 4))):
+        kind = draw(st.sampled_from(["flip", "delete", "insert", "double line", "delete line", "swap lines", "value"]))
+        if kind == "value":
+            at = draw(st.sampled_from([match.span() for match in re.finditer(rb"(?<== ).+", content)] or [(0, 0)]))
+            new = draw(VALUES)
+            content = content[: at[0]] + new + content[at[1] :]
+        elif "line" in kind:
+            lines = content.split(b"\n")
+            one, other = (draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+            if kind == "double line":
+                lines.insert(other, lines[one])
+            elif kind == "delete line":
+                del lines[one]
+            else:
+                lines[one], lines[other] = lines[other], lines[one]
+            content = b"\n".join(lines)
+        else:
+            at_byte = draw(st.integers(0, len(content)))
+            cut = 0 if kind == "insert" else 1 if kind == "flip" else draw(st.integers(1, 40))
+            new = b"" if kind == "delete" else draw(st.one_of(st.binary(min_size=1, max_size=1), PIECES))
+            content = content[:at_byte] + new + content[at_byte + cut :]
+    if draw(st.integers(0, 5)) == 0:
+        content = content.replace(b"\n", b"\r\n")
+    return content
+
+
+@settings(max_examples=500, deadline=None)
+@given(content=mutations())
+def test_a_shipped_profile_after_any_accident_loads_or_is_refused_with_places_inside_it(content: bytes) -> None:
+    check_outcome(content)
+
+
+@settings(max_examples=200, deadline=None)
+@given(content=st.one_of(st.binary(max_size=60), st.text(max_size=60).map(str.encode)))
+@example(content=b"\xef\xbb\xbf\xff")
+@example(content=b"a = [\r\r\n")
+@example(content=b"a = '''\r\n\r\n")
+@example(content=b"\n\n\n[")
+@example(content=b"a=1\n\r\n\r\n x")
+def test_any_bytes_load_or_are_refused_with_places_inside_them(content: bytes) -> None:
+    check_outcome(content)
+
+
+@settings(max_examples=200, deadline=None)
+@given(pieces=st.lists(st.one_of(PIECES, st.sampled_from(TEXT.encode().splitlines(keepends=True))), max_size=30))
+def test_any_pieces_of_toml_load_or_are_refused_with_places_inside_them(pieces: list[bytes]) -> None:
+    check_outcome(b"".join(pieces))

@@ -1,0 +1,48 @@
+"""What is written reads to the same profile; what a profile leaves out stays left out."""
+
+import tomllib
+
+import pytest
+
+from busplan.profile.model import Profile
+from busplan.profile.shipped import load, shipped_names
+from busplan.profile.toml import decode, override, validate
+from busplan.profile.write import profile_text
+
+
+def read(text: str) -> Profile:
+    return validate(decode(text.encode(), name="new"))
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_written_profile_reads_to_the_same(name: str) -> None:
+    profile = load(name).profile
+    changed = override(profile, {"bus.nodes": 7, "bus.gap_count": "optimal", "cycle.period_us": 812.5})
+    for one in (profile, changed):
+        again = read(profile_text(one))
+        assert again == one
+        assert again.model_fields_set == one.model_fields_set
+    assert tomllib.loads(profile_text(profile)) == load(name).document.data()
+
+
+def test_text_of_every_kind_survives() -> None:
+    profile = override(
+        load("paper-4ms").profile,
+        {
+            "name": 'a "name" \\ with = # [signs] and \u00fc',
+            "description": 'two\nlines, a\ttab, """quotes""" and \\ at the end \\',
+            "servo.x": {"position_gain_per_s": 1e-7},
+            "bus.max_hops": None,
+        },
+    )
+    assert read(profile_text(profile)) == profile
+
+
+def test_an_override_adds_no_section() -> None:
+    profile = load("paper-two-node").profile
+    assert not profile.asks_for_circle
+    assert not override(profile, {"bus.nodes": 3}).asks_for_circle
+    asked = override(profile, {"delivery.seed": 3})
+    assert asked.asks_for_circle
+    assert asked.delivery.seed == 3
+    assert asked.delivery.model_fields_set == {"seed"}

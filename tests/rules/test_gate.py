@@ -1,0 +1,212 @@
+"""The gate over one document: what it finds, where, and in which order."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from busplan.errors import PlacedError
+from busplan.profile.document import Document
+from busplan.profile.toml import MAX_FILE_BYTES, decode
+from busplan.rules import bus
+from busplan.rules.gate import FileResult, check_document, unreadable
+from busplan.rules.registry import RULES
+from busplan.rules.report import CheckReport
+
+Changed = Callable[..., str]
+Check = Callable[..., FileResult]
+
+
+def places(result: FileResult) -> list[tuple[int, int, str]]:
+    return [(one.line, one.column, one.code) for one in result.findings]
+
+
+def test_findings_stand_in_the_order_of_places(changed: Changed, check: Check) -> None:
+    text = changed(
+        ('"optimal"', "63"), ("period_us = 4000", "period_us = 300"), ("read_bytes = 12", "read_bytes = 13"),
+        ('"measured"', '"assumed"'),
+        more="\n[limits]\nmin_spare_axes = 100\nmin_spare_nodes = 20\nmax_utilisation = 0.1\n",
+    )  # fmt: skip
+    found = places(check(text))
+    assert [code for *_, code in found] == ["BP110", "BP101", "BP111", "BP112", "BP105", "BP104", "BP103"]
+    assert all(one < other for one, other in pairwise(found))
+
+
+def test_tables_may_stand_in_any_order_and_form(check: Check) -> None:
+    text = """\
+node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35, grade = "assumed" } }
+name = "example"
+schema_version = 1
+payload.read_bytes = 12
+payload.write_bytes = 13
+cycle."period_us" = 4000
+[bus]
+nodes = 2
+kind = "ieee1394"
+speed = "S400"
+"""
+    assert places(check(text)) == [(1, 85, "BP112"), (5, 9, "BP111"), (7, 2, "BP110")]
+
+
+def test_columns_count_characters(changed: Changed, check: Check) -> None:
+    text = changed(("nodes = 2", "nodes = 2\n\t\tgap_count = 63"), ('gap_count = "optimal"\n', ""))
+    assert places(check(text)) == [(8, 3, "BP110")]
+    inline = 'tolerance = { max_contour_error_mm = 1, "größe" = 1 }\n'
+    assert places(check(inline + text)) == [(1, 41, "BP002")]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("start", ["", "\ufeff"])
+def test_line_ends_and_byte_order_mark_move_nothing(start: str, end: str, changed: Changed) -> None:
+    content = (start + changed(('"optimal"', "63"))).replace("\n", end).encode()
+    assert places(check_document(decode(content, name="a.toml"))) == [(7, 1, "BP110")]
+
+
+def test_the_source_of_each_finding_is_its_line(changed: Changed, check: Check) -> None:
+    result = check(changed(('"optimal"', "63  # here"), ("axes = 4", "axes = 4"), ('"measured"', '"assumed"')))
+    assert result.source == ("gap_count = 63  # here", 'grade = "assumed"')
+    assert check(changed(("nodes = 2", "nodes = 0"))).source == ("nodes = 0",)
+
+
+def test_a_broken_file_has_no_profile_and_no_figures(changed: Changed, check: Check) -> None:
+    result = check(changed(("nodes = 2", "nodes = 0")), baseline={"paper.margin_us": 1e9})
+    assert (result.profile, result.figures, result.status) == (None, {}, "findings")
+    assert [one.code for one in result.findings] == ["BP005"]
+
+
+def test_status(clean: str, changed: Changed, check: Check) -> None:
+    assert check(clean).status == "ok"
+    assert check(changed(('"optimal"', "63"))).status == "findings"
+    assert FileResult("a", None, (), {}, failure="gone").status == "error"
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "source"),
+    [
+        (b"a = 1\r\nb = '\xff'", (2, 6), "b = '\ufffd'"),
+        ("# ü\n# ".encode() + b"\xff\xfe\n", (2, 3), "# \ufffd\ufffd"),
+        (b"\xff", (1, 1), "\ufffd"),
+        (b"\xef\xbb\xbf\xff", (1, 1), "\ufffd"),
+        (b"a\xe2\x82", (1, 2), "a\ufffd"),
+        (b"#" * (MAX_FILE_BYTES + 1), (1, 1), "#" * (MAX_FILE_BYTES + 1)),
+    ],
+)
+def test_what_is_no_text_is_a_finding_at_the_byte(content: bytes, place: tuple[int, int], source: str) -> None:
+    with pytest.raises(PlacedError) as caught:
+        decode(content, name="a.toml")
+    result = unreadable("a.toml", caught.value, content)
+    (finding,) = result.findings
+    assert (finding.line, finding.column, finding.code) == (*place, "BP001")
+    assert result.source == (source,)
+
+
+def test_a_file_of_the_largest_size_is_read(clean: str) -> None:
+    content = clean.encode() + b"#" * (MAX_FILE_BYTES - len(clean))
+    assert check_document(decode(content, name="a.toml")).findings == ()
+
+
+def test_the_circle_is_tested_for_profiles_that_ask_and_when_asked(clean: str, check: Check) -> None:
+    unstable = clean + "\n[servo]\nposition_gain_per_s = 30000\n"
+    assert [one.code for one in check(unstable).findings] == ["BP202"]
+    assert check(unstable, with_circle=False).findings == ()
+
+
+def test_a_margin_that_only_the_default_asks_for_stands_at_the_gain(clean: str, check: Check) -> None:
+    little = clean + "\n[circle]\nradius_mm = 25\n[servo]\nstep_us = 100\nposition_gain_per_s = 14000\n"
+    (finding,) = check(little).findings
+    assert (finding.code, finding.key, finding.line) == ("BP202", "servo.position_gain_per_s", 30)
+    assert "margin" in finding.message
+    (said,) = check(little + "[tolerance]\nmin_gain_margin_db = 6\n").findings
+    assert (said.key, said.line) == ("tolerance.min_gain_margin_db", 32)
+
+
+def test_a_cycle_that_does_not_fit_has_no_circle(changed: Changed, check: Check) -> None:
+    text = changed(("period_us = 4000", "period_us = 100"), more="\n[servo]\nposition_gain_per_s = 30000\n")
+    assert [one.code for one in check(text).findings] == ["BP101"]
+
+
+def test_the_model_that_decides_is_the_profiles(changed: Changed, check: Check) -> None:
+    # 175 us are enough for the paper's timing and not for the standard's.
+    for deciding, code, severity in (("paper", "BP102", "warning"), ("standard", "BP101", "error")):
+        text = changed(("period_us = 4000", "period_us = 350\n[bus2]")).replace("\n[bus2]", "")
+        (finding,) = check(text.replace("nodes = 2", f'nodes = 2\ntiming_model = "{deciding}"')).findings
+        assert (finding.code, finding.severity) == (code, severity)
+    # Where neither has room, the overrun of the deciding one says it all.
+    (finding,) = check(changed(("period_us = 4000", "period_us = 100"))).findings
+    assert finding.code == "BP101"
+
+
+def test_limits_at_their_edge_are_held(changed: Changed, check: Check) -> None:
+    figures = check(changed(("nodes = 2", "nodes = 13"))).figures
+    assert figures["standard.max_axes"] == 52
+    for nodes, spare, code in ((13, 0, None), (12, 1, None), (13, 1, "BP104")):
+        text = changed(("nodes = 2", f"nodes = {nodes}"), more=f"\n[limits]\nmin_spare_nodes = {spare}\n")
+        assert [one.code for one in check(text).findings] == ([code] if code else [])
+    nothing = check(changed(more="\n[limits]\nmax_utilisation = 0\n"))
+    assert "no change of gap count, slice ratio or period alone is a cure" in nothing.findings[0].message
+
+
+@pytest.mark.parametrize("limit", [1, 100, 1_000_000])
+def test_spare_nodes_beyond_any_bus_have_no_cure(limit: int, changed: Changed, check: Check) -> None:
+    roomy = (("period_us = 4000", "period_us = 1_000_000"), ("nodes = 2", "nodes = 16"))
+    (chain,) = check(changed(*roomy, more=f"\n[limits]\nmin_spare_nodes = {limit}\n")).findings
+    assert "limited by hops; a tree with bus.max_hops = 16 or less" in chain.message
+    tree = changed(roomy[0], ("nodes = 2", "nodes = 62\nmax_hops = 9"))
+    (full,) = check(f"{tree}\n[limits]\nmin_spare_nodes = {limit}\n").findings
+    assert "limited by nodes; a second bus" in full.message
+
+
+def test_a_table_of_measured_times_is_not_extrapolated(changed: Changed, check: Check) -> None:
+    table = 'kind = "table"\ngrade = "measured"\npayload_bytes = [16, 32]\ntime_us = [1, 2]'
+    result = check(changed(('kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35', table)))
+    assert [(one.code, one.key) for one in result.findings] == [
+        ("BP007", "payload.read_bytes"),
+        ("BP007", "payload.write_bytes"),
+    ]
+
+
+def test_fingerprints_are_unique_and_do_not_move(changed: Changed, check: Check) -> None:
+    text = changed(("read_bytes = 12", "read_bytes = 13"), ('"optimal"', "63"), ("nodes = 2", "nodes = 2 # busplan:"))
+    text += "# busplan: ignore[BP111]\n# busplan: ignore[BP110] reason\n"
+    before = CheckReport((check(text),)).located
+    after = CheckReport((check("# new\n\n" + text.replace("[cycle]", "\n[cycle]")),)).located
+    assert len({one.fingerprint for one in before}) == len(before) == 6
+    assert [one.fingerprint for one in before] == [one.fingerprint for one in after]
+    assert [one.finding.line for one in before] != [one.finding.line for one in after]
+    mended = CheckReport((check(text.replace("read_bytes = 13", "read_bytes = 12")),)).located
+    assert {one.fingerprint for one in mended} < {one.fingerprint for one in before}
+    elsewhere = CheckReport((check_document(Document("b.toml", text)),)).located
+    assert not {one.fingerprint for one in before} & {one.fingerprint for one in elsewhere}
+
+
+def test_severities_decide_what_fails() -> None:
+    def report(*codes: str) -> CheckReport:
+        template = check_document(Document("a.toml", "x")).findings[0]
+        found = tuple(template._replace(code=code, severity=RULES[code].severity) for code in codes)
+        return CheckReport((FileResult("a.toml", "a", found, {}, ("",) * len(found)),))
+
+    assert not report().has_findings("warning")
+    assert report("BP110").has_findings("warning")
+    assert not report("BP110").has_findings("error")
+    assert report("BP110", "BP101").has_findings("error")
+    assert report("BP110", "BP101", "BP102").summary == (1, 1, 2)
+
+
+def test_every_rule_of_the_bus_has_a_check() -> None:
+    assert all(rule.check is not None and rule.check.__doc__ for rule in bus.RULES)
+
+
+def test_without_a_circle_no_numpy_is_loaded() -> None:
+    code = (
+        "import sys; sys.argv = ['busplan', 'check', 'paper-1ms', 'paper-4ms', '--no-circle', '--format', sys.argv[1]];"
+        "from busplan.__main__ import main\n"
+        "try: main()\n"
+        "except SystemExit as end: print(end.code, *sorted({name.split('.')[0] for name in sys.modules}))"
+    )
+    for format_ in ("text", "full", "json", "github", "gitlab", "junit", "sarif"):
+        run = subprocess.run([sys.executable, "-c", code, format_], capture_output=True, text=True, check=True)
+        exit_code, *modules = run.stdout.splitlines()[-1].split()
+        assert exit_code == "0"
+        assert not {"numpy", "numba", "matplotlib", "rich", "multiprocessing"} & set(modules)
