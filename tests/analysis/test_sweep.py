@@ -162,3 +162,26 @@ def test_what_no_profile_could_have_is_refused_in_the_profiles_own_words(
     profile = override(make(), {"node.execution": TABLE})
     with pytest.raises(BusplanError, match=re.escape(message)):
         checked_grid(profile, axes, with_circle=False)
+
+
+def test_a_table_is_read_at_its_points_between_them_and_at_both_ends(make: Make) -> None:
+    changes: dict[str, object] = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 4}
+    profile = override(make(), changes)
+    axes: dict[str, Values] = {
+        "payload.read_bytes": Listed((4, 5, 15, 16, 17, 32, 33, 34, 2499, 2500)),
+        "payload.write_bytes": Listed((2500, 4)),
+    }
+    assert_rows_are_those_of_capacity(profile, checked_grid(profile, axes, with_circle=False), chunk_points=20)
+
+
+def test_of_equal_terms_the_first_binds_as_in_capacity(make: Make) -> None:
+    # One node, twice 100 us of execution, and 200 us for the rest: both terms are the largest.
+    profile = make(bus__nodes=1, node__execution__base_us=100.0, node__execution__per_byte_us=0.0)
+    axes: dict[str, Values] = {"cycle.nonperiodic_us": Listed((199, 200, 201))}
+    (block,) = sweep(profile, checked_grid(profile, axes, with_circle=False), timing_models=("paper",))
+    assert [block.row(index, ["binding_term"])["binding_term"] for index in range(3)] == [
+        "execution",
+        "execution",
+        "nonperiodic",
+    ]
+    assert_rows_are_those_of_capacity(profile, Grid(axes), chunk_points=3)

@@ -183,14 +183,15 @@ def _columns(where: Profile, values: Mapping[str, Array], model: TimingModelName
     now = cycle(where, model=model, nodes=where.bus.nodes)
     numbers = numeric_figures(where, now)
     max_nodes, limited_by = _largest_nodes(where, values, model)
-    late = np.logical_not(fits_in(now.required_us, available_us=available_us(where)))
+    late = np.logical_not(fits_in(numbers["required_us"], available_us=numbers["available_us"]))
+    terms_us = [numbers.get(f"cycle_{term}_us", numbers.get(f"{term}_us")) for term in _TERMS]
     broken = limits_broken(where)
     flags = [*(broken[limit] for limit in _LIMITS[:-1]), late]
     exceeded: Any = sum(flag * np.uint8(1 << bit) for bit, flag in enumerate(flags))
     numbers |= {"max_nodes": max_nodes, "max_axes": where.node.axes * max_nodes, "fits": np.equal(exceeded, 0)}
     words = {
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
-        "binding_term": Column(_largest(list(now.terms_us().values())), _TERMS),
+        "binding_term": Column(_largest(terms_us), _TERMS),
         "limited_by": Column(limited_by, _LIMITS),
         "exceeded": Column(exceeded, _EXCEEDED),
     }
@@ -235,8 +236,12 @@ def _largest_nodes(where: Profile, values: Mapping[str, Array], model: TimingMod
         required = required_by_nodes(where, model=model)
         root = np.asarray(required.nodes(given_us))
         near = np.rint(root)
-        doubt = (np.abs(root - near) * required.c1_us <= _DOUBT * given_us) & (near >= 1) & (near <= most)
+        off = np.abs(root - near)
         answer = np.minimum(np.floor(root), most)
+        # First by one bound for all, which is one comparison each; what it leaves, by its own.
+        doubt = off <= _DOUBT * np.max(given_us) / np.min(required.c1_us)
+        if np.any(doubt):
+            doubt = doubt & (off * required.c1_us <= _DOUBT * given_us) & (near >= 1) & (near <= most)
         if np.any(doubt):
             # So close to a whole number that rounding decides: there the cycle itself tells.
             shape = np.broadcast_shapes(doubt.shape, *(own.shape for own in values.values()))

@@ -79,18 +79,19 @@ def run_sweep(job: SweepJob) -> None:
         _require_circles(job)
     tally, expected = Tally(job.timing_models), job.grid.points
     with ExitStack() as stack:
-        # Opened before the work: a path that cannot be written is said at once.
-        plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
-        file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
-        sink = stack.enter_context(_sink(job, file, tally))
-        takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-        with ctrl_c_noted() as stopped, progress_bar("sweep") as progress, _blocks(job) as blocks:
-            for block in blocks:
-                for take in takers:
-                    take(block)
-                progress(tally.points, expected)
-                if stopped():
-                    break
+        with ctrl_c_noted() as stopped:
+            # Opened before the work: a path that cannot be written is said at once.
+            plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
+            file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
+            sink = stack.enter_context(_sink(job, file, tally))
+            takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
+            with progress_bar("sweep") as progress, _blocks(job) as blocks:
+                for block in blocks:
+                    for take in takers:
+                        take(block)
+                    progress(tally.points, expected)
+                    if stopped():
+                        break
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.format_ != "table" or file is not None:

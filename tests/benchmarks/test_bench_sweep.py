@@ -1,0 +1,188 @@
+"""How fast a sweep is: against the scalar path, and against the same equations written by hand in NumPy.
+
+Ten million points, both timing models, all figures. Ratios within one run, in `extra_info`; nothing fails because a
+machine is slow. The budgets are 200 times faster than the scalar path, and 3 times the time of the arithmetic by hand.
+"""
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+from busplan.analysis.capacity import figures
+from busplan.analysis.grid import Chunk, Grid, Steps, checked_grid
+from busplan.analysis.sweep import CHUNK_POINTS, sweep
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+
+MODELS = ("paper", "standard")
+GRIDS = {
+    "one key": {"cycle.period_us": Steps(1000, 1, 10, 10_000_000)},
+    "three keys": {
+        "bus.nodes": Steps(1, 1, 1, 16),
+        "node.execution.base_us": Steps(0, 1, 10, 625),
+        "cycle.period_us": Steps(100, 4, 1, 1000),
+    },
+    "short last key": {"cycle.period_us": Steps(1000, 1, 10, 2_000_000), "bus.nodes": Steps(1, 1, 1, 5)},
+}
+SCALAR_POINTS = 300
+
+PROFILE = Profile.model_validate(
+    {
+        "schema_version": 1,
+        "name": "bench",
+        "bus": {"kind": "ieee1394", "speed": "S400", "nodes": 2, "timing_model": "standard"},
+        "cycle": {"period_us": 4000.0},
+        "payload": {"read_bytes": 12, "write_bytes": 12},
+        "node": {"axes": 4, "execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}},
+    }
+)
+
+
+def by_hand(chunk: Chunk, clock: float, packets: tuple[int, int, int, int]) -> dict[str, Any]:
+    """All figures of a chunk, straight from the equations, for a chain at S400 with gap count 63."""
+    rate, gap, ratio, axes = 393.216, 63, 0.5, 4
+    n = chunk.values.get("bus.nodes", np.array(2)).astype(float)
+    period = chunk.values.get("cycle.period_us", np.array(4000.0)).astype(float)
+    execution = chunk.values.get("node.execution.base_us", np.array(30.0)) + 0.35 * 12
+    hop = 0.023 + 14 / clock
+    way = hop * n
+    arbitration = way + 4 * gap / clock + 1.63
+    acknowledge = way + 0.25
+    read_data = 2 * way + 8 * (packets[0] + packets[1]) / rate
+    write_data = 2 * way + 8 * (packets[2] + packets[3]) / rate
+    read = 2 * arbitration + read_data + 2 * acknowledge + execution
+    write = 2 * arbitration + write_data + 2 * acknowledge + execution
+    gaps = (82 + 48 * gap) / clock
+    sync = 0.3 + 0.1 * (n - 1)
+    available = ratio * period
+    required = n * (read + gaps) + n * (write + gaps) + sync
+    terms = [
+        n * 4 * arbitration,
+        n * (read_data + write_data),
+        n * 4 * acknowledge,
+        n * 2 * execution,
+        n * 2 * gaps + 0 * n,
+        sync + 0 * n,
+        0 * n,
+    ]
+    best, binding = terms[0], np.uint8(0)
+    for index, term in enumerate(terms[1:], start=1):
+        binding = np.where(term > best, np.uint8(index), binding)  # type: ignore[assignment]
+        best = np.maximum(term, best)
+    # required = c1 N + c2 N^2 + 0.2, with the hops of a chain taken out.
+    c2 = 12 * hop
+    c1 = read + write - c2 * n + 2 * gaps + 0.1
+    spare = np.maximum(available - 0.2, 0)
+    max_nodes = np.minimum(2 * spare / (c1 + np.sqrt(c1 * c1 + 4 * c2 * spare)), 16).astype(np.int64)
+    table = np.array([5, 5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43])
+    fits = required <= available
+    return {
+        "axes": axes * n,
+        "safe_gap_count": table[n.astype(int)],
+        "available_us": available,
+        "required_us": required,
+        "time_slice_us": available / n,
+        "required_time_slice_us": required / n,
+        "read_latency_us": read,
+        "write_latency_us": write,
+        "sync_us": sync,
+        "binding_term": binding,
+        "utilisation": required / available,
+        "margin_us": available - required,
+        "nodes_eq11": (available - sync) / (2 * ((read + write) / 2 + gaps)),
+        "max_nodes": max_nodes,
+        "max_axes": axes * max_nodes,
+        "limited_by": max_nodes == 16,
+        "min_period_us": required / ratio,
+        "min_slice_ratio": required / period,
+        "exceeded": (n > 62) * 2 + (n > 16) * 4 + ~fits * 8,
+        "fits": fits & (n <= 16),
+    }
+
+
+def all_by_hand(grid: Grid) -> Iterator[tuple[Chunk, list[dict[str, Any]]]]:
+    """The same chunks as a sweep, by hand."""
+    for chunk in grid.chunks(CHUNK_POINTS):
+        yield chunk, [by_hand(chunk, 393.216, (32, 32, 32, 32)), by_hand(chunk, 98.304, (20, 36, 36, 16))]
+
+
+def exhaust(items: Iterator[Any]) -> None:
+    for _ in items:
+        pass
+
+
+def seconds(run: Callable[[], object]) -> float:
+    start = perf_counter()
+    run()
+    return perf_counter() - start
+
+
+def scalar_loop(grid: Grid) -> None:
+    """The scalar path for points spread over the grid."""
+    points = [chunk.point(0) for chunk in grid.chunks(CHUNK_POINTS)]
+    for changes in points[:: max(1, len(points) // SCALAR_POINTS)][:SCALAR_POINTS]:
+        variant = override(PROFILE, changes)
+        for model in MODELS:
+            figures(variant, model=model)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_sweep_of_ten_million_points(benchmark: Any, name: str) -> None:
+    grid = checked_grid(PROFILE, dict(GRIDS[name]), with_circle=False)
+    assert grid.points == 10_000_000
+
+    def run() -> None:
+        exhaust(sweep(PROFILE, grid, timing_models=("paper", "standard")))
+
+    # The hand-written one is the same mathematics.
+    block = next(iter(sweep(PROFILE, grid, timing_models=("paper", "standard"))))
+    _, written = next(all_by_hand(grid))
+    for ours, theirs in zip(block.models, written, strict=True):
+        for figure in ("required_us", "nodes_eq11", "max_nodes", "binding_term", "safe_gap_count", "exceeded"):
+            np.testing.assert_allclose(
+                np.broadcast_to(ours[figure].values, block.chunk.shape),
+                np.broadcast_to(theirs[figure], block.chunk.shape),
+                rtol=1e-12,
+            )
+    # Taken in turns, so that a busy neighbour slows all.
+    times = [
+        (seconds(run), seconds(lambda: exhaust(all_by_hand(grid))), seconds(lambda: scalar_loop(grid)))
+        for _ in range(7)
+    ]
+    swept, by_hand_s, scalar = (min(column) for column in zip(*times, strict=True))
+    benchmark.extra_info["points"] = grid.points
+    benchmark.extra_info["nanoseconds_per_point"] = round(swept / grid.points * 1e9, 1)
+    benchmark.extra_info["times_faster_than_scalar"] = round(scalar / SCALAR_POINTS / (swept / grid.points))
+    benchmark.extra_info["times_numpy_by_hand"] = round(swept / by_hand_s, 2)
+    benchmark.pedantic(run, rounds=1)
+
+
+PEAK = """
+import resource, subprocess, sys
+subprocess.run([sys.executable, "-m", "busplan", *sys.argv[1:]], stdout=subprocess.DEVNULL, check=True)
+print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+"""
+PEAK_MB = 300
+
+
+@pytest.mark.parametrize("form", ["table", "csv", "npz"])
+def test_peak_memory_is_flat(benchmark: Any, form: str, tmp_path: Path) -> None:
+    # Memory is no matter of how busy the machine is: this one is asserted.
+    periods = "100:300099" if form == "csv" else "100:3000099"
+    arguments = ["sweep", "paper-4ms", "--vary", f"cycle.period_us={periods}", "--format", form]
+    if form != "table":
+        arguments += ["-o", str(tmp_path / f"out.{form}")]
+
+    def run() -> int:
+        found = subprocess.run([sys.executable, "-c", PEAK, *arguments], check=True, capture_output=True, text=True)
+        return int(found.stdout) // 1024
+
+    peak_mb = benchmark.pedantic(run, rounds=1)
+    benchmark.extra_info["peak_mb"] = peak_mb
+    assert peak_mb < PEAK_MB

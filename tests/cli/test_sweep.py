@@ -1,0 +1,179 @@
+"""`busplan sweep` as a process: documents, files, interruption, refusals."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "FORCE_COLOR"}
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "busplan", *arguments]
+
+
+def busplan(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(*arguments), capture_output=True, text=True, cwd=cwd, check=False, timeout=120, env=ENVIRONMENT
+    )
+
+
+def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(tmp_path: Path) -> None:
+    run = busplan("sweep", "paper-4ms", "--vary", "bus.nodes=2:3", "--format", "csv", cwd=tmp_path)
+    assert (run.returncode, run.stderr.count("\n")) == (0, 1)
+    rows = list(csv.reader(run.stdout.splitlines()))
+    three = busplan("capacity", "paper-4ms", "--nodes", "3", "--format", "csv", cwd=tmp_path)
+    own = list(csv.reader(three.stdout.splitlines()))
+    assert rows[0] == ["bus.nodes", *own[0][1:]]
+    assert rows[0][1] == "timing_model"
+    assert rows[3:] == [["3", *row[1:]] for row in own[1:]]
+
+
+def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_rows(tmp_path: Path) -> None:
+    grid = ["--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3"]
+    for name in ("rows.csv", "rows.jsonl", "rows.npz"):
+        run = busplan("sweep", "paper-4ms", *grid, "-o", name, cwd=tmp_path)
+        assert (run.returncode, run.stdout) == (0, "")
+        assert run.stderr.endswith(f"wrote {name}\n")
+    header, *lines = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
+    assert (header["schema"], header["command"], header["rows"]) == (1, "sweep", len(lines))
+    rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
+    with np.load(tmp_path / "rows.npz") as archive:
+        assert archive["complete"]
+        assert set(rows[0]) <= set(archive)
+        for index, (line, row) in enumerate(zip(lines, rows, strict=True)):
+            assert list(line) == list(row)
+            for name, value in line.items():
+                found = archive[name][index]
+                if f"{name}_words" in archive:
+                    found = archive[f"{name}_words"][found]
+                assert (found if isinstance(value, (int, float)) and name != "bus.gap_count" else str(found)) == (
+                    " ".join(value) if isinstance(value, list) else str(value) if name == "bus.gap_count" else value
+                )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.csv", "rows.jsonl", "rows.npz"]
+
+
+def test_the_table_shows_the_top_rows_and_how_many_fit(tmp_path: Path) -> None:
+    run = busplan(
+        "sweep", "paper-4ms", "--vary", "bus.nodes=1:16", "--sort", "margin_us:asc", "--top", "2", "--timing",
+        "standard", cwd=tmp_path,
+    )  # fmt: skip
+    assert (run.returncode, run.stderr) == (0, "")
+    lines = run.stdout.splitlines()
+    assert lines[:2] == [
+        "paper-4ms: 16 points; 11 by the standard model fit.",
+        "2 of 16 rows, smallest margin_us first.",
+    ]
+    assert [line.split()[0] for line in lines[-2:]] == ["16", "15"]
+
+
+@pytest.mark.parametrize("name", ["rows.csv", "rows.jsonl", "rows.npz"])
+def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("old", encoding="utf-8")
+    with subprocess.Popen(
+        command("sweep", "paper-4ms", "--vary", "cycle.period_us=100:900000000", "-o", name),
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT,
+    ) as run:
+        deadline = time.monotonic() + 60
+        # The temporary file stands once Ctrl-C is listened to.
+        while not list(tmp_path.glob(f".{name}.*.tmp")) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        time.sleep(0.3)
+        run.send_signal(signal.SIGINT)
+        _, errors = run.communicate(timeout=60)
+    assert run.returncode == 130
+    partial = name.replace(".", ".partial.")
+    assert f"kept in {partial}" in errors
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, partial])
+    assert (tmp_path / name).read_text(encoding="utf-8") == "old"
+    if name.endswith("npz"):
+        with np.load(tmp_path / partial) as archive:
+            assert not archive["complete"]
+            assert len(archive["max_nodes"]) == len(archive["cycle.period_us"]) > 0
+            assert archive["cycle.period_us"][::2].tolist() == list(range(100, 100 + len(archive["fits"]) // 2))
+        return
+    text = (tmp_path / partial).read_text(encoding="utf-8")
+    assert text.endswith("\n")
+    if name.endswith("jsonl"):
+        rows = [json.loads(line) for line in text.splitlines()]
+        assert len(rows) - 1 < rows[0]["rows"]
+    else:
+        assert len({len(row) for row in csv.reader(text.splitlines())}) == 1
+
+
+def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: Path) -> None:
+    grid = ["--vary", "cycle.period_us=500,4000", "--vary", "circle.feed_mm_per_min=15000", "--circle"]
+    shortened = ["--vary", "circle.radius_mm=20", *grid, "--format", "jsonl"]
+    alone, together = (busplan("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path) for jobs in ("1", "2"))
+    assert (alone.returncode, together.returncode) == (0, 0), alone.stderr + together.stderr
+    assert alone.stdout == together.stdout
+    _, *rows = [json.loads(line) for line in alone.stdout.splitlines()]
+    assert [(row["cycle.period_us"], row["timing_model"], row["fits"]) for row in rows] == [
+        (500, "paper", True),
+        (500, "standard", False),
+        (4000, "paper", True),
+        (4000, "standard", True),
+    ]
+    # What does not fit is not simulated, and does not pass.
+    assert (rows[1]["max_contour_error_mm"], rows[1]["passed"]) == (None, False)
+    single = busplan("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
+    (result,) = json.loads(single.stdout)["results"]
+    for name in (
+        "mean_contour_error_mm",
+        "max_contour_error_mm",
+        "circular_deviation_mm",
+        "phase_margin_deg",
+        "passed",
+    ):
+        assert rows[2][name] == result[name]
+
+
+@pytest.mark.parametrize("grid", [["bus.nodes=1:9"], ["bus.gap_count=optimal,63", "cycle.period_us=250,1000,500"]])
+def test_figures_are_drawn(grid: list[str], tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    varied = [part for spec in grid for part in ("--vary", spec)]
+    first, second = (
+        busplan("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
+    )
+    assert (first.returncode, first.stderr, second.returncode) == (0, "wrote f.svg\n", 0)
+    assert (tmp_path / "f.svg").read_bytes().startswith(b"<?xml")
+
+
+REFUSALS = {
+    "--vary bus.nodes=1:9 --format npz": "--format npz: is no text for a terminal; give -o FILE.npz",
+    "--vary bus.nodes=1:9 --format csv --top 3": "--top: goes with --format table",
+    "--vary bus.nodes=1:9 --figure fits": "--figure: goes with --plot FILE",
+    "--vary bus.nodes=1:9 --jobs 2": "--jobs: goes with --circle",
+    "--vary bus.nodes=1:9 --top 0": "--top 0: must be 1 or more",
+    "--vary bus.nodes=1:9 --sort limited_by": "--sort limited_by: expected a column in numbers: bus.nodes, period_us",
+    "--vary bus.gap_count=1,optimal --sort bus.gap_count": "--sort bus.gap_count: expected a column in numbers",
+    "--vary bus.nodes=1:9 --sort nodes:up": "--sort nodes:up: expected a column, or a column and :asc",
+    "--vary bus.nodes=1:9 --columns foo": "--columns foo: no such column; there are bus.nodes, timing_model",
+    "--vary bus.nodes=1:9 --plot x.gif": "--plot x.gif: expected a name ending in .png, .svg or .pdf",
+    "--vary bus.nodes=1:9 --vary node.axes=1:3 --vary cycle.period_us=1:9 --plot x.svg": "draws one or two keys",
+    "--vary cycle.period_us=1:900000 --plot x.svg": "--plot: 900,000 points",
+    "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",
+    "--vary cycle.period_us=1000,1050 --circle": "at cycle.period_us = 1050: step_us = 100.0",
+    "--vary bus.nodes=1:9 -o no/such/folder.csv": "there is no folder",
+    "--vary bus.nodes=0:9": "bus.nodes 0: must be 1 or more",
+    "": "--vary: nothing to vary",
+}
+
+
+@pytest.mark.parametrize("line", REFUSALS)
+def test_refusals(line: str, tmp_path: Path) -> None:
+    run = busplan("sweep", "paper-4ms", *line.split(), cwd=tmp_path)
+    assert (run.returncode, run.stdout) == (2, "")
+
+    assert REFUSALS[line] in run.stderr
+    assert list(tmp_path.iterdir()) == []
