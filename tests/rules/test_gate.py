@@ -89,6 +89,8 @@ def test_status(clean: str, changed: Changed, check: Check) -> None:
         ("# ü\n# ".encode() + b"\xff\xfe\n", (2, 3), "# \ufffd\ufffd"),
         (b"\xff", (1, 1), "\ufffd"),
         (b"\xef\xbb\xbf\xff", (1, 1), "\ufffd"),
+        (b"\xef\xbb\xbfa = 1\nb\xff", (2, 2), "b\ufffd"),
+        (b"\xef\xbb\xbf\xef\xbb\xff", (1, 1), "\ufffd\ufffd"),
         (b"a\xe2\x82", (1, 2), "a\ufffd"),
         (b"#" * (MAX_FILE_BYTES + 1), (1, 1), "#" * (MAX_FILE_BYTES + 1)),
     ],

@@ -22,6 +22,8 @@ RATIO_STEPS: Final = 10_000
 """A slice ratio is advised in steps of 0.0001, a period in steps of 1 us, always rounded to the safe side."""
 MAX_ADVISED_RATIO: Final = 0.9
 """No larger slice ratio is advised: the host computes in what communication leaves of the period. Chosen."""
+_SMALLEST_SHARE: Final = 1e-6
+"""Below it there is no cure, as a slice ratio has no smaller value; what is divided by it stays finite."""
 
 
 class Change(NamedTuple):
@@ -134,7 +136,7 @@ def change_for_room(profile: Profile, *, model: TimingModelName, nodes: int, uti
     Change
         None when no single kind of change does.
     """
-    if not utilisation:
+    if utilisation < _SMALLEST_SHARE:
         return None
     for cure in _time_cures(profile, nodes, [model], share=utilisation):
         after = _after(profile, cure, models=[model])

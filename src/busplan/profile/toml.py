@@ -5,6 +5,7 @@ Whatever fails, the message names file, line and column, the value, and what wou
 """
 
 import sys
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -43,13 +44,14 @@ def decode(content: bytes, *, name: str) -> Document:
     if len(content) > MAX_FILE_BYTES:
         message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML"
         raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
+    # The mark goes first: what the codec that knows it says of places, it says of the bytes behind.
+    content = content.removeprefix(BOM_UTF8)
     try:
-        text = content.decode("utf-8-sig")
+        text = content.decode()
     except UnicodeDecodeError as error:
-        # The codec counts without the byte order mark, in bytes of its own.
-        before = error.object[: error.start].decode()
+        before = content[: error.start].decode()
         line, column = Lines(before + "?").line_and_column(len(before))
-        message = f"not a text file: byte 0x{error.object[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
+        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
         raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
     # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
     return Document(name, text.replace("\r\n", "\n"))

@@ -57,6 +57,6 @@ class CheckReport:
                 number = seen[same] = seen.get(same, -1) + 1
                 mark = "\0".join((file.path, *same, str(number)))
                 found.append(
-                    Located(file.path, finding, source, sha256(mark.encode("utf-8", "surrogateescape")).hexdigest())
+                    Located(file.path, finding, source, sha256(mark.encode("utf-8", "surrogatepass")).hexdigest())
                 )
         return tuple(found)
