@@ -2,6 +2,7 @@
 
 import math
 import tracemalloc
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from busplan.errors import BusplanError
 from busplan.servo import axis as axis_module
 from busplan.servo import contour as contour_module
 from busplan.servo.axis import simulate_axis
-from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.circle import CircleRun, check_circle, simulate_circle
 from busplan.servo.contour import contour_error
 from busplan.servo.delivery import Arrivals
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
@@ -373,3 +374,21 @@ def test_whatever_is_set_the_measures_are_finite(**drawn: Any) -> None:
     assert np.isfinite(numbers).all()
     assert contour.radial_deviation_min_mm <= contour.radial_deviation_max_mm
     assert 0 <= contour.mean_contour_error_mm <= contour.max_contour_error_mm
+
+
+def test_the_highest_level_of_the_dac_limits_the_feed() -> None:
+    # Two bits command -100, -50, 0 and 50 mm/s.
+    path, timing = circle_path(50.0, feed_mm_per_min=3000.0, period_us=1000.0), LoopTiming(period_us=1000.0)
+    ideal = Axis(position_gain_per_s=50.0, max_velocity_mm_s=100.0)
+    check_circle(path, x=ideal, y=ideal, timing=timing)
+    with pytest.raises(
+        BusplanError, match=r"axis y reaches 3000 mm/min with max_velocity_mm_s = 100\.0 and dac_bits = 2"
+    ):
+        check_circle(path, x=ideal, y=replace(ideal, dac_bits=2), timing=timing)
+
+
+def test_an_offset_beyond_the_reach_is_blamed_itself() -> None:
+    path = circle_path(50.0, feed_mm_per_min=3000.0, period_us=1000.0)
+    axis = Axis(position_gain_per_s=50.0, max_velocity_mm_s=100.0, drive_offset_mm_s=-150.0)
+    with pytest.raises(BusplanError, match=r"drive_offset_mm_s = -150\.0: axis x commands at most 100 mm/s"):
+        check_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))

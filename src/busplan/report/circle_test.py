@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.circle_test import CircleFigures, CircleTest
+from busplan.analysis.circle_test import CircleFigures, CircleTest, failed_measure, to_attack
 from busplan.analysis.contour_profile import ContourProfile
 from busplan.report.lines import BLANK, Line, table, us
 from busplan.report.words import period
@@ -13,6 +13,13 @@ PLOT_SECTORS: Final = 72
 _PLOT_ROWS: Final = 9
 _SHOWN: Final = 1e-9
 """Largest error, in mm, that still counts as none in a plot."""
+
+
+_MEASURES: Final = {
+    "mean_contour_error_mm": "mean contour error",
+    "max_contour_error_mm": "largest contour error",
+    "circular_deviation_mm": "circular deviation G",
+}
 
 
 def circle_lines(
@@ -42,12 +49,15 @@ def _verdict(name: str, result: CircleFigures) -> Iterator[Line]:
         return
     reasons = ", and ".join(failure.text for failure in result.failures)
     yield Line(f"{subject}: FAILED, {reasons}.", "bad")
-    worst = result.contributions[0] if result.contributions else None
-    if worst is not None and worst.removed_mm > 0:
+    measure, attack = failed_measure(result), to_attack(result)
+    if measure is not None and attack is not None:
+        source, removed_mm = attack
         yield Line(
-            f"Attack {worst.source} first: without it the largest contour error is "
-            f"{_um(worst.max_contour_error_mm)} um, {_um(worst.removed_mm)} um less."
+            f"Attack {source.source} first: without it the {_MEASURES[measure]} is "
+            f"{_um(getattr(source, measure))} um, {_um(removed_mm)} um less."
         )
+    elif measure is not None and result.contributions is not None:
+        yield Line(f"No single error source of the profile explains the {_MEASURES[measure]}.")
 
 
 def _um(value_mm: float | None) -> str:
