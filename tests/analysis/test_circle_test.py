@@ -366,3 +366,23 @@ def test_each_margin_is_the_smaller_one_of_both_axes(small: Profile) -> None:
     assert phases.index(min(phases)) != gains.index(min(gains))
     assert (both.phase_margin_deg, both.gain_margin_db) == (min(phases), min(gains))
     assert both.crossover_hz == (one, other)[phases.index(min(phases))].crossover_hz
+
+
+def test_a_short_arc_at_constant_speed_has_no_circular_deviation(small: Profile) -> None:
+    # Ramps of 0.6 s take a good half turn between them.
+    short = override(small, {"circle.ramp_periods": 600})
+    result = only(short)
+    assert result.passed
+    assert result.constant_speed_deg is not None
+    assert 100 < result.constant_speed_deg < 270
+    assert result.circular_deviation_mm is result.centre_offset_mm is result.radius_deviation_mm is None
+    blind = only(override(short, {"tolerance.circular_deviation_mm": 1.0}))
+    (failure,) = blind.failures
+    assert (failure.name, failure.value, failure.limit) == ("constant_speed_deg", blind.constant_speed_deg, 270)
+    assert "needs 270 deg of the circle at constant speed" in failure.text
+
+
+def test_a_loop_that_settles_slowly_keeps_arc_enough(small: Profile) -> None:
+    slow = only(override(small, {"servo.position_gain_per_s": 3.0}))
+    assert (slow.constant_speed_deg or 0.0) >= 270
+    assert slow.circular_deviation_mm is not None

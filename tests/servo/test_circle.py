@@ -265,7 +265,7 @@ def test_the_part_at_constant_speed_waits_for_the_loop_and_ends_with_the_feed() 
     assert run.constant_speed.stop * 100 == pytest.approx(path.constant_until_us, abs=100)
     slow = simulate_circle(path, x=an_axis(position_gain_per_s=0.5), y=an_axis(), timing=timing)
     whole_us = path.constant_until_us - path.constant_from_us - 1000
-    assert slow.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 4, abs=100)
+    assert slow.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 5, abs=100)
 
 
 def test_a_circle_of_ramps_only_still_has_measures() -> None:

@@ -25,6 +25,9 @@ Progress = Callable[[int, int], None]
 CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 """Measures of roundness that have a tolerance, in the order in which they are looked at."""
 
+LEAST_ARC_DEG: Final = 270.0
+"""Arc that the circular deviation G needs: the least-squares centre of a shorter one follows its errors."""
+
 _FAILURES: Final[dict[str, str]] = {
     "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
     "hops": "{value:.0f} hops are over the {limit:.0f} of one bus",
@@ -37,6 +40,8 @@ _FAILURES: Final[dict[str, str]] = {
     "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
     "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
     "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "constant_speed_deg": "the circular deviation G cannot be told: its least-squares centre needs {limit:.0f} deg of "
+    "the circle at constant speed, not {value:.0f} deg; shorten circle.ramp_periods or lower circle.feed_mm_per_min",
     "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
 }
 
@@ -94,8 +99,11 @@ class CircleFigures(NamedTuple):
     radial_deviation_min_mm: float | None
     radial_deviation_max_mm: float | None
     circular_deviation_mm: float | None
+    """About the least-squares centre; None, as radius and centre, where `constant_speed_deg` is too short."""
     radius_deviation_mm: float | None
     centre_offset_mm: tuple[float, float] | None
+    constant_speed_deg: float | None
+    """Arc at constant speed, with the loops settled, from which F, G, radius and centre are taken."""
     passed: bool
     failures: tuple[Failure, ...]
     contributions: tuple[Contribution, ...] | None
@@ -310,6 +318,8 @@ def _figures(
 ) -> CircleFigures:
     phase_deg, gain_db, crossover_hz = _margins(run) if run else (None, None, None)
     contour = run.contour if run else None
+    # A short arc has a least-squares centre too, but not one that means anything.
+    round_ = contour if run and run.constant_speed_deg >= LEAST_ARC_DEG else None
     circle = profile.circle
     setpoints = circle_setpoints(
         circle.radius_mm,
@@ -341,9 +351,10 @@ def _figures(
         max_contour_error_mm=contour.max_contour_error_mm if contour else None,
         radial_deviation_min_mm=contour.radial_deviation_min_mm if contour else None,
         radial_deviation_max_mm=contour.radial_deviation_max_mm if contour else None,
-        circular_deviation_mm=contour.circular_deviation_mm if contour else None,
-        radius_deviation_mm=contour.radius_deviation_mm if contour else None,
-        centre_offset_mm=contour.centre_offset_mm if contour else None,
+        circular_deviation_mm=round_.circular_deviation_mm if round_ else None,
+        radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
+        centre_offset_mm=round_.centre_offset_mm if round_ else None,
+        constant_speed_deg=run.constant_speed_deg if run else None,
         passed=not failures,
         failures=failures,
         contributions=None,
@@ -395,11 +406,18 @@ def _failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
         ("max_contour_error_mm", contour.max_contour_error_mm, tolerance.max_contour_error_mm),
         ("circular_deviation_mm", contour.circular_deviation_mm, tolerance.circular_deviation_mm),
     )
+    arc_deg = run.constant_speed_deg
+    blind = arc_deg < LEAST_ARC_DEG and tolerance.circular_deviation_mm is not None
     return tuple(
         Failure(name, value, limit)
         for name, value, limit in (
             *strayed,
             *((name, value, limit) for name, value, limit in low if value < limit),
-            *((name, value, limit) for name, value, limit in high if limit is not None and value > limit),
+            *(
+                (name, value, limit)
+                for name, value, limit in high
+                if limit is not None and value > limit and not (blind and name == "circular_deviation_mm")
+            ),
+            *((("constant_speed_deg", arc_deg, LEAST_ARC_DEG),) if blind else ()),
         )
     )

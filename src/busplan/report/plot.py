@@ -126,11 +126,11 @@ def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
     axes.set_axis_off()
     axes.set_title(_title(result), fontsize=10)
     factor = per_um * 1e3 * result.radius_mm
-    deviation_um = (result.circular_deviation_mm or 0.0) * 1e3
+    deviation = "-" if result.circular_deviation_mm is None else f"{result.circular_deviation_mm * 1e3:.2f} um"
     axes.text(
         0.0,
         0.0,
-        f"{step_um:g} um a ring\n{factor:.0f} times magnified\nG = {deviation_um:.2f} um",
+        f"{step_um:g} um a ring\n{factor:.0f} times magnified\nG = {deviation}",
         ha="center",
         va="center",
         fontsize=9,

@@ -35,8 +35,9 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
     for failure in result.failures:
         stability = failure.name in ("stability", "min_phase_margin_deg", "min_gain_margin_db")
         # Margins have default limits: what is not said in the file cannot be where its finding stands.
-        said = failure.name in subject.profile.tolerance.model_fields_set
-        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
+        name = "circular_deviation_mm" if failure.name == "constant_speed_deg" else failure.name
+        said = name in subject.profile.tolerance.model_fields_set
+        key = f"tolerance.{name}" if said else "servo.position_gain_per_s"
         cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else ""
         if failure.name in CONTOUR_MEASURES:
             cure = attack

@@ -26,8 +26,8 @@ _IDEAL_MECHANICS = Mechanics()
 FULL_TURN_DEG = 360.0
 _FOLLOWING_DEG = 36.0
 """What a following error may lack of the full turn when the set-points end: a tenth of it."""
-_SETTLING_SHARE = 0.25
-"""The measures at constant speed leave out at most this share of it for the loop to settle."""
+_SETTLING_SHARE = 0.2
+"""The measures at constant speed leave out at most this share of it for the loop to settle: 270 degrees stay."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -169,7 +169,7 @@ def simulate_circle(
     Notes
     -----
     The measures at constant speed begin when the set-points have reached the feed, one period has passed and the loops
-    have settled to a thousandth, but they leave out no more than a quarter; they end when the set-points slow down.
+    have settled to a thousandth, but they leave out no more than a fifth; they end when the set-points slow down.
 
     References
     ----------
