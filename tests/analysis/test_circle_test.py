@@ -1,11 +1,12 @@
 """The circle test of a profile: bus first, then stability, then tolerances, and what to attack."""
 
 from collections.abc import Callable
+from math import cos
 
 import pytest
 
 from busplan.analysis.capacity import figures
-from busplan.analysis.circle_test import CircleFigures, circle_test
+from busplan.analysis.circle_test import CircleFigures, circle_test, to_attack
 from busplan.analysis.contour_profile import contour_profile
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
@@ -200,8 +201,82 @@ def test_contributions_are_ranked_and_only_of_sources_that_are_there(small: Prof
         "drive_lag",
         "drive_offset",
         "axis_mismatch",
+        "period",
     }
-    assert only(override(small, {"servo.velocity_feedforward": 1.0}), with_contributions=True).contributions == ()
+    chords = only(override(small, {"servo.velocity_feedforward": 1.0}), with_contributions=True).contributions
+    assert [one.source for one in chords or ()] == ["period"]
+
+
+def test_the_chords_of_the_period_are_a_source(small: Profile) -> None:
+    # Set-points w T apart on an ideal drive: chords that lie r (1 - cos(w T / 2)) inside.
+    coarse = override(small, {"servo.velocity_feedforward": 1.0, "cycle.period_us": 20_000, "circle.ramp_periods": 2})
+    result = only(coarse, with_contributions=True)
+    chord_mm = 25 * (1 - cos(50 / 25 * 0.02 / 2))
+    assert result.max_contour_error_mm == pytest.approx(chord_mm, rel=0.02)
+    (source,) = result.contributions or ()
+    assert source.source == "period"
+    assert source.removed_mm == pytest.approx(chord_mm, rel=0.02)
+
+
+def test_acceleration_feedforward_is_a_source(small: Profile) -> None:
+    wrong = override(small, {"servo.velocity_feedforward": 1.0, "servo.acceleration_feedforward_s": 0.01})
+    assert (only(wrong, with_contributions=True).contributions or ())[0].source == "acceleration_feedforward"
+
+
+def test_what_is_attacked_first_takes_most_of_the_measure_that_failed(small: Profile) -> None:
+    # The lag makes the circle too small, which G does not see; the scale makes it oval.
+    rough = override(
+        small,
+        {
+            "servo.velocity_feedforward": 0.0,
+            "mechanics.scale_x_ppm": 300,
+            "mechanics.scale_y_ppm": -300,
+        },
+    )
+    for measure, source in (("max_contour_error_mm", "velocity_feedforward"), ("circular_deviation_mm", "scale")):
+        result = only(override(rough, {f"tolerance.{measure}": 1e-4}))
+        found = to_attack(result)
+        assert found is not None
+        contribution, removed_mm = found
+        assert contribution.source == source
+        assert removed_mm == pytest.approx(getattr(result, measure) - getattr(contribution, measure))
+        assert removed_mm > 0
+
+
+def test_a_margin_that_fails_has_no_source(small: Profile) -> None:
+    result = only(override(small, {"tolerance.min_phase_margin_deg": 179.0}), with_contributions=True)
+    assert not result.passed
+    assert to_attack(result) is None
+
+
+def test_a_bus_that_does_not_fit_needs_no_path(small: Profile, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("a path was built")
+
+    monkeypatch.setattr("busplan.analysis.circle_test.circle_path", refuse)
+    huge = {"cycle.period_us": 1.0, "servo.step_us": 1.0, "circle.radius_mm": 10_000.0}
+    result = only(override(small, huge))
+    assert [one.name for one in result.failures] == ["required_us"]
+    assert result.setpoints == result.steps > 1e9
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"delivery.jitter_us": 1500}, "jitter_us = 1500"),
+        ({"servo.y.max_velocity_mm_s": 10}, "axis y reaches"),
+        ({"servo.step_us": 0.001}, "step_us = 0.001"),
+    ],
+)
+def test_all_periods_are_checked_before_the_first_is_simulated(
+    small: Profile, monkeypatch: pytest.MonkeyPatch, changes: dict[str, object], message: str
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise AssertionError("simulated before all was checked")
+
+    monkeypatch.setattr("busplan.analysis.circle_test.simulate_circle", refuse)
+    with pytest.raises(BusplanError, match=message):
+        circle_test(override(small, changes), periods_us=[4000.0, 2000.0])
 
 
 def test_the_seed_decides_what_is_lost(small: Profile) -> None:
@@ -252,3 +327,62 @@ def test_the_error_around_the_circle_lies_between_f_min_and_f_max(small: Profile
     assert len(profile.low_mm) == len(profile.high_mm) == 36
     assert min(value for value in profile.low_mm if value is not None) == result.radial_deviation_min_mm
     assert max(value for value in profile.high_mm if value is not None) == result.radial_deviation_max_mm
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"servo.velocity_feedforward": 1e6},
+        {"delivery.loss_probability": 1.0},
+        {"mechanics.backlash_mm": 100.0},
+        {"servo.position_gain_per_s": 1e-9},
+    ],
+)
+def test_a_table_that_does_not_go_round_fails(small: Profile, changes: dict[str, object]) -> None:
+    result = only(override(small, changes))
+    assert result.stable
+    (failure,) = (one for one in result.failures if one.name == "circle_not_followed")
+    assert failure.limit == 360
+    assert "did not follow the circle" in failure.text
+
+
+@pytest.mark.parametrize("direction", ["ccw", "cw"])
+@pytest.mark.parametrize("ramp_periods", [0, 20])
+def test_a_following_error_is_no_lack_of_following(small: Profile, direction: str, ramp_periods: int) -> None:
+    lagging = {"circle.direction": direction, "circle.ramp_periods": ramp_periods, "servo.position_gain_per_s": 10}
+    assert only(override(small, lagging)).passed
+
+
+def test_each_margin_is_the_smaller_one_of_both_axes(small: Profile) -> None:
+    # A high gain costs x its gain margin, a lag costs y its phase margin.
+    x = {"servo.x.position_gain_per_s": 15_000}
+    y = {"servo.y.position_gain_per_s": 50, "servo.y.drive_lag_us": 60_000}
+    both = only(override(small, {**x, **y}))
+    one, other = (
+        only(override(small, {key.replace(".x.", ".").replace(".y.", "."): value for key, value in axis.items()}))
+        for axis in (x, y)
+    )
+    phases, gains = ([getattr(each, name) for each in (one, other)] for name in ("phase_margin_deg", "gain_margin_db"))
+    assert phases.index(min(phases)) != gains.index(min(gains))
+    assert (both.phase_margin_deg, both.gain_margin_db) == (min(phases), min(gains))
+    assert both.crossover_hz == (one, other)[phases.index(min(phases))].crossover_hz
+
+
+def test_a_short_arc_at_constant_speed_has_no_circular_deviation(small: Profile) -> None:
+    # Ramps of 0.6 s take a good half turn between them.
+    short = override(small, {"circle.ramp_periods": 600})
+    result = only(short)
+    assert result.passed
+    assert result.constant_speed_deg is not None
+    assert 100 < result.constant_speed_deg < 270
+    assert result.circular_deviation_mm is result.centre_offset_mm is result.radius_deviation_mm is None
+    blind = only(override(short, {"tolerance.circular_deviation_mm": 1.0}))
+    (failure,) = blind.failures
+    assert (failure.name, failure.value, failure.limit) == ("constant_speed_deg", blind.constant_speed_deg, 270)
+    assert "needs 270 deg of the circle at constant speed" in failure.text
+
+
+def test_a_loop_that_settles_slowly_keeps_arc_enough(small: Profile) -> None:
+    slow = only(override(small, {"servo.position_gain_per_s": 3.0}))
+    assert (slow.constant_speed_deg or 0.0) >= 270
+    assert slow.circular_deviation_mm is not None

@@ -4,11 +4,15 @@ import csv
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from busplan.cli.output import new_file
+from busplan.errors import BusplanError
 
 QUICK = """
 schema_version = 1
@@ -85,7 +89,8 @@ def test_json_holds_the_contract(profile: Path) -> None:
         assert all(math.isfinite(result[key]) for key in numbers)
         assert len(result["centre_offset_mm"]) == 2
         assert (result["bus_fits"], result["passed"], result["failures"]) == (True, True, [])
-        assert [set(one) for one in result["contributions"]] == [{"source", "max_contour_error_mm", "removed_mm"}]
+        assert {one["source"] for one in result["contributions"]} == {"velocity_feedforward", "period"}
+        assert all(set(one) >= {"source", "max_contour_error_mm", "removed_mm"} for one in result["contributions"])
 
 
 def test_without_contributions_the_key_is_not_there(profile: Path) -> None:
@@ -197,13 +202,73 @@ def test_bad_input_is_exit_2_with_one_message_and_no_file(profile: Path, argumen
     assert [path.name for path in profile.parent.iterdir()] == ["quick.toml"]
 
 
-def test_a_failing_plot_leaves_the_old_file(profile: Path) -> None:
+def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(profile: Path) -> None:
     old = profile.parent / "c.png"
     old.write_bytes(b"old")
-    run = busplan(profile, "--plot", "c.png", "--period", "100us", cwd=profile.parent)
-    assert run.returncode == 2
+    run = busplan(profile, "--plot", "c.png", "--period", "100us", "--format", "json", cwd=profile.parent)
+    assert run.returncode == 1
     assert "nothing to draw" in run.stderr
+    assert "wrote" not in run.stderr
+    assert json.loads(run.stdout)["results"][0]["failures"][0]["name"] == "required_us"
     assert old.read_bytes() == b"old"
+    assert len(list(profile.parent.iterdir())) == 2
+
+
+def test_trace_and_plot_in_one_file_are_refused(profile: Path) -> None:
+    (profile.parent / "link.svg").symlink_to("c.svg")
+    run = busplan(profile, "--trace", "c.svg", "--plot", "link.svg", cwd=profile.parent)
+    assert run.returncode == 2
+    assert "the same file" in run.stderr
+
+
+@pytest.mark.parametrize("error", [ValueError("mine"), FileNotFoundError("mine"), OSError("mine")])
+def test_an_error_of_the_callers_own_work_stays_its_own(tmp_path: Path, error: Exception) -> None:
+    def work() -> None:
+        with new_file(tmp_path / "f", overwrite=True) as file:
+            file.write(b"half")
+            raise error
+
+    with pytest.raises(type(error), match="mine"):
+        work()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no full disk here")
+def test_a_full_disk_is_said_of_the_file(tmp_path: Path) -> None:
+    def work() -> None:
+        with new_file(tmp_path / "f", overwrite=True) as file:
+            os.dup2(os.open("/dev/full", os.O_WRONLY), file.fileno())
+            file.write(bytes(1 << 20))
+
+    with pytest.raises(BusplanError, match="f: cannot be written: No space"):
+        work()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_broken_matplotlib_is_said_before_the_simulation(profile: Path) -> None:
+    package = profile.parent / "broken" / "matplotlib"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("", encoding="utf-8")
+    (package / "figure.py").write_text("raise RuntimeError('wrong ABI')", encoding="utf-8")
+    code = "import sys; sys.path.insert(0, 'broken'); from busplan.__main__ import main; main()"
+    run = subprocess.run(
+        [sys.executable, "-c", code, "circle-test", str(profile), "--plot", "c.png"],
+        capture_output=True,
+        text=True,
+        cwd=profile.parent,
+        check=False,
+    )
+    assert run.returncode == 2
+    assert "does not load (RuntimeError: wrong ABI)" in run.stderr
+    assert not (profile.parent / "c.png").exists()
+
+
+def test_rounding_is_shown_as_nothing(profile: Path) -> None:
+    # Ideal but for a scale: all errors are on one side, and the other end of the plot is rounding.
+    text = QUICK.replace("velocity_feedforward = 0", "velocity_feedforward = 1") + "[mechanics]\nbacklash_mm = 0.0\n"
+    profile.write_text(text, encoding="utf-8")
+    run = busplan(profile, cwd=profile.parent)
+    assert not re.search(r"e-\d\d|[+-]0\.0\b", run.stdout)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

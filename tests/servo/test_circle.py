@@ -2,6 +2,7 @@
 
 import math
 import tracemalloc
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from busplan.errors import BusplanError
 from busplan.servo import axis as axis_module
 from busplan.servo import contour as contour_module
 from busplan.servo.axis import simulate_axis
-from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.circle import CircleRun, check_circle, simulate_circle
 from busplan.servo.contour import contour_error
 from busplan.servo.delivery import Arrivals
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
@@ -264,7 +265,7 @@ def test_the_part_at_constant_speed_waits_for_the_loop_and_ends_with_the_feed() 
     assert run.constant_speed.stop * 100 == pytest.approx(path.constant_until_us, abs=100)
     slow = simulate_circle(path, x=an_axis(position_gain_per_s=0.5), y=an_axis(), timing=timing)
     whole_us = path.constant_until_us - path.constant_from_us - 1000
-    assert slow.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 4, abs=100)
+    assert slow.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 5, abs=100)
 
 
 def test_a_circle_of_ramps_only_still_has_measures() -> None:
@@ -373,3 +374,21 @@ def test_whatever_is_set_the_measures_are_finite(**drawn: Any) -> None:
     assert np.isfinite(numbers).all()
     assert contour.radial_deviation_min_mm <= contour.radial_deviation_max_mm
     assert 0 <= contour.mean_contour_error_mm <= contour.max_contour_error_mm
+
+
+def test_the_highest_level_of_the_dac_limits_the_feed() -> None:
+    # Two bits command -100, -50, 0 and 50 mm/s.
+    path, timing = circle_path(50.0, feed_mm_per_min=3000.0, period_us=1000.0), LoopTiming(period_us=1000.0)
+    ideal = Axis(position_gain_per_s=50.0, max_velocity_mm_s=100.0)
+    check_circle(path, x=ideal, y=ideal, timing=timing)
+    with pytest.raises(
+        BusplanError, match=r"axis y reaches 3000 mm/min with max_velocity_mm_s = 100\.0 and dac_bits = 2"
+    ):
+        check_circle(path, x=ideal, y=replace(ideal, dac_bits=2), timing=timing)
+
+
+def test_an_offset_beyond_the_reach_is_blamed_itself() -> None:
+    path = circle_path(50.0, feed_mm_per_min=3000.0, period_us=1000.0)
+    axis = Axis(position_gain_per_s=50.0, max_velocity_mm_s=100.0, drive_offset_mm_s=-150.0)
+    with pytest.raises(BusplanError, match=r"drive_offset_mm_s = -150\.0: axis x commands at most 100 mm/s"):
+        check_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))

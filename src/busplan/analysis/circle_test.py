@@ -13,15 +13,20 @@ from busplan.analysis.contributions import Contribution, Setup, contributions, s
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
-from busplan.servo.circle import CircleRun, simulate_circle
-from busplan.servo.margins import LoopMargins
+from busplan.servo.circle import FULL_TURN_DEG, CircleRun, check_circle, simulate_circle
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import circle_path
+from busplan.servo.path import circle_path, circle_setpoints
 from busplan.timing import TimingModelName
 
 Progress = Callable[[int, int], None]
 """Called with the steps done and the steps to do."""
 
+
+CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
+"""Measures of roundness that have a tolerance, in the order in which they are looked at."""
+
+LEAST_ARC_DEG: Final = 270.0
+"""Arc that the circular deviation G needs: the least-squares centre of a shorter one follows its errors."""
 
 _FAILURES: Final[dict[str, str]] = {
     "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
@@ -29,10 +34,14 @@ _FAILURES: Final[dict[str, str]] = {
     "nodes": "{value:.0f} nodes are over the {limit:.0f} of one bus",
     "payload_bytes": "a payload of {value:.0f} bytes is over the limit of {limit:.0f} bytes",
     "stability": "the position loop is unstable",
+    "circle_not_followed": "the table did not follow the circle (not the whole turn, or an error above the radius): "
+    "it went {value:.0f} deg of {limit:.0f} deg round the centre",
     "min_phase_margin_deg": "the phase margin of {value:.2f} deg is {under:.2f} deg under its {limit:g} deg",
     "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
     "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
     "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "constant_speed_deg": "the circular deviation G cannot be told: its least-squares centre needs {limit:.0f} deg of "
+    "the circle at constant speed, not {value:.0f} deg; shorten circle.ramp_periods or lower circle.feed_mm_per_min",
     "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
 }
 
@@ -80,21 +89,57 @@ class CircleFigures(NamedTuple):
     """How the servo values are known: measured, calibrated or assumed."""
     stable: bool | None
     phase_margin_deg: float | None
-    """Of the axis with the smaller one; None also where the loop gain never reaches one."""
+    """The smaller one of both axes; None also where no loop gain reaches one."""
     gain_margin_db: float | None
-    """Of the axis with the smaller one; None also where no gain makes the loop unstable."""
+    """The smaller one of both axes, whichever has it; None also where no gain makes a loop unstable."""
     crossover_hz: float | None
+    """Of the axis with the smaller phase margin."""
     mean_contour_error_mm: float | None
     max_contour_error_mm: float | None
     radial_deviation_min_mm: float | None
     radial_deviation_max_mm: float | None
     circular_deviation_mm: float | None
+    """About the least-squares centre; None, as radius and centre, where `constant_speed_deg` is too short."""
     radius_deviation_mm: float | None
     centre_offset_mm: tuple[float, float] | None
+    constant_speed_deg: float | None
+    """Arc at constant speed, with the loops settled, from which F, G, radius and centre are taken."""
     passed: bool
     failures: tuple[Failure, ...]
     contributions: tuple[Contribution, ...] | None
     """Ranked, largest first; None where they were not asked for and nothing failed that they could explain."""
+
+
+def failed_measure(result: CircleFigures) -> str | None:
+    """Name of the first contour measure that misses its tolerance; None where only something else fails.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period.
+    """
+    return next((failure.name for failure in result.failures if failure.name in CONTOUR_MEASURES), None)
+
+
+def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
+    """Tell which source takes most of the first contour measure that fails, and how much it takes [mm].
+
+    Parameters
+    ----------
+    result
+        The circle test at one period, with contributions.
+
+    Returns
+    -------
+    tuple or None
+        None where no contour measure fails, or no source takes anything of it.
+    """
+    measure = failed_measure(result)
+    if measure is None or not result.contributions:
+        return None
+    first = min(result.contributions, key=lambda one: float(getattr(one, measure)))
+    removed_mm = float(getattr(result, measure)) - float(getattr(first, measure))
+    return (first, removed_mm) if removed_mm > 0 else None
 
 
 class CircleTest(NamedTuple):
@@ -153,10 +198,12 @@ def circle_test(
         override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
     ]
     counter = _Counter(progress)
-    # Everything is set up before anything is simulated: what is wrong with the last period is said at once.
-    setups = [setup(variant) for variant in variants]
-    for variant, one in zip(variants, setups, strict=True):
-        counter.expect(one, runs=1 + (len(sources(one)) if with_contributions else 0), wanted=bus(variant).fits)
+    # Everything is set up before anything is simulated: what is wrong with the last period is said at once. What the
+    # bus does not carry needs no path, however many set-points it has.
+    setups = [setup(variant) if bus(variant).fits else loop_timing(variant) for variant in variants]
+    for one in setups:
+        if isinstance(one, Setup):
+            counter.expect(one, *(sources(one).values() if with_contributions else ()))
     pairs = [
         _test(variant, one, with_contributions=with_contributions, explain=explain, counter=counter)
         for variant, one in zip(variants, setups, strict=True)
@@ -178,8 +225,7 @@ def setup(profile: Profile) -> Setup:
         As `circle_test`.
     """
     circle, servo, delivery, mechanics = profile.circle, profile.servo, profile.delivery, profile.mechanics
-    required_us = bus(profile).required_us
-    return Setup(
+    one = Setup(
         path=circle_path(
             circle.radius_mm,
             feed_mm_per_min=circle.feed_mm_per_min,
@@ -189,16 +235,30 @@ def setup(profile: Profile) -> Setup:
         ),
         x=Axis(**servo.axis_keys("x")),
         y=Axis(**servo.axis_keys("y")),
-        timing=LoopTiming(
-            period_us=profile.cycle.period_us,
-            step_us=servo.step_us,
-            loop=servo.loop,
-            interpolation=servo.interpolation,
-            # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
-            delay_us=min(required_us, profile.cycle.period_us) if servo.loop == "host" else 0.0,
-        ),
+        timing=loop_timing(profile),
         delivery=Delivery(**delivery.model_dump()),
         mechanics=Mechanics(**mechanics.model_dump()),
+    )
+    check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
+    return one
+
+
+def loop_timing(profile: Profile) -> LoopTiming:
+    """Where a profile closes its loops, and how often.
+
+    Raises
+    ------
+    BusplanError
+        The period is no multiple of the step.
+    """
+    period_us, servo = profile.cycle.period_us, profile.servo
+    return LoopTiming(
+        period_us=period_us,
+        step_us=servo.step_us,
+        loop=servo.loop,
+        interpolation=servo.interpolation,
+        # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
+        delay_us=min(bus(profile).required_us, period_us) if servo.loop == "host" else 0.0,
     )
 
 
@@ -210,8 +270,8 @@ class _Counter:
         self._expected = 0
         self._done = 0
 
-    def expect(self, one: Setup, *, runs: int, wanted: bool) -> None:
-        self._expected += 2 * one.steps * runs * wanted
+    def expect(self, *setups: Setup) -> None:
+        self._expected += sum(2 * one.steps for one in setups)
 
     def run(self, one: Setup) -> CircleRun:
         before = self._done
@@ -235,71 +295,84 @@ class _Counter:
 
 
 def _test(
-    profile: Profile, one: Setup, *, with_contributions: bool, explain: bool, counter: _Counter
+    profile: Profile, one: Setup | LoopTiming, *, with_contributions: bool, explain: bool, counter: _Counter
 ) -> tuple[CircleFigures, CircleRun | None]:
     capacity = bus(profile)
-    if not capacity.fits:
+    if isinstance(one, LoopTiming):
         return _figures(profile, one, capacity, None), None
     run = counter.run(one)
-    result = _figures(profile, one, capacity, run)
-    explained = {"mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm"}
-    if with_contributions or (explain and explained & {failure.name for failure in result.failures}):
+    result = _figures(profile, one.timing, capacity, run)
+    if with_contributions or (explain and failed_measure(result)):
         if not with_contributions:
-            counter.expect(one, runs=len(sources(one)), wanted=True)
-        ranked = contributions(one, run.contour.max_contour_error_mm, simulate=counter.run)
+            counter.expect(*sources(one).values())
+        ranked = contributions(one, max_contour_error_mm=run.contour.max_contour_error_mm, simulate=counter.run)
         result = result._replace(contributions=ranked)
     return result, run
 
 
 def _figures(
     profile: Profile,
-    one: Setup,
+    timing: LoopTiming,
     capacity: CapacityFigures,
     run: CircleRun | None,
 ) -> CircleFigures:
-    margins = _smaller(run) if run else None
+    phase_deg, gain_db, crossover_hz = _margins(run) if run else (None, None, None)
     contour = run.contour if run else None
+    # A short arc has a least-squares centre too, but not one that means anything.
+    round_ = contour if run and run.constant_speed_deg >= LEAST_ARC_DEG else None
+    circle = profile.circle
+    setpoints = circle_setpoints(
+        circle.radius_mm,
+        feed_mm_per_min=circle.feed_mm_per_min,
+        period_us=timing.period_us,
+        ramp_periods=circle.ramp_periods,
+    )
     failures = _bus_failures(profile, capacity) if run is None else _failures(profile, run)
     return CircleFigures(
         period_us=profile.cycle.period_us,
-        feed_mm_per_min=profile.circle.feed_mm_per_min,
-        radius_mm=profile.circle.radius_mm,
-        duration_s=one.path.duration_us / 1e6,
-        setpoints=one.path.setpoints,
-        steps=one.steps,
-        step_us=one.timing.step_us,
-        loop=one.timing.loop,
-        delay_us=one.timing.delay_us,
+        feed_mm_per_min=circle.feed_mm_per_min,
+        radius_mm=circle.radius_mm,
+        duration_s=setpoints * timing.period_us / 1e6,
+        setpoints=setpoints,
+        steps=setpoints * timing.steps_per_period,
+        step_us=timing.step_us,
+        loop=timing.loop,
+        delay_us=timing.delay_us,
         timing_model=capacity.timing_model,
         bus_fits=capacity.fits,
         required_us=capacity.required_us,
         available_us=capacity.available_us,
         servo_grade=profile.servo.grade,
-        stable=margins.stable if margins else None,
-        phase_margin_deg=margins.phase_margin_deg if margins else None,
-        gain_margin_db=margins.gain_margin_db if margins else None,
-        crossover_hz=margins.crossover_hz if margins else None,
+        stable=run.margins_x.stable and run.margins_y.stable if run else None,
+        phase_margin_deg=phase_deg,
+        gain_margin_db=gain_db,
+        crossover_hz=crossover_hz,
         mean_contour_error_mm=contour.mean_contour_error_mm if contour else None,
         max_contour_error_mm=contour.max_contour_error_mm if contour else None,
         radial_deviation_min_mm=contour.radial_deviation_min_mm if contour else None,
         radial_deviation_max_mm=contour.radial_deviation_max_mm if contour else None,
-        circular_deviation_mm=contour.circular_deviation_mm if contour else None,
-        radius_deviation_mm=contour.radius_deviation_mm if contour else None,
-        centre_offset_mm=contour.centre_offset_mm if contour else None,
+        circular_deviation_mm=round_.circular_deviation_mm if round_ else None,
+        radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
+        centre_offset_mm=round_.centre_offset_mm if round_ else None,
+        constant_speed_deg=run.constant_speed_deg if run else None,
         passed=not failures,
         failures=failures,
         contributions=None,
     )
 
 
-def _smaller(run: CircleRun) -> LoopMargins:
-    """Margins of the axis that has less of them: an unstable one, else the smaller phase margin."""
+def _margins(run: CircleRun) -> tuple[float | None, float | None, float | None]:
+    """Smallest phase margin [deg] and gain margin [dB] of both axes, and the crossover of the former [Hz].
 
-    def rank(margins: LoopMargins) -> tuple[bool, float, float]:
-        phase, gain = margins.phase_margin_deg, margins.gain_margin_db
-        return margins.stable, inf if phase is None else phase, inf if gain is None else gain
-
-    return min(run.margins_x, run.margins_y, key=rank)
+    One axis may have the smaller phase margin and the other the smaller gain margin. An unstable loop has neither, and
+    hides what the other axis has.
+    """
+    axes = (run.margins_x, run.margins_y)
+    if not all(one.stable for one in axes):
+        return None, None, None
+    gains = [one.gain_margin_db for one in axes if one.gain_margin_db is not None]
+    phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
+    return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
 
 
 def _bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
@@ -317,25 +390,34 @@ def _bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure,
 
 
 def _failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
-    """What a simulated circle does not hold: stability first, then margins, then the contour."""
-    margins, contour, tolerance = (run.margins_x, run.margins_y), run.contour, profile.tolerance
-    if not all(one.stable for one in margins):
+    """What a simulated circle does not hold: stability first, then the turn, the margins and the contour."""
+    contour, tolerance = run.contour, profile.tolerance
+    if not (run.margins_x.stable and run.margins_y.stable):
         return (Failure("stability", None, None),)
-    phase = [one.phase_margin_deg for one in margins if one.phase_margin_deg is not None]
-    gain = [one.gain_margin_db for one in margins if one.gain_margin_db is not None]
+    phase_deg, gain_db, _ = _margins(run)
     low = (
-        ("min_phase_margin_deg", min(phase, default=inf), tolerance.min_phase_margin_deg),
-        ("min_gain_margin_db", min(gain, default=inf), tolerance.min_gain_margin_db),
+        ("min_phase_margin_deg", inf if phase_deg is None else phase_deg, tolerance.min_phase_margin_deg),
+        ("min_gain_margin_db", inf if gain_db is None else gain_db, tolerance.min_gain_margin_db),
     )
+    # Radial errors do not show it: a table that stands still on the circle has none.
+    strayed = () if run.follows else (("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)
     high = (
         ("mean_contour_error_mm", contour.mean_contour_error_mm, tolerance.mean_contour_error_mm),
         ("max_contour_error_mm", contour.max_contour_error_mm, tolerance.max_contour_error_mm),
         ("circular_deviation_mm", contour.circular_deviation_mm, tolerance.circular_deviation_mm),
     )
+    arc_deg = run.constant_speed_deg
+    blind = arc_deg < LEAST_ARC_DEG and tolerance.circular_deviation_mm is not None
     return tuple(
         Failure(name, value, limit)
         for name, value, limit in (
+            *strayed,
             *((name, value, limit) for name, value, limit in low if value < limit),
-            *((name, value, limit) for name, value, limit in high if limit is not None and value > limit),
+            *(
+                (name, value, limit)
+                for name, value, limit in high
+                if limit is not None and value > limit and not (blind and name == "circular_deviation_mm")
+            ),
+            *((("constant_speed_deg", arc_deg, LEAST_ARC_DEG),) if blind else ()),
         )
     )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from busplan.servo.circle import CircleRun
-from busplan.servo.contour import contour_error
+from busplan.servo.contour import blocks, contour_error
 
 
 class ContourProfile(NamedTuple):
@@ -30,13 +30,14 @@ def contour_profile(run: CircleRun, *, sectors: int) -> ContourProfile:
     ContourProfile
         Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
     """
-    x_mm, y_mm = run.x_mm[run.constant_speed], run.y_mm[run.constant_speed]
-    error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
-    turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
-    sector = np.minimum((turn * sectors).astype(np.int64), sectors - 1)
     low, high = np.full(sectors, np.inf), np.full(sectors, -np.inf)
-    np.minimum.at(low, sector, error_mm)
-    np.maximum.at(high, sector, error_mm)
+    for block in blocks(run.constant_speed):
+        x_mm, y_mm = run.x_mm[block], run.y_mm[block]
+        error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
+        turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
+        sector = np.minimum((turn * sectors).astype(np.int64), sectors - 1)
+        np.minimum.at(low, sector, error_mm)
+        np.maximum.at(high, sector, error_mm)
     return ContourProfile(
         tuple(float(value) if np.isfinite(value) else None for value in low),
         tuple(float(value) if np.isfinite(value) else None for value in high),

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from busplan.servo.circle import CircleRun
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import CirclePath
+from busplan.servo.path import MAX_SETPOINTS, CirclePath, circle_path
 
 
 class Setup(NamedTuple):
@@ -37,12 +37,37 @@ class Contribution(NamedTuple):
     """Largest contour error when this source is removed [mm]."""
     removed_mm: float
     """What its removal takes away from the largest contour error [mm]; negative where it hides another source."""
+    mean_contour_error_mm: float
+    """Mean contour error when this source is removed [mm]."""
+    circular_deviation_mm: float
+    """Circular deviation G when this source is removed [mm]."""
 
 
 Removal = Callable[[Setup], Setup]
 
+
+def _with_setpoints_every_step(one: Setup) -> Setup:
+    """The same circle without its chords; as it is where the period does more than to cut the circle into them."""
+    path, timing, delivery = one.path, one.timing, one.delivery
+    # A host's loop runs once a period; jitter, skew and losses come once a period and would not mean the same.
+    irregular = delivery.jitter_us or delivery.skew_us or delivery.loss_probability
+    if timing.loop == "host" or irregular or timing.steps_per_period == 1 or one.steps >= MAX_SETPOINTS:
+        return one
+    return one._replace(
+        path=circle_path(
+            path.radius_mm,
+            feed_mm_per_min=path.feed_mm_per_min,
+            period_us=timing.step_us,
+            ramp_periods=round(path.constant_from_us / timing.step_us),
+            direction=path.direction,
+        ),
+        timing=replace(timing, period_us=timing.step_us),
+    )
+
+
 _REMOVALS: Mapping[str, Removal] = {
     "velocity_feedforward": lambda one: one.with_axes(velocity_feedforward=1.0),
+    "acceleration_feedforward": lambda one: one.with_axes(acceleration_feedforward_s=0.0),
     "drive_lag": lambda one: one.with_axes(drive_lag_us=0.0),
     "drive_offset": lambda one: one.with_axes(drive_offset_mm_s=0.0),
     "dac_resolution": lambda one: one.with_axes(dac_bits=0),
@@ -50,6 +75,7 @@ _REMOVALS: Mapping[str, Removal] = {
     "reversal": lambda one: one.with_axes(reversal_mm_s=0.0),
     "axis_mismatch": lambda one: one._replace(y=one.x),
     "hold": lambda one: one._replace(timing=replace(one.timing, interpolation="linear")),
+    "period": _with_setpoints_every_step,
     "bus_delay": lambda one: one._replace(timing=replace(one.timing, delay_us=0.0)),
     "jitter": lambda one: one._replace(delivery=replace(one.delivery, jitter_us=0.0)),
     "skew": lambda one: one._replace(delivery=replace(one.delivery, skew_us=0.0)),
@@ -71,7 +97,7 @@ def sources(one: Setup) -> dict[str, Setup]:
 
 
 def contributions(
-    one: Setup, max_contour_error_mm: float, *, simulate: Callable[[Setup], CircleRun]
+    one: Setup, *, max_contour_error_mm: float, simulate: Callable[[Setup], CircleRun]
 ) -> tuple[Contribution, ...]:
     """Rank the error sources of a circle test.
 
@@ -87,12 +113,21 @@ def contributions(
     Returns
     -------
     tuple
-        What each source takes, largest first.
+        What each source takes from the largest contour error, largest first.
 
     Notes
     -----
     Sources act together, so what they take one by one need not add up to the whole.
     """
-    without = {source: simulate(setup).contour.max_contour_error_mm for source, setup in sources(one).items()}
-    ranked = (Contribution(source, left_mm, max_contour_error_mm - left_mm) for source, left_mm in without.items())
+    without = {source: simulate(setup).contour for source, setup in sources(one).items()}
+    ranked = (
+        Contribution(
+            source,
+            left.max_contour_error_mm,
+            max_contour_error_mm - left.max_contour_error_mm,
+            left.mean_contour_error_mm,
+            left.circular_deviation_mm,
+        )
+        for source, left in without.items()
+    )
     return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))

@@ -1,5 +1,6 @@
 """`busplan circle-test`."""
 
+import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, BinaryIO
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 import typer
 
 from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
-from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
+from busplan.cli.output import NewFile, PlanFailsError, emit, emit_text, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -67,6 +68,7 @@ def circle_test_command(
         raise BusplanError("--every: goes with --trace FILE.csv")
     if every is not None and every < 1:
         raise BusplanError(f"--every {every}: must be 1 or more")
+    _require_two_files(trace, plot)
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.circle_test import circle_test
     from busplan.profile.shipped import load
@@ -89,15 +91,33 @@ def circle_test_command(
         if trace_file is not None:
             _write_trace(test, trace_file, every=every or 10)
         if plot_file is not None and file_format is not None:
-            from busplan.report.plot import circle_figure
-
-            plot_file.write(circle_figure(test, file_format=file_format))
-    for path in (trace, plot):
-        if path is not None:
-            say(f"wrote {path}")
+            _draw(test, plot_file, file_format=file_format)
+    _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
     _emit(test, format_=format_, contributions=contributions)
     if not test.passed:
         raise PlanFailsError
+
+
+def _require_two_files(trace: Path | None, plot: Path | None) -> None:
+    if trace and plot and os.path.realpath(trace) == os.path.realpath(plot):
+        raise BusplanError(f"--trace {trace} and --plot {plot}: the same file; give two names")
+
+
+def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
+    """Draw what was simulated; where no period was, the old file stays as it is."""
+    if all(run is None for run in test.runs):
+        file.abandon()
+        return
+    from busplan.report.plot import circle_figure
+
+    file.write(circle_figure(test, file_format=file_format))
+
+
+def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
+    if trace is not None:
+        say(f"wrote {trace}")
+    if plot is not None:
+        say(f"wrote {plot}" if drawn else f"{plot}: not written, for no period fits the bus: nothing to draw")
 
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:

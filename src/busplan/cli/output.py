@@ -5,10 +5,10 @@ import os
 import stat
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from errno import EISDIR
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -107,7 +107,7 @@ def partial_path(path: Path) -> Path:
 
 
 @contextmanager
-def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Iterator[BinaryIO]:
+def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Iterator["NewFile"]:
     """Open a file that appears as a whole or not at all: a temporary one beside it, which takes its name at the end.
 
     It is opened at once, so that a path that cannot be written is refused before the work for it is done. What fails
@@ -122,26 +122,73 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     stopped: StoppedError | None = None
-    try:
-        mode = _mode_of(target, overwrite=overwrite)
-        # "x" gives the file the permissions that any new file of the user has.
-        with temporary.open("xb") as file:
-            try:
-                yield file
-            except StoppedError as error:
-                if not keeps_partial:
-                    raise
-                stopped, target, overwrite = error, partial_path(target), True
+    with ExitStack() as last:
+        with _named(path, target):
+            mode = _mode_of(target, overwrite=overwrite)
+            last.callback(_remove, temporary)
+            file = NewFile(_Raw(temporary, path=path, target=target))
+        last.callback(_close, file)
+        try:
+            # What the caller's own work raises is the caller's to tell.
+            yield file
+        except StoppedError as error:
+            if not keeps_partial:
+                raise
+            stopped, target, overwrite = error, partial_path(target), True
+        if file.abandoned:
+            return
+        with _named(path, target):
             file.flush()
             os.fsync(file.fileno())
-        if mode is not None:
-            temporary.chmod(mode)
-        if overwrite:
-            temporary.replace(target)
-        else:
-            _rename_new(temporary, target)
+            file.close()
+            if mode is not None:
+                temporary.chmod(mode)
+            if overwrite:
+                temporary.replace(target)
+            else:
+                _rename_new(temporary, target)
         if stopped is not None:
             raise stopped
+
+
+class _Raw(io.FileIO):
+    """A new file that says itself that it cannot be written: a full disk shows in the caller's own write."""
+
+    def __init__(self, temporary: Path, *, path: Path, target: Path) -> None:
+        self._names = path, target
+        # "x" gives the file the permissions that any new file of the user has.
+        super().__init__(temporary, "xb")
+
+    def write(self, data: Any, /) -> int:
+        with _named(*self._names):
+            return super().write(data)
+
+
+class NewFile(io.BufferedWriter):
+    """A file in the making."""
+
+    abandoned = False
+
+    def abandon(self) -> None:
+        """Leave what was there before as it is: nothing takes its name at the end."""
+        self.abandoned = True
+
+
+def _close(file: NewFile) -> None:
+    with suppress(OSError, ValueError, BusplanError):
+        file.close()
+
+
+def _remove(temporary: Path) -> None:
+    with suppress(OSError, ValueError):
+        temporary.unlink()
+
+
+@contextmanager
+def _named(path: Path, target: Path) -> Iterator[None]:
+    """Say in the user's words what cannot be done with a file."""
+    try:
+        yield
     except FileExistsError:
         raise BusplanError(f"{path}: already there; give another name, or --force to overwrite it") from None
     except FileNotFoundError:
@@ -149,9 +196,6 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise BusplanError(f"{path}: cannot be written: {reason}") from None
-    finally:
-        with suppress(OSError, ValueError):
-            temporary.unlink()
 
 
 def _mode_of(target: Path, *, overwrite: bool) -> int | None:

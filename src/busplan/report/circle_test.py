@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.circle_test import CircleFigures, CircleTest
+from busplan.analysis.circle_test import CircleFigures, CircleTest, failed_measure, to_attack
 from busplan.analysis.contour_profile import ContourProfile
 from busplan.report.lines import BLANK, Line, table, us
 from busplan.report.words import period
@@ -13,6 +13,17 @@ PLOT_SECTORS: Final = 72
 _PLOT_ROWS: Final = 9
 _SHOWN: Final = 1e-9
 """Largest error, in mm, that still counts as none in a plot."""
+_SHOWN_UM: Final = 1e-6
+"""Smallest error, in um, that is shown as one: a picometre is rounding."""
+_ONE_DIGIT_UM: Final = 0.05
+"""From here on one digit after the point shows something."""
+
+
+_MEASURES: Final = {
+    "mean_contour_error_mm": "mean contour error",
+    "max_contour_error_mm": "largest contour error",
+    "circular_deviation_mm": "circular deviation G",
+}
 
 
 def circle_lines(
@@ -42,16 +53,30 @@ def _verdict(name: str, result: CircleFigures) -> Iterator[Line]:
         return
     reasons = ", and ".join(failure.text for failure in result.failures)
     yield Line(f"{subject}: FAILED, {reasons}.", "bad")
-    worst = result.contributions[0] if result.contributions else None
-    if worst is not None and worst.removed_mm > 0:
+    measure, attack = failed_measure(result), to_attack(result)
+    if measure is not None and attack is not None:
+        source, removed_mm = attack
         yield Line(
-            f"Attack {worst.source} first: without it the largest contour error is "
-            f"{_um(worst.max_contour_error_mm)} um, {_um(worst.removed_mm)} um less."
+            f"Attack {source.source} first: without it the {_MEASURES[measure]} is "
+            f"{_um(getattr(source, measure))} um, {_um(removed_mm)} um less."
         )
+    elif measure is not None and result.contributions is not None:
+        yield Line(f"No single error source of the profile explains the {_MEASURES[measure]}.")
 
 
 def _um(value_mm: float | None) -> str:
-    return "-" if value_mm is None else us(value_mm * 1e3)
+    return "-" if value_mm is None else us(_rounded_um(value_mm))
+
+
+def _rounded_um(value_mm: float) -> float:
+    """Micrometres, and 0 without a sign for what is less than arithmetic can tell."""
+    value_um = value_mm * 1e3
+    return value_um if abs(value_um) >= _SHOWN_UM else 0.0
+
+
+def _signed_um(value_mm: float) -> str:
+    text = f"{value_mm * 1e3:+.3f}"
+    return "0.000" if float(text) == 0.0 else text
 
 
 def _two(value: float | None) -> str:
@@ -88,7 +113,7 @@ def _contributions(title: str, result: CircleFigures) -> list[Line]:
         *table(
             ["source", "max without it, um", "takes, um"],
             (
-                [one.source, _um(one.max_contour_error_mm), f"{one.removed_mm * 1e3:+.3f}"]
+                [one.source, _um(one.max_contour_error_mm), _signed_um(one.removed_mm)]
                 for one in result.contributions or ()
             ),
             left=1,
@@ -114,11 +139,19 @@ def _plot(title: str, profile: ContourProfile) -> list[Line]:
             _cell(low, high, lower=lower, upper=upper, zero=zero)
             for low, high in zip(profile.low_mm, profile.high_mm, strict=True)
         )
-        text = f"{label * 1e3:+.1f}" if label is not None else "0" if zero else ""
+        text = _label(label) if label is not None else "0" if zero else ""
         lines.append(Line(f"{text:>9} |{cells}".rstrip(), "table"))
     axis = "".join(f"{angle:<{PLOT_SECTORS // 4}}" for angle in (0, 90, 180, 270)).rstrip()
     lines.append(Line(f"{'deg':>9}  {axis}", "table"))
     return lines
+
+
+def _label(value_mm: float) -> str:
+    """An end of the scale, with as many digits as tell it from 0."""
+    value_um = _rounded_um(value_mm)
+    if value_um == 0.0:
+        return "0"
+    return f"{value_um:+.1f}" if abs(value_um) >= _ONE_DIGIT_UM else f"{value_um:+.1g}"
 
 
 def _cell(low: float | None, high: float | None, *, lower: float, upper: float, zero: bool) -> str:

@@ -1,5 +1,6 @@
 """The circle test as a figure, as ballbar reports draw it. Needs the extra `plot` (matplotlib)."""
 
+from importlib import import_module
 from importlib.util import find_spec
 from io import BytesIO
 from math import ceil, floor, log10
@@ -31,10 +32,17 @@ def require_matplotlib(option: str = "--plot") -> None:
     Raises
     ------
     BusplanError
-        The extra `plot` is not installed.
+        The extra `plot` is not installed, or does not load.
     """
     if find_spec("matplotlib") is None:
         raise BusplanError(f"{option} needs matplotlib: install it with the extra, as in pip install 'busplan[plot]'")
+    try:
+        import_module("matplotlib.figure")
+    except Exception as error:  # noqa: BLE001 - a broken installation fails in many ways
+        raise BusplanError(
+            f"{option} needs matplotlib, and the installed one does not load ({type(error).__name__}: {error}); "
+            "install it again, as in pip install --force-reinstall matplotlib"
+        ) from None
 
 
 def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
@@ -118,11 +126,11 @@ def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
     axes.set_axis_off()
     axes.set_title(_title(result), fontsize=10)
     factor = per_um * 1e3 * result.radius_mm
-    deviation_um = (result.circular_deviation_mm or 0.0) * 1e3
+    deviation = "-" if result.circular_deviation_mm is None else f"{result.circular_deviation_mm * 1e3:.2f} um"
     axes.text(
         0.0,
         0.0,
-        f"{step_um:g} um a ring\n{factor:.0f} times magnified\nG = {deviation_um:.2f} um",
+        f"{step_um:g} um a ring\n{factor:.0f} times magnified\nG = {deviation}",
         ha="center",
         va="center",
         fontsize=9,

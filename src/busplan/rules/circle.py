@@ -18,7 +18,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
 
     A cycle that does not fit has its own rule, and no circle.
     """
-    from busplan.analysis.circle_test import circle_test
+    from busplan.analysis.circle_test import CONTOUR_MEASURES, circle_test, to_attack
 
     if not subject.profile.asks_for_circle or not subject.deciding.fits:
         return
@@ -28,14 +28,19 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
         for message in error.problems:
             yield "BP203", Problem(_key_of(message, subject.profile), message)
         return
-    worst = result.contributions[0] if result.contributions else None
-    attack = f"; attack {worst.source} first" if worst is not None and worst.removed_mm > 0 else ""
+    first = to_attack(result)
+    attack = (
+        "; no single error source of the profile explains it" if first is None else f"; attack {first[0].source} first"
+    )
     for failure in result.failures:
         stability = failure.name in ("stability", "min_phase_margin_deg", "min_gain_margin_db")
         # Margins have default limits: what is not said in the file cannot be where its finding stands.
-        said = failure.name in subject.profile.tolerance.model_fields_set
-        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
-        cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else attack
+        name = "circular_deviation_mm" if failure.name == "constant_speed_deg" else failure.name
+        said = name in subject.profile.tolerance.model_fields_set
+        key = f"tolerance.{name}" if said else "servo.position_gain_per_s"
+        cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else ""
+        if failure.name in CONTOUR_MEASURES:
+            cure = attack
         yield "BP202" if stability else "BP201", Problem(key, f"{failure.text}{cure}")
 
 

@@ -102,7 +102,7 @@ def simulate_axis(
     """
     cycles = len(setpoints_mm) - 1
     arrivals = Arrivals.punctual(cycles) if arrivals is None else arrivals
-    position_mm = np.empty(_checked_steps(setpoints_mm, axis=axis, timing=timing))
+    position_mm = np.empty(checked_steps(setpoints_mm, axis=axis, timing=timing))
     run = compiled(run_rows, _SIGNATURE) if is_compiled(engine) else None
     chunk_steps = _CHUNK_STEPS[run is not None]
     state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
@@ -168,8 +168,7 @@ def _constants(axis: Axis, timing: LoopTiming) -> Constants:
     """Constants of the kernel, as `Constants` lists them."""
     period_s = timing.control_period_us / _US_PER_S
     limit = axis.max_velocity_mm_s
-    # Two's complement, as DACs have it: one level more below zero than above.
-    level = 2 * limit / 2**axis.dac_bits if axis.dac_bits else 0.0
+    level = axis.level_mm_s
     return (
         axis.position_gain_per_s,
         axis.integral_gain_per_s2,
@@ -178,7 +177,7 @@ def _constants(axis: Axis, timing: LoopTiming) -> Constants:
         1 / axis.encoder_resolution_mm if axis.encoder_resolution_mm else 0.0,
         axis.encoder_resolution_mm,
         -limit,
-        limit - level,
+        axis.highest_command_mm_s,
         1 / level if level else 0.0,
         level,
         axis.drive_offset_mm_s,
@@ -187,8 +186,30 @@ def _constants(axis: Axis, timing: LoopTiming) -> Constants:
     )
 
 
-def _checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> int:
-    """Count the steps of the move; refuse more than memory and arithmetic bear."""
+def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> int:
+    """Count the steps of a move; refuse more than memory and arithmetic bear.
+
+    Parameters
+    ----------
+    setpoints_mm, axis, timing
+        As for `simulate_axis`.
+
+    Returns
+    -------
+    int
+        Number of steps [1].
+
+    Raises
+    ------
+    BusplanError
+        Too many steps, or an encoder too fine for the travel.
+
+    Examples
+    --------
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
+    >>> checked_steps(np.zeros(3), axis=axis, timing=LoopTiming(period_us=1000.0, step_us=500.0))
+    4
+    """
     cycles = len(setpoints_mm) - 1
     steps = cycles * timing.steps_per_period
     if steps > MAX_STEPS:

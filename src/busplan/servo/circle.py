@@ -1,7 +1,7 @@
 """The circle test: path, bus, both axes, mechanics and measures, joined."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from busplan.errors import BusplanError
-from busplan.servo.axis import axis_targets, simulate_axis
-from busplan.servo.contour import Contour, contour_error, measure_contour
-from busplan.servo.delivery import Arrivals, arrivals
+from busplan.servo.axis import axis_targets, checked_steps, simulate_axis
+from busplan.servo.contour import Contour, contour_error, covered_deg, measure_contour
+from busplan.servo.delivery import Arrivals, arrivals, check_delivery
 from busplan.servo.engine import Engine
 from busplan.servo.margins import LoopMargins, loop_margins
 from busplan.servo.mechanics import move_to_table
@@ -23,8 +23,11 @@ Progress = Callable[[int, int], None]
 
 _IDEAL_DELIVERY = Delivery()
 _IDEAL_MECHANICS = Mechanics()
-_SETTLING_SHARE = 0.25
-"""The measures at constant speed leave out at most this share of it for the loop to settle."""
+FULL_TURN_DEG = 360.0
+_FOLLOWING_DEG = 36.0
+"""What a following error may lack of the full turn when the set-points end: a tenth of it."""
+_SETTLING_SHARE = 0.2
+"""The measures at constant speed leave out at most this share of it for the loop to settle: 270 degrees stay."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,8 +56,12 @@ class CircleRun:
         Position of the table at the end of every step, shape (steps,) [mm].
     contour
         The measures; finite even when the loop is unstable.
+    covered_deg
+        How far the table went round the centre in the whole move, positive in the direction of the path [deg].
     constant_speed
         The steps that the measures at constant speed are taken from.
+    constant_speed_deg
+        How far it went in those [deg].
     margins_x, margins_y
         Stability of both position loops.
     """
@@ -68,7 +75,9 @@ class CircleRun:
     x_mm: Floats
     y_mm: Floats
     contour: Contour
+    covered_deg: float
     constant_speed: slice
+    constant_speed_deg: float
     margins_x: LoopMargins
     margins_y: LoopMargins
 
@@ -76,6 +85,11 @@ class CircleRun:
     def steps(self) -> int:
         """Number of simulated steps [1]."""
         return len(self.x_mm)
+
+    @property
+    def follows(self) -> bool:
+        """Whether the table went round with the path: once, and never more than the radius away."""
+        return not self.diverged and abs(self.covered_deg - FULL_TURN_DEG) <= _FOLLOWING_DEG
 
     @property
     def diverged(self) -> bool:
@@ -155,7 +169,7 @@ def simulate_circle(
     Notes
     -----
     The measures at constant speed begin when the set-points have reached the feed, one period has passed and the loops
-    have settled to a thousandth, but they leave out no more than a quarter; they end when the set-points slow down.
+    have settled to a thousandth, but they leave out no more than a fifth; they end when the set-points slow down.
 
     References
     ----------
@@ -172,7 +186,7 @@ def simulate_circle(
     >>> round(run.contour.radius_deviation_mm, 3), round(50 * (1 / (1 + (2 / 50) ** 2) ** 0.5 - 1), 3)
     (-0.04, -0.04)
     """
-    _check(path, x=x, y=y, timing=timing)
+    check_circle(path, x=x, y=y, timing=timing, delivery=delivery)
     received = partial(arrivals, delivery, cycles=path.setpoints, period_us=path.period_us)
     arrivals_x, arrivals_y = received(name="x"), received(name="y")
     total = 2 * path.setpoints * timing.steps_per_period
@@ -187,6 +201,8 @@ def simulate_circle(
     move_to_table(x_mm, y_mm=y_mm, mechanics=mechanics, engine=engine)
     margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
     constant_speed = _constant_speed(path, timing=timing, margins=(margins_x, margins_y))
+    # Either way round, the path's own direction counts as positive.
+    forward = 1.0 if path.direction == "ccw" else -1.0
     return CircleRun(
         path=path,
         x=x,
@@ -197,25 +213,63 @@ def simulate_circle(
         x_mm=x_mm,
         y_mm=y_mm,
         contour=measure_contour(x_mm, y_mm=y_mm, radius_mm=path.radius_mm, constant_speed=constant_speed),
+        covered_deg=forward * covered_deg(x_mm, y_mm=y_mm),
         constant_speed=constant_speed,
+        constant_speed_deg=forward * covered_deg(x_mm, y_mm=y_mm, part=constant_speed),
         margins_x=margins_x,
         margins_y=margins_y,
     )
 
 
-def _check(path: CirclePath, *, x: Axis, y: Axis, timing: LoopTiming) -> None:
+def check_circle(
+    path: CirclePath, *, x: Axis, y: Axis, timing: LoopTiming, delivery: Delivery = _IDEAL_DELIVERY
+) -> None:
+    """Refuse what `simulate_circle` cannot simulate, without simulating anything.
+
+    Parameters
+    ----------
+    path, x, y, timing, delivery
+        As for `simulate_circle`.
+
+    Raises
+    ------
+    BusplanError
+        As `simulate_circle`, but for "numba".
+
+    Examples
+    --------
+    >>> from busplan.servo.path import circle_path
+    >>> path = circle_path(50.0, feed_mm_per_min=6000.0, period_us=1000.0)
+    >>> axis = Axis(position_gain_per_s=50.0, max_velocity_mm_s=400.0)
+    >>> check_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))
+    """
     problems = []
     if path.period_us != timing.period_us:
         problems.append(f"period_us = {timing.period_us}: the set-points of the path come every {path.period_us} us")
     for name, axis in (("x", x), ("y", y)):
-        reachable = axis.max_velocity_mm_s - abs(axis.drive_offset_mm_s)
-        if path.feed_mm_s >= reachable:
-            problems.append(
-                f"feed_mm_per_min = {path.feed_mm_per_min}: axis {name} reaches {reachable * 60:g} mm/min with "
-                f"max_velocity_mm_s = {axis.max_velocity_mm_s}; the feed must stay below it"
-            )
+        problems.extend(_out_of_reach(path, name=name, axis=axis))
     if problems:
         raise BusplanError(*problems)
+    check_delivery(delivery, period_us=timing.period_us)
+    checked_steps(path.x_mm, axis=x, timing=timing)
+    checked_steps(path.y_mm, axis=y, timing=timing)
+
+
+def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[str]:
+    """The problem of a drive that cannot keep up with the feed in both directions."""
+    highest_mm_s, offset_mm_s = axis.highest_command_mm_s, abs(axis.drive_offset_mm_s)
+    levels = f" and dac_bits = {axis.dac_bits}" if axis.dac_bits else ""
+    if offset_mm_s >= highest_mm_s:
+        yield (
+            f"drive_offset_mm_s = {axis.drive_offset_mm_s}: axis {name} commands at most {highest_mm_s:g} mm/s with "
+            f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the offset must stay below it"
+        )
+    elif path.feed_mm_s >= highest_mm_s - offset_mm_s:
+        yield (
+            f"feed_mm_per_min = {path.feed_mm_per_min}: axis {name} reaches "
+            f"{(highest_mm_s - offset_mm_s) * 60:g} mm/min with max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; "
+            f"the feed must stay below it"
+        )
 
 
 def _constant_speed(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> slice:

@@ -12,6 +12,7 @@ _BLOCK = 1 << 15
 """Points looked at together: little memory beside the positions, and it stays in the cache."""
 _ITERATIONS = 20
 _CONVERGED_MM = 1e-10
+_DEG_PER_TURN = 360.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +103,7 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
     (0.001, 0.003)
     """
     total, largest = 0.0, 0.0
-    for block in _blocks(slice(0, len(x_mm))):
+    for block in blocks(slice(0, len(x_mm))):
         error = np.abs(contour_error(x_mm[block], y_mm=y_mm[block], radius_mm=radius_mm))
         total += float(error.sum())
         largest = max(largest, float(error.max()))
@@ -120,6 +121,40 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
         centre_offset_mm=centre_mm,
         radius_deviation_mm=radius_deviation_mm,
     )
+
+
+def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> float:
+    """Tell how far the table went round the centre: the angle from first to last point, whole turns included.
+
+    Parameters
+    ----------
+    x_mm, y_mm
+        Positions of the table about the centre of the nominal circle, in order of time, shape (n,) each [mm].
+    part
+        The points to look at, with a start and a stop; all of them by default.
+
+    Returns
+    -------
+    float
+        Positive anticlockwise [deg].
+
+    Notes
+    -----
+    Contour errors are blind to it: a table that stands still at any point of the circle has none.
+
+    Examples
+    --------
+    >>> angle = np.linspace(0.0, -3.0 * np.pi, 1000)
+    >>> round(covered_deg(np.cos(angle), y_mm=np.sin(angle)), 6)
+    -540.0
+    """
+    total = 0.0
+    for block in blocks(slice(0, len(x_mm)) if part is None else part):
+        # One point more at the front: where the block before ended.
+        joined = slice(max(block.start - 1, 0 if part is None else part.start), block.stop)
+        turned = np.diff(np.arctan2(y_mm[joined], x_mm[joined])) / (2 * np.pi)
+        total += float((turned - np.rint(turned)).sum())
+    return total * _DEG_PER_TURN
 
 
 def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tuple[tuple[float, float], float]:
@@ -166,7 +201,7 @@ def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tup
 
 def _gauss_newton_step(fitted: Floats, x_mm: Floats, y_mm: Floats, radius_mm: float) -> Floats:
     normal, right = np.zeros((3, 3)), np.zeros(3)
-    for block in _blocks(slice(0, len(x_mm))):
+    for block in blocks(slice(0, len(x_mm))):
         x, y = x_mm[block] - fitted[0], y_mm[block] - fitted[1]
         distance = np.hypot(x, y)
         away = np.maximum(distance, np.finfo(float).tiny)
@@ -181,12 +216,29 @@ def _range_about(
 ) -> tuple[float, float]:
     """Smallest and largest distance from a centre, minus the nominal radius [mm]."""
     extremes = []
-    for block in _blocks(part):
+    for block in blocks(part):
         error = contour_error(x_mm[block] - centre_mm[0], y_mm=y_mm[block] - centre_mm[1], radius_mm=radius_mm)
         extremes += [float(error.min()), float(error.max())]
     return min(extremes), max(extremes)
 
 
-def _blocks(part: slice) -> Iterator[slice]:
+def blocks(part: slice) -> Iterator[slice]:
+    """Cut a part of the positions into pieces that take little memory.
+
+    Parameters
+    ----------
+    part
+        The points, with a start and a stop.
+
+    Yields
+    ------
+    slice
+        The pieces, in order.
+
+    Examples
+    --------
+    >>> list(blocks(slice(10, 20)))
+    [slice(10, 20, None)]
+    """
     for start in range(part.start, part.stop, _BLOCK):
         yield slice(start, min(start + _BLOCK, part.stop))

@@ -88,6 +88,32 @@ def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: floa
     )
 
 
+def check_delivery(delivery: Delivery, *, period_us: float) -> None:
+    """Refuse a delivery that would mix up the packets of two cycles.
+
+    Parameters
+    ----------
+    delivery
+        Jitter and skew.
+    period_us
+        Communication period [us].
+
+    Raises
+    ------
+    BusplanError
+        Jitter and skew together exceed half the period.
+
+    Examples
+    --------
+    >>> check_delivery(Delivery(jitter_us=400.0, skew_us=100.0), period_us=1000.0)
+    """
+    if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
+        refuse(
+            f"jitter_us = {delivery.jitter_us} and skew_us = {delivery.skew_us}: together they must not exceed "
+            f"half the period, {period_us / 2:g} us"
+        )
+
+
 def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:
     """How much later than planned each SP takes effect on a node.
 
@@ -123,11 +149,7 @@ def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, perio
     >>> arrival_offsets_us(Delivery(skew_us=3.0), name="y", cycles=3, period_us=1000.0).tolist()
     [0.0, 3.0, 3.0, 0.0]
     """
-    if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
-        refuse(
-            f"jitter_us = {delivery.jitter_us} and skew_us = {delivery.skew_us}: together they must not exceed "
-            f"half the period, {period_us / 2:g} us"
-        )
+    check_delivery(delivery, period_us=period_us)
     random = np.random.default_rng([delivery.seed, _JITTER_STREAM])
     offsets = delivery.jitter_us * random.uniform(-1.0, 1.0, cycles + 1)
     offsets += delivery.skew_us if name == "y" else 0.0

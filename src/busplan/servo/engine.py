@@ -53,8 +53,8 @@ def compiled(function: Callable[..., Any], signature: str) -> Callable[..., Any]
     Returns
     -------
     callable or None
-        The compiled function; None without numba, and where no cache can be written: compiling anew at each start
-        takes as long as plain Python takes for a whole circle.
+        The compiled function; None without a numba that works, and where no cache can be read or written:
+        compiling anew at each start takes as long as plain Python takes for a whole circle.
 
     Examples
     --------
@@ -64,9 +64,9 @@ def compiled(function: Callable[..., Any], signature: str) -> Callable[..., Any]
     """
     try:
         import numba  # noqa: PLC0415 - an optional extra that takes a fifth of a second to load
-    except ImportError:
+    except Exception:  # noqa: BLE001 - a broken installation fails in many ways, and nothing depends on it
         return None
     try:
         return numba.njit(signature, cache=True)(function)
-    except (RuntimeError, OSError):
+    except Exception:  # noqa: BLE001 - a damaged cache raises whatever unpickling garbage raises
         return None

@@ -102,6 +102,19 @@ class Axis:
             *self._out_of_range(),
         )
 
+    @property
+    def level_mm_s(self) -> float:
+        """Step from one level of the DAC to the next; 0 for an ideal one [mm/s]."""
+        return 2 * self.max_velocity_mm_s / 2**self.dac_bits if self.dac_bits else 0.0
+
+    @property
+    def highest_command_mm_s(self) -> float:
+        """Largest velocity that can be commanded forwards [mm/s].
+
+        Two's complement, as DACs have it: one level more below zero than above.
+        """
+        return self.max_velocity_mm_s - self.level_mm_s
+
     def _out_of_range(self) -> list[str]:
         problems = []
         if self.dac_bits != 0 and not 2 <= self.dac_bits <= MAX_DAC_BITS:  # noqa: PLR2004 - sign and one bit

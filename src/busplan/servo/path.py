@@ -38,6 +38,8 @@ class CirclePath:
         Set-points, the start at time 0 included, shape (setpoints + 1,) [mm].
     constant_from_us, constant_until_us
         Time at which the speed reaches the feed, and leaves it [us].
+    direction
+        Which way round the set-points go.
     """
 
     radius_mm: float
@@ -47,6 +49,7 @@ class CirclePath:
     y_mm: Floats
     constant_from_us: float
     constant_until_us: float
+    direction: Direction = "ccw"
 
     @property
     def setpoints(self) -> int:
@@ -122,18 +125,20 @@ def circle_path(
         *negative(ramp_periods=ramp_periods),
         *not_one_of("ccw", "cw", direction=direction),
     )
+    setpoints = circle_setpoints(
+        radius_mm, feed_mm_per_min=feed_mm_per_min, period_us=period_us, ramp_periods=ramp_periods
+    )
     period_s, feed_mm_s = period_us / _US_PER_S, feed_mm_per_min / _S_PER_MIN
     length_mm, ramp_s = 2 * math.pi * radius_mm, ramp_periods * period_s
     if length_mm < feed_mm_s * ramp_s:
         raise BusplanError(_too_short(radius_mm, feed_mm_per_min=feed_mm_per_min, ramp_s=ramp_s))
     duration_s = length_mm / feed_mm_s + ramp_s
-    periods = duration_s / period_s
-    if periods > MAX_SETPOINTS:
+    if setpoints > MAX_SETPOINTS:
         raise BusplanError(
-            f"feed_mm_per_min = {feed_mm_per_min}: the circle takes {periods:.3g} periods of {period_us:g} us, "
+            f"feed_mm_per_min = {feed_mm_per_min}: the circle takes {setpoints:.3g} periods of {period_us:g} us, "
             f"more than {MAX_SETPOINTS}; choose a faster feed, a smaller radius or a longer period"
         )
-    time_s = np.arange(math.ceil(periods - _ROUNDING_PERIODS) + 1, dtype=np.float64) * period_s
+    time_s = np.arange(setpoints + 1, dtype=np.float64) * period_s
     way_mm = _trapezoid(time_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s, length_mm=length_mm)
     angle = way_mm / radius_mm
     return CirclePath(
@@ -144,7 +149,31 @@ def circle_path(
         y_mm=radius_mm * np.sin(angle) * (1 if direction == "ccw" else -1),
         constant_from_us=ramp_s * _US_PER_S,
         constant_until_us=(duration_s - ramp_s) * _US_PER_S,
+        direction=direction,
     )
+
+
+def circle_setpoints(radius_mm: float, *, feed_mm_per_min: float, period_us: float, ramp_periods: int = 100) -> int:
+    """Count the set-points of `circle_path` without making them.
+
+    Parameters
+    ----------
+    radius_mm, feed_mm_per_min, period_us, ramp_periods
+        As for `circle_path`, in range.
+
+    Returns
+    -------
+    int
+        Number of periods that the move takes [1].
+
+    Examples
+    --------
+    >>> circle_setpoints(320.0, feed_mm_per_min=2500.0, period_us=4000.0)
+    12164
+    """
+    period_s, feed_mm_s = period_us / _US_PER_S, feed_mm_per_min / _S_PER_MIN
+    duration_s = 2 * math.pi * radius_mm / feed_mm_s + ramp_periods * period_s
+    return math.ceil(duration_s / period_s - _ROUNDING_PERIODS)
 
 
 def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: float) -> Floats:
