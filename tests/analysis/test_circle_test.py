@@ -254,7 +254,7 @@ def test_a_bus_that_does_not_fit_needs_no_path(small: Profile, monkeypatch: pyte
         raise AssertionError("a path was built")
 
     monkeypatch.setattr("busplan.analysis.circle_test.circle_path", refuse)
-    huge = {"cycle.period_us": 1.0, "servo.step_us": 1.0, "circle.radius_mm": 10_000.0}
+    huge: dict[str, object] = {"cycle.period_us": 1.0, "servo.step_us": 1.0, "circle.radius_mm": 10_000.0}
     result = only(override(small, huge))
     assert [one.name for one in result.failures] == ["required_us"]
     assert result.setpoints == result.steps > 1e9
@@ -375,7 +375,7 @@ def test_a_short_arc_at_constant_speed_has_no_circular_deviation(small: Profile)
     assert result.passed
     assert result.constant_speed_deg is not None
     assert 100 < result.constant_speed_deg < 270
-    assert result.circular_deviation_mm is result.centre_offset_mm is result.radius_deviation_mm is None
+    assert (result.circular_deviation_mm, result.centre_offset_mm, result.radius_deviation_mm) == (None, None, None)
     blind = only(override(short, {"tolerance.circular_deviation_mm": 1.0}))
     (failure,) = blind.failures
     assert (failure.name, failure.value, failure.limit) == ("constant_speed_deg", blind.constant_speed_deg, 270)
