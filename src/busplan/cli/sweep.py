@@ -1,18 +1,17 @@
 """`busplan sweep`: its options, and what of them goes together."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
 from busplan.cli.options import ProfileArgument, TimingOption, plot_format, timing_models
-from busplan.cli.sweep_run import SweepFormat, SweepJob, available_processors, run_sweep
-from busplan.cli.vary import parse_axes
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.grid import Grid
 
+SweepFormat = Literal["table", "csv", "jsonl", "npz"]
 _ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".jsonl": "jsonl", ".npz": "npz"}
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "max_axes"
@@ -114,9 +113,13 @@ def sweep_command(
     for option, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{option} {number}: must be 1 or more")
+    # Every command pays for what stands at the top of this module.
+    from busplan.cli.vary import parse_axes
+
     axes = parse_axes(vary or [])
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.grid import checked_grid
+    from busplan.cli.sweep_run import SweepJob, available_processors, run_sweep
     from busplan.profile.shipped import load
 
     loaded = load(profile).profile

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Final, NamedTuple, Protocol
 
 from busplan.cli.interrupt import ctrl_c_noted
 from busplan.cli.output import StoppedError, emit, emit_text, new_file, partial_path, say
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep import Block
     from busplan.analysis.sweep_circle import CircleTask, Figures
     from busplan.cli.npz import NpzColumns
+    from busplan.cli.sweep import SweepFormat
     from busplan.profile.model import Profile
     from busplan.report.sweep.figure import FigureData
     from busplan.report.sweep.top import Tally
     from busplan.timing import TimingModelName
 
-SweepFormat = Literal["table", "csv", "jsonl", "npz"]
 _CIRCLES_AT_ONCE: Final = 4
 """Points that each process tests between two looks at Ctrl-C."""
 
@@ -33,7 +33,7 @@ class SweepJob(NamedTuple):
     grid: "Grid"
     timing_models: "tuple[TimingModelName, ...]"
     columns: tuple[str, ...]
-    format_: SweepFormat
+    format_: "SweepFormat"
     output: Path | None
     top: int
     sort_by: str | None
