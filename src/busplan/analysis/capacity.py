@@ -1,5 +1,6 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import chain
 from math import floor
@@ -326,8 +327,8 @@ def largest_nodes(profile: Profile, *, model: TimingModelName) -> tuple[int, Lim
 
     Required time is c0 + c1 N + c2 N^2: in a chain each packet crosses N hops, and there are N transactions of
     each kind; in a tree the hops stay, and c2 is zero. The root is the answer but for rounding, which the test of
-    its neighbours takes out. An "optimal" gap count in a chain grows with N by the table; there each of the at most
-    16 rows is tested.
+    its neighbours takes out. An "optimal" gap count in a chain grows with N by the table, and the required time with
+    both; there the at most 16 rows are halved until one is left.
 
     Parameters
     ----------
@@ -358,11 +359,11 @@ def largest_nodes(profile: Profile, *, model: TimingModelName) -> tuple[int, Lim
         return fits_in(cycle(profile, model=model, nodes=nodes).required_us, available_us=given_us)
 
     if is_chain and bus.gap_count == "optimal":
-        answer = most
+        answer = bisect_left(range(1, most + 1), x=True, key=lambda nodes: not fits(nodes))
     else:
         answer = min(most, floor(required_by_nodes(profile, model=model).nodes(given_us)) + 1)
-    while answer and not fits(answer):
-        answer -= 1
+        while answer and not fits(answer):
+            answer -= 1
     return answer, structural if answer == most else "time"
 
 

@@ -11,7 +11,7 @@ from busplan.cli.output import PlanFailsError, emit_text, say, write_file
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from busplan.profile.collect import Source
     from busplan.rules.baseline import Recorded
@@ -77,7 +77,10 @@ def check_command(
 
     collection = collect(paths, stdin_name=stdin_filename)
     recorded = _read_baseline(baseline, needed=not update_baseline)
-    report = _check(collection.sources, recorded=None if update_baseline else recorded, with_circle=circle, jobs=jobs)
+    one = partial(
+        _check_source, recorded=None if update_baseline else recorded, with_circle=circle, record=update_baseline
+    )
+    report = _check(collection.sources, one, jobs=jobs)
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if verbose:
@@ -93,10 +96,9 @@ def check_command(
         raise PlanFailsError
 
 
-def _check(sources: "Sequence[Source]", *, recorded: Recordings | None, with_circle: bool, jobs: int) -> "CheckReport":
+def _check(sources: "Sequence[Source]", one: "Callable[[Source], FileResult]", *, jobs: int) -> "CheckReport":
     from busplan.rules.report import CheckReport
 
-    one = partial(_check_source, recorded=recorded, with_circle=with_circle)
     workers = min(jobs, len(sources))
     if workers <= 1:
         return CheckReport(tuple(map(one, sources)))
@@ -112,7 +114,7 @@ def _check(sources: "Sequence[Source]", *, recorded: Recordings | None, with_cir
     return CheckReport(tuple(found[source] for source in sources))
 
 
-def _check_source(source: "Source", *, recorded: Recordings | None, with_circle: bool) -> "FileResult":
+def _check_source(source: "Source", *, recorded: Recordings | None, with_circle: bool, record: bool) -> "FileResult":
     from busplan.errors import PlacedError
     from busplan.profile.toml import decode, read_bytes
     from busplan.rules.gate import FileResult, check_document, unreadable
@@ -128,7 +130,7 @@ def _check_source(source: "Source", *, recorded: Recordings | None, with_circle:
     except PlacedError as error:
         return unreadable(source.name, error, content)
     before: Recorded | None = None if recorded is None else recorded.get(source.name, {})
-    return check_document(document, with_circle=with_circle, baseline=before)
+    return check_document(document, with_circle=with_circle, baseline=before, record=record)
 
 
 def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:

@@ -1,6 +1,7 @@
 """The profiles that come with busplan."""
 
 import os
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ from busplan.errors import BusplanError
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 
 
+@cache
 def shipped_folder() -> Path:
     """Folder of the shipped profiles: inside the installed package, or `profiles/` of a source checkout."""
     package = Path(__file__).resolve().parents[1]
@@ -38,16 +40,14 @@ def locate(argument: str) -> tuple[Path, str]:
     """
     if argument == "-":
         return Path("-"), "<stdin>"
-    names = shipped_names()
-    if argument in names:
-        path = shipped_folder() / f"{argument}.toml"
-        return path, path.name
+    shipped = shipped_folder() / f"{argument}.toml"
+    if shipped.stem == argument and os.path.lexists(shipped):
+        return shipped, shipped.name
     path = Path(argument)
     if not argument or not os.path.lexists(path):
         shown = argument or repr(argument)
-        raise BusplanError(
-            f"{shown}: no such file, and no shipped profile of that name; shipped are {', '.join(names)}"
-        )
+        names = ", ".join(shipped_names())
+        raise BusplanError(f"{shown}: no such file, and no shipped profile of that name; shipped are {names}")
     return path, argument
 
 

@@ -41,8 +41,8 @@ def slice_overrun(subject: Subject) -> Iterator[Problem]:
 
 def other_model_overrun(subject: Subject) -> Iterator[Problem]:
     """The cycle fits under the deciding model alone."""
-    deciding, other = subject.deciding, subject.other
-    if "time" in other.exceeded and "time" not in deciding.exceeded:
+    if "time" not in subject.deciding.exceeded and subject.other_overruns:
+        deciding, other = subject.deciding, subject.other
         cure = _cure(subject, deciding, other)
         yield Problem(
             "cycle.period_us",

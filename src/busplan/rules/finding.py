@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Literal, NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.capacity import CapacityFigures, cycle, figures, fits_in
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.profile.toml import LoadedProfile
+from busplan.timing import TimingModelName
 
 Severity = Literal["error", "warning"]
 
@@ -45,8 +46,19 @@ class Subject:
     @cached_property
     def other(self) -> CapacityFigures:
         """Capacity under the other timing model."""
+        return figures(self.profile, model=self._other_model)
+
+    @property
+    def other_overruns(self) -> bool:
+        """Whether the cycle does not fit under the other timing model, which takes no figures to tell."""
+        now = cycle(self.profile, model=self._other_model, nodes=self.profile.bus.nodes)
+        available_us = self.profile.cycle.slice_ratio * self.profile.cycle.period_us
+        return not fits_in(now.required_us, available_us=available_us)
+
+    @property
+    def _other_model(self) -> TimingModelName:
         (model,) = (model for model in BOTH_MODELS if model != self.profile.bus.timing_model)
-        return figures(self.profile, model=model)
+        return model
 
 
 class Rule(NamedTuple):

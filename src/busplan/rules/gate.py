@@ -25,7 +25,7 @@ class FileResult(NamedTuple):
     findings: tuple[Finding, ...]
     """In the order of their places."""
     figures: dict[str, float]
-    """What a baseline records; empty where the profile could not be read."""
+    """What a baseline records; empty where the profile could not be read, or nobody asked."""
     source: tuple[str, ...] = ()
     """The lines that findings stand on, in their order, for reports that show them."""
     failure: str | None = None
@@ -39,7 +39,9 @@ class FileResult(NamedTuple):
         return "findings" if self.findings else "ok"
 
 
-def check_document(document: Document, *, with_circle: bool = True, baseline: Recorded | None = None) -> FileResult:
+def check_document(
+    document: Document, *, with_circle: bool = True, baseline: Recorded | None = None, record: bool = True
+) -> FileResult:
     """Check one document against all rules.
 
     Parameters
@@ -50,6 +52,8 @@ def check_document(document: Document, *, with_circle: bool = True, baseline: Re
         Whether to run the circle test of profiles that ask for one.
     baseline
         What the profile may not lose; nothing without it.
+    record
+        Whether to give the figures that a baseline records.
 
     Returns
     -------
@@ -72,7 +76,8 @@ def check_document(document: Document, *, with_circle: bool = True, baseline: Re
         lost = regressions(figures_of(subject), baseline)
         found += [_placed(subject, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
-    return _result(document, profile.name, suppress(found, document, ran=ran), figures_of(subject))
+    figures = figures_of(subject) if record else {}
+    return _result(document, profile.name, suppress(found, document, ran=ran), figures)
 
 
 def _bus_findings(subject: Subject) -> Iterator[Finding]:
