@@ -129,6 +129,13 @@ def test_one_broken_file_does_not_stop_the_others(folder: Path) -> None:
         assert ("failure" in one) == (one["status"] == "error")
 
 
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="no file here that root cannot read")
+def test_a_file_that_fails_while_it_is_read_is_a_failure(folder: Path) -> None:
+    run = busplan("check", "/proc/self/mem", "p/fails.toml", cwd=folder)
+    assert (run.returncode, run.stdout[:14]) == (2, "p/fails.toml:1")
+    assert run.stderr.startswith("/proc/self/mem: cannot be read: ")
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read anything")
 def test_an_unreadable_file_is_a_failure(folder: Path) -> None:
     (folder / "p" / "clean.toml").chmod(0)

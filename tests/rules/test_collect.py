@@ -38,6 +38,12 @@ def test_a_folder_means_all_below_it_in_the_order_of_names() -> None:
     assert names(collect(["p/"])) == names(collect(["./p"])) == names(collect(["p"]))
 
 
+def test_the_order_is_that_of_names_whatever_the_disk_says() -> None:
+    expected = [f"p/{(number * 7919) % 997:03}/{(number * 31) % 7}.toml" for number in range(60)]
+    write(*expected)
+    assert names(collect(["p"])) == sorted(expected)
+
+
 def test_hidden_and_foreign_folders_are_left_out_unless_named() -> None:
     write("p/a.toml", "p/.venv/b.toml", "p/node_modules/c.toml", "p/__pycache__/d.toml", "p/.e.toml")
     assert names(collect(["p"])) == ["p/.e.toml", "p/a.toml"]

@@ -150,6 +150,31 @@ def test_limits_at_their_edge_are_held(changed: Changed, check: Check) -> None:
     assert "no change of gap count, slice ratio or period alone is a cure" in nothing.findings[0].message
 
 
+@pytest.mark.parametrize(
+    ("gap_count", "limit", "cure"),
+    [
+        ("63", 0.1, "bus.gap_count = 7"),
+        ('"optimal"', 0.08, "cycle.slice_ratio = 0.5746"),
+        ("63", 0.06, "bus.gap_count = 7, cycle.slice_ratio = 0.7661"),
+        ("63", 0.04, "cycle.period_us = "),
+    ],
+)
+def test_a_full_slice_has_its_cheapest_cure(
+    gap_count: str, limit: float, cure: str, changed: Changed, check: Check
+) -> None:
+    text = changed(('"optimal"', gap_count), more=f"\n[limits]\nmax_utilisation = {limit}\n")
+    (finding,) = [one for one in check(text).findings if one.code == "BP103"]
+    assert finding.message.rpartition("cheapest cure: ")[2].startswith(cure)
+
+
+@pytest.mark.parametrize(("parts", "code"), [(20, "BP002"), (21, "BP001"), (40_000, "BP001")])
+def test_a_key_of_very_many_parts_is_refused_before_it_costs_time(
+    parts: int, code: str, clean: str, check: Check
+) -> None:
+    (finding,) = check(f"{'.'.join('a' * parts)} = 1\n{clean}").findings
+    assert (finding.code, finding.line, finding.column) == (code, 1, 1)
+
+
 @pytest.mark.parametrize("limit", [1, 100, 1_000_000])
 def test_spare_nodes_beyond_any_bus_have_no_cure(limit: int, changed: Changed, check: Check) -> None:
     roomy = (("period_us = 4000", "period_us = 1_000_000"), ("nodes = 2", "nodes = 16"))
