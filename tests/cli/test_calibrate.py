@@ -25,15 +25,11 @@ run()
 """
 KILLS = {
     "half-written": """
-import io, pathlib
-real = pathlib.Path.open
-class Half(io.FileIO):
-    def write(self, data):
-        super().write(bytes(data)[: len(data) // 2])
-        die()
-def opened(self, mode="r", *args, **kwargs):
-    return Half(str(self), "x") if mode == "xb" else real(self, mode, *args, **kwargs)
-pathlib.Path.open = opened
+from busplan.cli import output
+def half(self, data):
+    os.write(self.fileno(), bytes(data)[: len(data) // 2])
+    die()
+output._Raw.write = half
 """,
     "not yet on the disk": "os.fsync = die",
     "not yet renamed": "import pathlib\npathlib.Path.replace = die",
