@@ -52,3 +52,4 @@ class PlacedError(BusplanError):
         more = [f"{name}: and {hidden} more problems"] if hidden else []
         super().__init__(*(f"{name}:{one.line}:{one.column}: {one.message}" for one in problems), *more)
         self.placed = problems
+        self.hidden = hidden

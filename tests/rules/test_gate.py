@@ -237,3 +237,13 @@ def test_without_a_circle_no_numpy_is_loaded() -> None:
         exit_code, *modules = run.stdout.splitlines()[-1].split()
         assert exit_code == "0"
         assert not {"numpy", "numba", "matplotlib", "rich", "multiprocessing"} & set(modules)
+
+
+def test_problems_that_are_not_listed_are_counted() -> None:
+    text = "\n".join(f"unknown_{number} = 1" for number in range(60))
+    result = check_document(decode(text.encode(), name="many.toml"))
+    # Six missing keys and sections come first: 66 problems, 50 listed.
+    assert len(result.findings) == 50
+    told = [one for one in result.findings if "more problems of this file are not listed" in one.message]
+    assert [one.message.rpartition("; ")[2] for one in told] == ["16 more problems of this file are not listed"]
+    assert told == [result.findings[-1]]

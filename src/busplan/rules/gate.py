@@ -95,9 +95,11 @@ def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
 
 
 def _of_file(error: PlacedError) -> Iterator[Finding]:
-    for one in error.placed:
+    last = len(error.placed) - 1
+    for number, one in enumerate(error.placed):
         rule = BY_KIND[one.kind]
-        yield Finding(rule.code, rule.name, rule.severity, one.message, one.key, one.line, one.column)
+        more = f"; {error.hidden} more problems of this file are not listed" if error.hidden and number == last else ""
+        yield Finding(rule.code, rule.name, rule.severity, one.message + more, one.key, one.line, one.column)
 
 
 def _placed(subject: Subject, rule: Rule, problem: Problem) -> Finding:
