@@ -1,0 +1,67 @@
+"""Every limit of a rule at its edge: what just holds has no finding, what just does not has one."""
+
+import re
+
+import pytest
+
+from busplan.ieee1394 import safe_gap_count
+from busplan.profile.shipped import locate
+from busplan.profile.toml import decode
+from busplan.rules.gate import check_document
+
+PLAIN = re.sub(r" *#.*", "", locate("paper-4ms")[0].read_text(encoding="utf-8")).split("[servo]")[0]
+
+
+def codes(*replacements: tuple[str, str], more: str = "") -> set[str]:
+    """Codes found in the plain profile with lines replaced."""
+    text = PLAIN
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    return {one.code for one in check_document(decode((text + more).encode(), name="edge.toml")).findings}
+
+
+@pytest.mark.parametrize("nodes", [1, 2, 16])
+def test_gap_count_is_wasteful_above_the_table_unsafe_below_and_right_at_it(nodes: int) -> None:
+    safe = safe_gap_count(nodes)
+    found = {
+        gap: codes(("gap_count = 63", f"gap_count = {gap}"), ("nodes = 2", f"nodes = {nodes}")) & {"BP109", "BP110"}
+        for gap in range(64)
+    }
+    assert found == {gap: {"BP109"} if gap < safe else {"BP110"} if gap > safe else set() for gap in range(64)}
+
+
+@pytest.mark.parametrize(("nodes", "expected"), [(62, set()), (63, {"BP106"})])
+def test_nodes_of_one_bus(nodes: int, expected: set[str]) -> None:
+    assert codes(("nodes = 2", f"nodes = {nodes}\nmax_hops = 4")) & {"BP106"} == expected
+
+
+@pytest.mark.parametrize(("hops", "expected"), [(16, set()), (17, {"BP107"})])
+def test_hops_of_one_bus(hops: int, expected: set[str]) -> None:
+    assert codes(("nodes = 2", f"nodes = 2\nmax_hops = {hops}")) & {"BP107"} == expected
+
+
+@pytest.mark.parametrize(("size", "expected"), [(512, set()), (513, {"BP108", "BP111"}), (516, {"BP108"})])
+def test_payload_of_a_speed_and_of_quadlets(size: int, expected: set[str]) -> None:
+    changes = (("S400", "S100"), ("write_bytes = 12", f"write_bytes = {size}"))
+    assert codes(*changes) & {"BP108", "BP111"} == expected
+
+
+def test_limits_are_broken_beyond_them_and_not_at_them() -> None:
+    # 16 nodes at most for two there are: 14 nodes and 56 axes to spare, by the paper's timing.
+    assert codes(more="[limits]\nmin_spare_nodes = 14\nmin_spare_axes = 56\n") & {"BP104", "BP105"} == set()
+    assert codes(more="[limits]\nmin_spare_nodes = 15\nmin_spare_axes = 57\n") & {"BP104", "BP105"} == {
+        "BP104",
+        "BP105",
+    }
+    # 205.917 us of 2000 us: 10.2959 %.
+    assert "BP103" not in codes(more="[limits]\nmax_utilisation = 0.10296\n")
+    assert "BP103" in codes(more="[limits]\nmax_utilisation = 0.10295\n")
+
+
+def test_the_slice_is_overrun_below_the_smallest_period() -> None:
+    # (2 x 2 x 51.379 + 0.4) / 0.5 us by the paper's timing, 640.798 us by the standard's.
+    assert codes(("period_us = 4000", "period_us = 411.84")) & {"BP101", "BP102"} == {"BP102"}
+    assert codes(("period_us = 4000", "period_us = 411.83")) & {"BP101", "BP102"} == {"BP101"}
+    assert codes(("period_us = 4000", "period_us = 640.80")) & {"BP101", "BP102"} == set()
+    assert codes(("period_us = 4000", "period_us = 640.79")) & {"BP101", "BP102"} == {"BP102"}
