@@ -13,6 +13,9 @@ G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Cont
 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
 
+from types import MappingProxyType
+from typing import Final
+
 from busplan.ieee1394 import (
     ARBITRATION_GAP_TICKS,
     ARBITRATION_HOLD_US,
@@ -21,6 +24,8 @@ from busplan.ieee1394 import (
     DATA_END_US,
     DATA_RATE_MBIT_S,
     EQ15_CONSTANT_US,
+    GAPS_TICKS,
+    GAPS_TICKS_PER_COUNT,
     PHY_DELAY_TICKS,
     REFERENCE_CABLE_M,
     RESET_GAP_TICKS,
@@ -28,10 +33,46 @@ from busplan.ieee1394 import (
     SUBACTION_GAP_TICKS,
     SUBACTION_GAP_TICKS_PER_COUNT,
 )
+from busplan.sourced import published
+
+SYMBOLS: Final = MappingProxyType(
+    {
+        "period_us": "T_s",
+        "slice_ratio": "alpha",
+        "nodes": "N",
+        "available_us": "alpha T_s",
+        "reads_us": "T_r",
+        "writes_us": "T_w",
+        "nonperiodic_us": "T_npd",
+        "sync_us": "CTS",
+        "request_us": "T_req",
+        "response_us": "T_resp",
+        "request_acknowledge_us": "T_ack1",
+        "response_acknowledge_us": "T_ack2",
+        "execution_us": "T_exec",
+        "cable_length_m": "L",
+        "hops": "H",
+        "gap_count": "g",
+        "data_rate_mbit_s": "R",
+        "gap_clock_mbit_s": "C",
+        "packet_bytes": "B",
+        "payload_bytes": "P",
+        "arbitration_us": "ArbP",
+        "data_us": "DTP",
+        "acknowledge_phase_us": "AckP",
+        "acknowledge_us": "T_ack",
+        "latency_us": "T_lant",
+        "gaps_us": "T_sum",
+        **{f"t{number}_us": f"T{number}" for number in range(1, 6)},
+    }
+)
+"""What stands for a quantity in the equations, by its name here. The paper's own, but for what it writes out or calls
+N and Bandwidth alike: hops H, gap count g, rate R, clock C, packet B, payload P, cable L."""
 
 
+@published(1, symbol="T_cs", section="II")
 def time_slice_us(period_us: float, *, slice_ratio: float, nodes: float) -> float:
-    """Communication time slice that the cycle gives each node, equation (1).
+    """Communication time slice that the cycle gives each node.
 
     Parameters
     ----------
@@ -52,10 +93,6 @@ def time_slice_us(period_us: float, *, slice_ratio: float, nodes: float) -> floa
     ZeroDivisionError
         `nodes` is zero.
 
-    References
-    ----------
-    Paper, equation (1).
-
     Examples
     --------
     >>> time_slice_us(4000.0, slice_ratio=0.5, nodes=2)
@@ -64,10 +101,11 @@ def time_slice_us(period_us: float, *, slice_ratio: float, nodes: float) -> floa
     return slice_ratio * period_us / nodes
 
 
+@published(2, symbol="T_cs", section="III-C")
 def required_time_slice_us(
     reads_us: float, *, writes_us: float, nonperiodic_us: float, sync_us: float, nodes: float
 ) -> float:
-    """Communication time slice that each node needs, equation (2).
+    """Communication time slice that each node needs.
 
     Parameters
     ----------
@@ -92,10 +130,6 @@ def required_time_slice_us(
     ZeroDivisionError
         `nodes` is zero.
 
-    References
-    ----------
-    Paper, equation (2).
-
     Examples
     --------
     >>> required_time_slice_us(120.0, writes_us=130.0, nonperiodic_us=49.5, sync_us=0.5, nodes=2)
@@ -104,6 +138,7 @@ def required_time_slice_us(
     return (reads_us + writes_us + nonperiodic_us + sync_us) / nodes
 
 
+@published(3, symbol="T_lant", section="III-E")
 def transaction_latency_us(
     request_us: float,
     *,
@@ -112,7 +147,7 @@ def transaction_latency_us(
     response_us: float,
     response_acknowledge_us: float,
 ) -> float:
-    """Latency of one asynchronous transaction from its five parts, equation (3).
+    """Latency of one asynchronous transaction from its five parts.
 
     Parameters
     ----------
@@ -132,10 +167,6 @@ def transaction_latency_us(
     float
         T_lant = T_req + T_ack1 + T_exec + T_resp + T_ack2 [us]; the broadcast shape of the arguments.
 
-    References
-    ----------
-    Paper, equation (3).
-
     Examples
     --------
     >>> transaction_latency_us(
@@ -146,8 +177,16 @@ def transaction_latency_us(
     return request_us + request_acknowledge_us + execution_us + response_us + response_acknowledge_us
 
 
+@published(
+    4,
+    5,
+    6,
+    symbol="hop",
+    section="III-E",
+    part="their bracket, for a cable of 4.5 m; in proportion to the length for others",
+)
 def hop_delay_us(cable_length_m: float, *, gap_clock_mbit_s: float) -> float:
-    """Delay of one hop, cable and PHY: the bracket of equations (4)-(6).
+    """Delay of one hop, cable and PHY.
 
     Parameters
     ----------
@@ -159,16 +198,12 @@ def hop_delay_us(cable_length_m: float, *, gap_clock_mbit_s: float) -> float:
     Returns
     -------
     float
-        0.023 cable / 4.5 + 14 / clock [us]; the broadcast shape of the arguments.
+        hop = 0.023 L / 4.5 + 14 / C [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `gap_clock_mbit_s` is zero.
-
-    References
-    ----------
-    Paper, equations (4)-(6), which hold for cables of 4.5 m; in proportion to the length for others.
 
     Examples
     --------
@@ -178,10 +213,11 @@ def hop_delay_us(cable_length_m: float, *, gap_clock_mbit_s: float) -> float:
     return CABLE_DELAY_US * cable_length_m / REFERENCE_CABLE_M + PHY_DELAY_TICKS / gap_clock_mbit_s
 
 
+@published(4, symbol="ArbP", section="III-E")
 def arbitration_phase_us(
     hops: float, *, gap_count: float, gap_clock_mbit_s: float, cable_length_m: float = REFERENCE_CABLE_M
 ) -> float:
-    """Arbitration phase of a packet, equation (4).
+    """Arbitration phase of a packet.
 
     Parameters
     ----------
@@ -197,16 +233,12 @@ def arbitration_phase_us(
     Returns
     -------
     float
-        ArbP_time = hop N + 4 g / clock + 1.63 [us]; the broadcast shape of the arguments.
+        ArbP = (0.023 L / 4.5 + 14 / C) H + 4 g / C + 1.63 [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `gap_clock_mbit_s` is zero.
-
-    References
-    ----------
-    Paper, equation (4).
 
     Examples
     --------
@@ -217,6 +249,7 @@ def arbitration_phase_us(
     return hop_us * hops + ARBITRATION_GAP_TICKS * gap_count / gap_clock_mbit_s + ARBITRATION_HOLD_US
 
 
+@published(5, symbol="DTP", section="III-E")
 def data_phase_us(
     hops: float,
     *,
@@ -225,7 +258,7 @@ def data_phase_us(
     gap_clock_mbit_s: float,
     cable_length_m: float = REFERENCE_CABLE_M,
 ) -> float:
-    """Data-transfer phase of a packet, equation (5).
+    """Data-transfer phase of a packet.
 
     Parameters
     ----------
@@ -243,16 +276,12 @@ def data_phase_us(
     Returns
     -------
     float
-        DTP_time = hop N + 8 DataSize / rate [us]; the broadcast shape of the arguments.
+        DTP = (0.023 L / 4.5 + 14 / C) H + 8 B / R [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         A rate is zero.
-
-    References
-    ----------
-    Paper, equation (5).
 
     Examples
     --------
@@ -263,8 +292,9 @@ def data_phase_us(
     return hop_us * hops + BITS_PER_BYTE * packet_bytes / data_rate_mbit_s
 
 
+@published(6, symbol="AckP", section="III-E")
 def acknowledge_phase_us(hops: float, *, gap_clock_mbit_s: float, cable_length_m: float = REFERENCE_CABLE_M) -> float:
-    """Acknowledge phase of a packet, equation (6).
+    """Acknowledge phase of a packet.
 
     Parameters
     ----------
@@ -278,16 +308,12 @@ def acknowledge_phase_us(hops: float, *, gap_clock_mbit_s: float, cable_length_m
     Returns
     -------
     float
-        AckP_time = hop N + 0.25 [us]; the broadcast shape of the arguments.
+        AckP = (0.023 L / 4.5 + 14 / C) H + 0.25 [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `gap_clock_mbit_s` is zero.
-
-    References
-    ----------
-    Paper, equation (6).
 
     Examples
     --------
@@ -297,8 +323,9 @@ def acknowledge_phase_us(hops: float, *, gap_clock_mbit_s: float, cable_length_m
     return hop_delay_us(cable_length_m, gap_clock_mbit_s=gap_clock_mbit_s) * hops + DATA_END_US
 
 
+@published(7, symbol="T_req", section="III-E")
 def request_us(arbitration_us: float, *, data_us: float) -> float:
-    """Request time of a transaction, equation (7).
+    """Request time of a transaction.
 
     Parameters
     ----------
@@ -310,11 +337,7 @@ def request_us(arbitration_us: float, *, data_us: float) -> float:
     Returns
     -------
     float
-        T_req = ArbP_time + DTP_time [us]; the broadcast shape of the arguments.
-
-    References
-    ----------
-    Paper, equation (7).
+        T_req = ArbP + DTP [us]; the broadcast shape of the arguments.
 
     Examples
     --------
@@ -324,8 +347,9 @@ def request_us(arbitration_us: float, *, data_us: float) -> float:
     return arbitration_us + data_us
 
 
+@published(8, symbol="T_resp", section="III-E")
 def response_us(arbitration_us: float, *, data_us: float) -> float:
-    """Response time of a transaction, equation (8).
+    """Response time of a transaction.
 
     Parameters
     ----------
@@ -337,11 +361,7 @@ def response_us(arbitration_us: float, *, data_us: float) -> float:
     Returns
     -------
     float
-        T_resp = ArbP_time + DTP_time [us]; the broadcast shape of the arguments.
-
-    References
-    ----------
-    Paper, equation (8).
+        T_resp = ArbP + DTP [us]; the broadcast shape of the arguments.
 
     Examples
     --------
@@ -351,8 +371,9 @@ def response_us(arbitration_us: float, *, data_us: float) -> float:
     return arbitration_us + data_us
 
 
+@published(9, symbol="T_ack1 = T_ack2", section="III-E")
 def acknowledge_us(acknowledge_phase_us: float) -> float:
-    """Acknowledge time of either half of a transaction, equation (9).
+    """Acknowledge time of either half of a transaction.
 
     Parameters
     ----------
@@ -362,11 +383,7 @@ def acknowledge_us(acknowledge_phase_us: float) -> float:
     Returns
     -------
     float
-        T_ack1 = T_ack2 = AckP_time [us]; the shape of the argument.
-
-    References
-    ----------
-    Paper, equation (9).
+        T_ack1 = T_ack2 = AckP [us]; the shape of the argument.
 
     Examples
     --------
@@ -376,8 +393,9 @@ def acknowledge_us(acknowledge_phase_us: float) -> float:
     return acknowledge_phase_us
 
 
+@published(10, symbol="T_sub", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
 def subaction_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
-    """Subaction gap, the first part of equation (10).
+    """Subaction gap.
 
     Parameters
     ----------
@@ -389,16 +407,12 @@ def subaction_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
     Returns
     -------
     float
-        (29 + 16 g) / clock [us]; the broadcast shape of the arguments.
+        T_sub = (29 + 16 g) / C [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `gap_clock_mbit_s` is zero.
-
-    References
-    ----------
-    IEEE 1394; derived by taking (82 + 48 g) of equation (10) apart.
 
     Examples
     --------
@@ -408,8 +422,9 @@ def subaction_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
     return (SUBACTION_GAP_TICKS + SUBACTION_GAP_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
 
 
+@published(10, symbol="T_reset", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
 def arbitration_reset_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
-    """Arbitration reset gap, the second part of equation (10).
+    """Arbitration reset gap.
 
     Parameters
     ----------
@@ -421,16 +436,12 @@ def arbitration_reset_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> fl
     Returns
     -------
     float
-        (53 + 32 g) / clock [us]; the broadcast shape of the arguments.
+        T_reset = (53 + 32 g) / C [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `gap_clock_mbit_s` is zero.
-
-    References
-    ----------
-    IEEE 1394; derived by taking (82 + 48 g) of equation (10) apart.
 
     Examples
     --------
@@ -440,8 +451,9 @@ def arbitration_reset_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> fl
     return (RESET_GAP_TICKS + RESET_GAP_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
 
 
+@published(10, symbol="T_sum", section="III-E")
 def gaps_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
-    """Subaction gap and arbitration reset gap together, equation (10).
+    """Subaction gap and arbitration reset gap together.
 
     Parameters
     ----------
@@ -453,29 +465,24 @@ def gaps_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
     Returns
     -------
     float
-        T_sum = (82 + 48 g) / clock [us]; the broadcast shape of the arguments.
+        T_sum = (82 + 48 g) / C [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `gap_clock_mbit_s` is zero.
 
-    References
-    ----------
-    Paper, equation (10).
-
     Examples
     --------
     >>> round(gaps_us(63, gap_clock_mbit_s=393.216), 2), round(gaps_us(63, gap_clock_mbit_s=98.304), 2)
     (7.9, 31.6)
     """
-    constant = SUBACTION_GAP_TICKS + RESET_GAP_TICKS
-    per_count = SUBACTION_GAP_TICKS_PER_COUNT + RESET_GAP_TICKS_PER_COUNT
-    return (constant + per_count * gap_count) / gap_clock_mbit_s
+    return (GAPS_TICKS + GAPS_TICKS_PER_COUNT * gap_count) / gap_clock_mbit_s
 
 
+@published(11, symbol="N", section="III-E")
 def published_nodes(available_us: float, *, sync_us: float, latency_us: float, gaps_us: float) -> float:
-    """Number of nodes as the paper publishes it, equation (11).
+    """Number of nodes as the paper publishes it.
 
     T_lant and CTS hold N themselves, so this is exact only where they were taken at the answer. It is reported
     as published; the capacity itself solves for N.
@@ -494,16 +501,12 @@ def published_nodes(available_us: float, *, sync_us: float, latency_us: float, g
     Returns
     -------
     float
-        N = (alpha T_s - CTS) / (2 (T_lant + T_sum)), not rounded [1]; the broadcast shape of the arguments.
+        N = (alpha T_s - CTS) / (2 (T_lant + T_sum)) [1], not rounded; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
         `latency_us` and `gaps_us` add up to zero.
-
-    References
-    ----------
-    Paper, equation (11).
 
     Examples
     --------
@@ -513,8 +516,9 @@ def published_nodes(available_us: float, *, sync_us: float, latency_us: float, g
     return (available_us - sync_us) / (2 * (latency_us + gaps_us))
 
 
+@published(12, symbol="T_lant", section="IV-A")
 def interval_latency_us(t1_us: float, *, t2_us: float, t3_us: float, t4_us: float, t5_us: float) -> float:
-    """Latency of one transaction from the five intervals of the bench, equation (12).
+    """Latency of one transaction from the five intervals of the bench.
 
     Parameters
     ----------
@@ -530,10 +534,6 @@ def interval_latency_us(t1_us: float, *, t2_us: float, t3_us: float, t4_us: floa
     float
         T_lant = T1 + T2 + T3 + T4 + T5 [us]; the broadcast shape of the arguments.
 
-    References
-    ----------
-    Paper, equation (12), Fig. 7.
-
     Examples
     --------
     >>> interval_latency_us(2.0, t2_us=1.0, t3_us=36.5, t4_us=2.0, t5_us=1.0)
@@ -542,8 +542,9 @@ def interval_latency_us(t1_us: float, *, t2_us: float, t3_us: float, t4_us: floa
     return t1_us + t2_us + t3_us + t4_us + t5_us
 
 
+@published(13, symbol="T1 + T2", section="IV-A")
 def request_and_acknowledge_us(request_us: float, *, acknowledge_us: float) -> float:
-    """First half of a transaction, T1 + T2 of the bench, equation (13).
+    """First half of a transaction, T1 + T2 of the bench.
 
     Parameters
     ----------
@@ -555,11 +556,7 @@ def request_and_acknowledge_us(request_us: float, *, acknowledge_us: float) -> f
     Returns
     -------
     float
-        T1 + T2 = T_req + T_ack1 [us]; the broadcast shape of the arguments.
-
-    References
-    ----------
-    Paper, equation (13).
+        T1 + T2 = T_req + T_ack [us]; the broadcast shape of the arguments.
 
     Examples
     --------
@@ -569,8 +566,9 @@ def request_and_acknowledge_us(request_us: float, *, acknowledge_us: float) -> f
     return request_us + acknowledge_us
 
 
+@published(14, symbol="T4 + T5", section="IV-A")
 def response_and_acknowledge_us(response_us: float, *, acknowledge_us: float) -> float:
-    """Second half of a transaction, T4 + T5 of the bench, equation (14).
+    """Second half of a transaction, T4 + T5 of the bench.
 
     Parameters
     ----------
@@ -582,11 +580,7 @@ def response_and_acknowledge_us(response_us: float, *, acknowledge_us: float) ->
     Returns
     -------
     float
-        T4 + T5 = T_resp + T_ack2 [us]; the broadcast shape of the arguments.
-
-    References
-    ----------
-    Paper, equation (14).
+        T4 + T5 = T_resp + T_ack [us]; the broadcast shape of the arguments.
 
     Examples
     --------
@@ -596,8 +590,9 @@ def response_and_acknowledge_us(response_us: float, *, acknowledge_us: float) ->
     return response_us + acknowledge_us
 
 
+@published(15, symbol="T1 + T2", section="IV-A")
 def published_request_and_acknowledge_us(payload_bytes: float) -> float:
-    """First half of a transaction as Table I's theory column has it, equation (15).
+    """First half of a transaction as Table I's theory column has it.
 
     The rounded form of equation (13) at one hop, gap count 63 and S400. The terms of equations (4)-(6) add up
     to 6.4 ns less than its constant.
@@ -610,11 +605,7 @@ def published_request_and_acknowledge_us(payload_bytes: float) -> float:
     Returns
     -------
     float
-        3.11 + 8 payload / 393.216 [us]; the shape of the argument.
-
-    References
-    ----------
-    Paper, equation (15).
+        T1 + T2 = 3.11 + 8 P / 393.216 [us]; the shape of the argument.
 
     Examples
     --------

@@ -5,6 +5,7 @@ G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Cont
 IEEE-1394 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
@@ -160,6 +161,20 @@ RESET_GAP_TICKS_PER_COUNT: Final = Sourced(
     source="eq (10) taken apart",
     meaning="growth of the arbitration reset gap with the gap count",
 )
+GAPS_TICKS: Final = Sourced(
+    SUBACTION_GAP_TICKS + RESET_GAP_TICKS,
+    unit="gap clock ticks",
+    grade="published",
+    source="eq (10)",
+    meaning="constant part of both gaps together",
+)
+GAPS_TICKS_PER_COUNT: Final = Sourced(
+    SUBACTION_GAP_TICKS_PER_COUNT + RESET_GAP_TICKS_PER_COUNT,
+    unit="gap clock ticks per gap count",
+    grade="published",
+    source="eq (10)",
+    meaning="growth of both gaps together with the gap count",
+)
 BITS_PER_BYTE: Final = 8
 EQ15_CONSTANT_US: Final = Sourced(
     3.11,
@@ -167,6 +182,37 @@ EQ15_CONSTANT_US: Final = Sourced(
     grade="published",
     source="eq (15)",
     meaning="eqs (4)-(6) at one hop, gap count 63 and S400, each rounded to two decimals and added",
+)
+
+# --- measured and set on the paper's bench: what a profile has that does not say otherwise ------------------
+
+PING_US: Final = Sourced(
+    0.3,
+    unit="us",
+    grade="measured",
+    source="paper, section IV-A",
+    meaning="latency of a ping to one node",
+)
+PING_PER_NODE_US: Final = Sourced(
+    0.1,
+    unit="us",
+    grade="measured",
+    source="paper, section IV-A",
+    meaning="what each further node adds to a ping",
+)
+SLICE_RATIO: Final = Sourced(
+    0.5,
+    unit="1",
+    grade="published",
+    source="paper, section III-E, eq (11)",
+    meaning="share of the period that is for communication",
+)
+PACKET_OVERHEAD_BYTES: Final = Sourced(
+    20,
+    unit="bytes",
+    grade="published",
+    source="paper, section IV-A",
+    meaning="overhead of each packet in the paper's model",
 )
 
 # --- gap count ---------------------------------------------------------------------------------------------
@@ -260,3 +306,15 @@ def padded_bytes(payload_bytes: int) -> int:
     (12, 16)
     """
     return -(-payload_bytes // QUADLET_BYTES) * QUADLET_BYTES
+
+
+def _constants() -> Iterator[tuple[str, Sourced]]:
+    for name, value in globals().items():
+        if isinstance(value, Sourced):
+            yield name, value
+        elif isinstance(value, MappingProxyType):
+            yield from ((f"{name}[{key}]", one) for key, one in value.items())
+
+
+CONSTANTS: Final = MappingProxyType(dict(_constants()))
+"""Every constant with a source, by its name here."""

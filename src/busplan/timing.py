@@ -137,7 +137,7 @@ def _standard_packets(kind: TransactionKind, payload_bytes: int, _overhead_bytes
 TIMING_MODELS: Final[Mapping[TimingModelName, TimingModel]] = MappingProxyType(
     {
         "paper": TimingModel("paper", lambda data_rate_mbit_s: data_rate_mbit_s, _paper_packets),
-        "standard": TimingModel("standard", lambda _data_rate_mbit_s: float(BASE_RATE_MBIT_S), _standard_packets),
+        "standard": TimingModel("standard", lambda _data_rate_mbit_s: BASE_RATE_MBIT_S, _standard_packets),
     }
 )
 """The timing models by name, in the order reports show them."""

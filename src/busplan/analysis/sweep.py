@@ -26,6 +26,7 @@ from busplan.analysis.grid import Array, Chunk, Grid
 from busplan.ieee1394 import MAX_HOPS
 from busplan.profile.bus import TableExecution
 from busplan.profile.model import Profile
+from busplan.profile.sections import with_unchecked
 from busplan.timing import TimingModelName
 
 CHUNK_POINTS: Final = 1 << 14
@@ -148,16 +149,11 @@ def _joined(parts: list[Column], *, axis: int) -> Column:
 def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
     """A profile whose keys hold arrays: never checked, for functions of operators only."""
     for key, own in values.items():
-        profile = _with(profile, key, own.item() if own.size == 1 else own.astype(float))
+        profile = with_unchecked(profile, key, own.item() if own.size == 1 else own.astype(float))
     execution = profile.node.execution
     if isinstance(execution, TableExecution):
-        profile = _with(profile, "node.execution", _TableOfArrays(execution))
+        profile = with_unchecked(profile, "node.execution", _TableOfArrays(execution))
     return profile
-
-
-def _with(section: Any, key: str, value: object) -> Any:
-    name, _, rest = key.partition(".")
-    return section.model_copy(update={name: _with(getattr(section, name), rest, value) if rest else value})
 
 
 class _TableOfArrays:

@@ -13,6 +13,7 @@ COMMANDS: Final = (
     "latency",
     "capacity",
     "circle-test",
+    "explain",
     "calibrate",
     "plan",
     "timeline",

@@ -14,7 +14,11 @@ from busplan.ieee1394 import (
     DATA_RATE_MBIT_S,
     MAX_GAP_COUNT,
     MAX_PAYLOAD_BYTES,
+    PACKET_OVERHEAD_BYTES,
+    PING_PER_NODE_US,
+    PING_US,
     REFERENCE_CABLE_M,
+    SLICE_RATIO,
     Speed,
     gap_count_by_hops,
 )
@@ -120,9 +124,11 @@ class Ieee1394Bus(Section):
 class Sync(Section):
     """Section [cycle.sync]: the synchronous packet that opens a cycle, CTS of equation (2)."""
 
-    ping_us: TimeUs = Field(default=0.3, description="Latency of a ping to one node, measured [us]", examples=[0.3])
+    ping_us: TimeUs = Field(
+        default=float(PING_US), description="Latency of a ping to one node, measured [us]", examples=[0.3]
+    )
     ping_per_node_us: TimeUs = Field(
-        default=0.1, description="What each further node adds, measured [us]", examples=[0.1]
+        default=float(PING_PER_NODE_US), description="What each further node adds, measured [us]", examples=[0.1]
     )
 
     def sync_us(self, nodes: int) -> float:
@@ -137,7 +143,9 @@ class Cycle(Section):
         description="Communication period T_s [us]", examples=[4000]
     )
     slice_ratio: Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)] = Field(
-        default=0.5, description="Share alpha of the period that is for communication, 0..1", examples=[0.5]
+        default=float(SLICE_RATIO),
+        description="Share alpha of the period that is for communication, 0..1",
+        examples=[0.5],
     )
     nonperiodic_us: TimeUs = Field(
         default=0.0, description="Time kept for non-periodic data in each cycle T_npd [us]", examples=[0]
@@ -151,7 +159,7 @@ class Payload(Section):
     read_bytes: Count = Field(description="Payload of the read transaction [bytes]", examples=[12])
     write_bytes: Count = Field(description="Payload of the write transaction [bytes]", examples=[12])
     overhead_bytes: Bytes = Field(
-        default=20,
+        default=int(PACKET_OVERHEAD_BYTES),
         description="Overhead of a packet in the paper model; the standard model uses real sizes [bytes]",
         examples=[20],
     )

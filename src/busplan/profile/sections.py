@@ -1,6 +1,6 @@
 """What all sections of a profile share: strictness, ranges, and errors in our own words."""
 
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -35,3 +35,23 @@ class Section(BaseModel):
     """What all sections of a profile share."""
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
+
+
+_Section = TypeVar("_Section", bound=Section)
+
+
+def with_unchecked(section: _Section, key: str, value: Any) -> _Section:
+    """Put anything in the place of a key: an array, or a number that remembers. Nothing is checked.
+
+    Parameters
+    ----------
+    section
+        The profile, or a section of it.
+    key
+        Dotted key below it.
+    value
+        What functions of operators only can compute with.
+    """
+    name, _, rest = key.partition(".")
+    new = with_unchecked(getattr(section, name), rest, value) if rest else value
+    return section.model_copy(update={name: new})

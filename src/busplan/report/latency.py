@@ -4,28 +4,29 @@ from collections.abc import Sequence
 from typing import Final
 
 from busplan.analysis.latency import LatencyResult, Transaction
+from busplan.analysis.quantities import FIGURES
 from busplan.ieee1394 import MAX_HOPS
 from busplan.profile.model import Profile
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
 from busplan.report.words import warnings
 
 _LATENCY_ROWS: Final = (
-    GridRow("request packet, bytes", "", "", "request_bytes", count),
-    GridRow("response packet, bytes", "", "", "response_bytes", count),
-    GridRow("arbitration, each", "(4)", "", "arbitration_us", us),
-    GridRow("data, request", "(5)", "", "request_data_us", us),
-    GridRow("data, response", "(5)", "", "response_data_us", us),
-    GridRow("acknowledge, each", "(6) (9)", "", "acknowledge_us", us),
-    GridRow("request T_req", "(7)", "", "request_us", us),
-    GridRow("response T_resp", "(8)", "", "response_us", us),
-    GridRow("T1+T2", "(13)", "", "request_and_acknowledge_us", us),
-    GridRow("execution T_exec = T3", "measured", "", "execution_us", us),
-    GridRow("T4+T5", "(14)", "", "response_and_acknowledge_us", us),
-    GridRow("latency T_lant", "(3) (12)", "", "latency_us", us),
-    GridRow("subaction gap", "(10)", "", "subaction_gap_us", us),
-    GridRow("arbitration reset gap", "(10)", "", "arbitration_reset_gap_us", us),
-    GridRow("gaps T_sum", "(10)", "", "gaps_us", us),
-    GridRow("T_lant + T_sum", "(3) (10)", "", "latency_with_gaps_us", us),
+    GridRow("request packet, bytes", "", "request_bytes", count),
+    GridRow("response packet, bytes", "", "response_bytes", count),
+    GridRow("arbitration, each", "", "arbitration_us", us),
+    GridRow("data, request", "", "request_data_us", us),
+    GridRow("data, response", "", "response_data_us", us),
+    GridRow("acknowledge, each", "", "acknowledge_us", us),
+    GridRow("request T_req", "", "request_us", us),
+    GridRow("response T_resp", "", "response_us", us),
+    GridRow("T1+T2", "", "request_and_acknowledge_us", us),
+    GridRow("execution T_exec = T3", "", "execution_us", us),
+    GridRow("T4+T5", "", "response_and_acknowledge_us", us),
+    GridRow("latency T_lant", "", "latency_us", us),
+    GridRow("subaction gap", "", "subaction_gap_us", us),
+    GridRow("arbitration reset gap", "", "arbitration_reset_gap_us", us),
+    GridRow("gaps T_sum", "", "gaps_us", us),
+    GridRow("T_lant + T_sum", "", "latency_with_gaps_us", us),
 )
 
 
@@ -57,4 +58,4 @@ def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
 
 def _grid(transactions: Sequence[Transaction]) -> list[Line]:
     columns = [(f"{one.transaction} {one.payload_bytes} B\n{one.timing_model}", one.phases) for one in transactions]
-    return grid("phase, us", columns, _LATENCY_ROWS)
+    return grid("phase, us", columns, _LATENCY_ROWS, figures=FIGURES["latency"])

@@ -3,8 +3,10 @@
 The layout is ours because a piped report must not pay for loading a renderer; colours are left to who prints.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
+
+from busplan.analysis.quantities import Figure
 
 Tone = Literal["good", "bad", "warning", "heading", "plain", "table"]
 """How a line is meant; "table" and "heading" lines keep their columns, the others may be wrapped."""
@@ -21,10 +23,9 @@ BLANK = Line("")
 
 
 class GridRow(NamedTuple):
-    """One row of figures: how it is called, where it comes from, and how its values are written."""
+    """One row of figures: how it is called, and how its values are written. Where they come from, the registry says."""
 
     label: str
-    equation: str
     unit: str
     key: str
     write: Callable[[Any], str]
@@ -100,7 +101,13 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) 
     ]
 
 
-def grid(first_heading: str, columns: Sequence[tuple[str, object]], rows: Sequence[GridRow]) -> list[Line]:
+def grid(
+    first_heading: str,
+    columns: Sequence[tuple[str, object]],
+    rows: Sequence[GridRow],
+    *,
+    figures: Mapping[str, Figure],
+) -> list[Line]:
     """Lay out figures: rows down, one column of values for each object, units where a row has one."""
     has_units = any(row.unit for row in rows)
     words = [first_heading, "eq", "unit"] if has_units else [first_heading, "eq"]
@@ -108,7 +115,7 @@ def grid(first_heading: str, columns: Sequence[tuple[str, object]], rows: Sequen
         [*words, *(heading for heading, _ in columns)],
         (
             [
-                *(row.label, row.equation, row.unit)[: len(words)],
+                *(row.label, figures[row.key].reference, row.unit)[: len(words)],
                 *(row.write(getattr(owner, row.key)) for _, owner in columns),
             ]
             for row in rows

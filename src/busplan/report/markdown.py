@@ -4,22 +4,25 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-_SPECIAL: Final = re.compile(r"([\\`*_{}\[\]()<>#+\-.!|~&@:])")
+_SPECIAL: Final = re.compile(r"([\\`*_{}\[\]()<>#+\-.!~&@:])")
+
+BAR: Final = r"\|"
+"""A bar inside a cell, also inside code: the table is taken apart before its cells are read."""
 
 
 def escaped(text: str) -> str:
-    r"""Write words so that none of them is markup, in a line or a cell of a table.
+    r"""Write words so that none of them is markup.
 
     Examples
     --------
-    >>> escaped("a|b *c*")
-    'a\\|b \\*c\\*'
+    >>> escaped("a *b*")
+    'a \\*b\\*'
     """
     return _SPECIAL.sub(r"\\\1", " ".join(text.split()))
 
 
 def code(text: str) -> str:
-    r"""Write text as code, as it is: nothing in it is markup, no mention and no link; a cell of a table may hold it.
+    """Write text as code, as it is: nothing in it is markup, no mention and no link.
 
     Parameters
     ----------
@@ -28,26 +31,26 @@ def code(text: str) -> str:
 
     Examples
     --------
-    >>> code("bus.nodes"), code("a ` b"), code("x | y")
-    ('`bus.nodes`', '`` a ` b ``', '`x \\| y`')
+    >>> code("bus.nodes"), code("a ` b")
+    ('`bus.nodes`', '`` a ` b ``')
     """
     line = " ".join(text.split())
     longest = max(map(len, re.findall("`+", line)), default=0)
     fence = "`" * (longest + 1)
-    # A backtick at an edge would join the fence; a backslash before a bar is part of the table's own language.
+    # A backtick at an edge would join the fence.
     space = " " if longest else ""
-    return f"{fence}{space}{line}{space}{fence}".replace("|", r"\|") if line else "` `"
+    return f"{fence}{space}{line}{space}{fence}" if line else "` `"
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) -> list[str]:
-    """Lay out a table, its cells as they are: who calls has escaped them.
+    r"""Lay out a table.
 
     Parameters
     ----------
     headings
         One a column.
     rows
-        Cells, as many as headings.
+        Cells, as many as headings; Markdown already, but for the bars that would part them.
     left
         How many of the first columns are words, set to the left; the others are figures, set to the right.
 
@@ -55,6 +58,11 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) 
     -------
     list
         Lines of Markdown, without line ends.
+
+    Examples
+    --------
+    >>> table(["name", "us"], [["`a | b`", "1"]], left=1)[-1]
+    '| `a \\| b` | 1 |'
     """
     rule = [":---" if number < left else "---:" for number in range(len(headings))]
-    return [f"| {' | '.join(row)} |" for row in (headings, rule, *rows)]
+    return [f"| {' | '.join(cell.replace('|', BAR) for cell in row)} |" for row in (headings, rule, *rows)]

@@ -1,0 +1,296 @@
+"""How the figures of `circle-test` are computed: the bus by its equations, the rest from one simulation.
+
+A simulation has no formula. Its lines say what was measured of it, at which step, and everything that went in.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from busplan.analysis.circle_test import CONTOUR_MEASURES, LEAST_ARC_DEG, CircleFigures, circle_test
+from busplan.analysis.derive_bus import capacity_figures
+from busplan.analysis.given import traced
+from busplan.analysis.quantities import FIGURES
+from busplan.analysis.trace import Input, Traced, short
+from busplan.profile.machine import AxisKeys
+from busplan.profile.model import Profile
+from busplan.servo.circle import CircleRun
+from busplan.servo.contour import contour_error
+
+Progress = Callable[[int, int], None]
+Figures = dict[str, Traced]
+
+_LOOP_KEYS: Final = ("position_gain_per_s", "integral_gain_per_s2", "derivative_gain", "drive_lag_us")
+"""What of the servo the linear loop holds."""
+
+
+class _Test(NamedTuple):
+    """One circle test, and what its lines are made of."""
+
+    profile: Profile
+    result: CircleFigures
+    run: CircleRun | None
+    bus: dict[str, Traced]
+    simulation: tuple[Traced, ...]
+    """Inputs of the simulation."""
+
+
+def circle_figures(profile: Profile, *, with_contributions: bool = False, progress: Progress | None = None) -> Figures:
+    """Derive every figure of `circle-test` at the profile's own period.
+
+    Parameters
+    ----------
+    profile
+        The network, its servo and its circle.
+    with_contributions
+        Run again without each error source in turn.
+    progress
+        As for `circle_test`.
+
+    Returns
+    -------
+    dict
+        By the keys of `FIGURES["circle-test"]`.
+
+    Raises
+    ------
+    BusplanError
+        As `circle_test`.
+    """
+    test = circle_test(profile, with_contributions=with_contributions, explain=False, progress=progress)
+    bus = capacity_figures(profile, model=profile.bus.timing_model)
+    one = _Test(profile, test.results[0], test.runs[0], bus, tuple(_simulation_inputs(profile)))
+    found: dict[str, Traced] = {}
+    for derive in (_given, _path, _bus_figures, _loop, _contour, _verdict):
+        found |= derive(one, found)
+        for key in found:
+            found[key].named(key, FIGURES["circle-test"][key].symbol)
+    return found
+
+
+def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
+    """What the circle test of a profile starts from, each with its grade; nothing is simulated."""
+    return tuple(one.given for one in _simulation_inputs(profile) if one.given is not None)
+
+
+def _simulation_inputs(profile: Profile) -> Iterator[Traced]:
+    """Everything that is not zero: zero in a resolution, a lag or a disturbance means that there is none."""
+    yield traced(profile, "cycle.period_us")
+    for name in ("circle", "servo", "delivery", "mechanics"):
+        section = getattr(profile, name)
+        keys = [key for key in type(section).model_fields if key not in ("x", "y", "grade") and getattr(section, key)]
+        yield from (traced(profile, f"{name}.{key}") for key in keys)
+    for axis in ("x", "y"):
+        own = getattr(profile.servo, axis).model_fields_set
+        yield from (traced(profile, f"servo.{axis}.{key}") for key in AxisKeys.model_fields if key in own)
+
+
+def _given(one: _Test, _found: Figures) -> Figures:
+    profile = one.profile
+    return {
+        "period_us": traced(profile, "cycle.period_us"),
+        "feed_mm_per_min": traced(profile, "circle.feed_mm_per_min"),
+        "radius_mm": traced(profile, "circle.radius_mm"),
+        "step_us": traced(profile, "servo.step_us"),
+        "loop": traced(profile, "servo.loop"),
+        "timing_model": traced(profile, "bus.timing_model"),
+        "servo_grade": traced(profile, "servo.grade"),
+    }
+
+
+def _path(one: _Test, found: Figures) -> Figures:
+    result, ramp = one.result, traced(one.profile, "circle.ramp_periods")
+    period, feed, radius, step = (found[key] for key in ("period_us", "feed_mm_per_min", "radius_mm", "step_us"))
+    setpoints = Traced(
+        result.setpoints,
+        formula="2 pi r / (F / 60) / (T_s / 1e6) + ramp, rounded up",
+        numbers=f"2 pi * {short(radius.value)} / ({short(feed.value)} / 60) / ({short(period.value)} / 1e6) "
+        f"+ {short(ramp.value)}, rounded up",
+        parts=(radius, feed, period, ramp),
+    ).named("setpoints", "n")
+    return {
+        "setpoints": setpoints,
+        # The result's own expression, given numbers that remember.
+        "duration_s": setpoints * period / 1e6,
+        "steps": Traced(
+            result.steps,
+            formula="n T_s / h",
+            numbers=f"{short(setpoints.value)} * {short(period.value)} / {short(step.value)}",
+            parts=(setpoints, period, step),
+        ),
+    }
+
+
+def _bus_figures(one: _Test, found: Figures) -> Figures:
+    required = one.bus["required_us"]
+    if one.profile.servo.loop == "node":
+        words, parts = "none: the loop is closed on the node", (found["loop"],)
+    else:
+        words = "T_need: the loop is closed on the host, the cycle lies inside it; at most T_s"
+        parts = (required,)
+    return {
+        "delay_us": Traced(one.result.delay_us, formula=words, numbers=short(one.result.delay_us), parts=parts),
+        "bus_fits": one.bus["fits"],
+        "required_us": required,
+        "available_us": one.bus["available_us"],
+    }
+
+
+def _loop(one: _Test, found: Figures) -> Figures:
+    result, loop = one.result, ("loop", "step_us", "period_us")
+    keys = {f"servo.{key}" for key in _LOOP_KEYS} | {f"servo.{axis}.{key}" for axis in ("x", "y") for key in _LOOP_KEYS}
+    gains = (part for part in one.simulation if part.given and part.given.name in keys)
+    parts = (*(found[key] for key in loop), *gains, found["delay_us"])
+    axes = {} if one.run is None else {"x": one.run.margins_x, "y": one.run.margins_y}
+
+    def each(name: str) -> str:
+        return ", ".join(f"{axis}: {short(getattr(margins, name))}" for axis, margins in axes.items())
+
+    return {
+        key: _measured(one, getattr(result, key), words, each(name), parts)
+        for key, name, words in (
+            ("stable", "stable", "all poles of 1 + L(z) inside the unit circle, on both axes; L(z) = C(z) G(z)"),
+            ("phase_margin_deg", "phase_margin_deg", "180 deg + arg L where |L| = 1, the smaller of both axes"),
+            ("gain_margin_db", "gain_margin_db", "-20 log10 |L| where arg L = 180 deg, the smaller of both axes"),
+            ("crossover_hz", "crossover_hz", "where |L| = 1, of the axis with the smaller phase margin"),
+        )
+    }
+
+
+def _measured(one: _Test, value: Any, formula: str, numbers: str, parts: tuple[Traced, ...]) -> Traced:
+    """A line that a simulation gives, or why there is none."""
+    if one.run is None:
+        return Traced(
+            None, formula="not simulated: the cycle does not fit the bus", numbers="-", parts=(one.bus["fits"],)
+        )
+    return Traced(value, formula=formula, numbers=numbers if value is not None else "does not exist", parts=parts)
+
+
+def _contour(one: _Test, _found: Figures) -> Figures:
+    result, words = one.result, _Words(one)
+    round_ = "" if words.is_round else f"; needs {LEAST_ARC_DEG:g} deg at constant speed"
+    error, steady = "sqrt(x^2 + y^2) - r", "at constant speed"
+    lowest, highest = "radial_deviation_min_mm", "radial_deviation_max_mm"
+    rows = (
+        ("mean_contour_error_mm", f"mean of |{error}| over all steps", words.mean()),
+        ("max_contour_error_mm", f"largest |{error}| of all steps", words.at("max_contour_error_mm")),
+        (lowest, f"smallest {error} {steady}", words.at(lowest)),
+        (highest, f"largest {error} {steady}", words.at(highest)),
+        (
+            "circular_deviation_mm",
+            f"largest less smallest distance from the least-squares centre {steady}{round_}",
+            words.range(),
+        ),
+        ("radius_deviation_mm", f"least-squares radius {steady} less r{round_}", words.radius()),
+        ("centre_offset_mm", f"centre of the least-squares circle {steady}{round_}", words.centre()),
+        ("constant_speed_deg", f"arc that the table covers {steady}, the loops settled", words.constant_speed()),
+    )
+    found = {}
+    for key, formula, numbers in rows:
+        value = getattr(result, key)
+        found[key] = _measured(
+            one, list(value) if isinstance(value, tuple) else value, formula, numbers, one.simulation
+        )
+    return found
+
+
+class _Words:
+    """The numbers of a simulation that its measures are made of."""
+
+    def __init__(self, one: _Test) -> None:
+        self._result, self._run = one.result, one.run
+
+    @property
+    def is_round(self) -> bool:
+        """Whether the arc is long enough for a centre."""
+        return self._result.circular_deviation_mm is not None
+
+    def mean(self) -> str:
+        """Sum and number of the errors."""
+        run, mean = self._run, self._result.mean_contour_error_mm
+        return "" if run is None or mean is None else f"{short(mean * run.steps)} / {run.steps}"
+
+    def at(self, key: str) -> str:
+        """When and where an extreme is reached."""
+        run = self._run
+        if run is None:
+            return ""
+        errors = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm)
+        first = 0
+        if key == "max_contour_error_mm":
+            index = int(np.abs(errors).argmax())
+        else:
+            first = run.constant_speed.start
+            part = errors[run.constant_speed]
+            index = first + int(part.argmin() if key == "radial_deviation_min_mm" else part.argmax())
+        x, y = float(run.x_mm[index]), float(run.y_mm[index])
+        angle = float(np.degrees(np.arctan2(y, x)) % 360)
+        time_s = (index + 1) * run.timing.step_us / 1e6
+        root = f"sqrt(({short(x)})^2 + ({short(y)})^2) - {short(run.path.radius_mm)}"
+        return f"{root}, {short(time_s)} s from the start, at {angle:.2f} deg"
+
+    def range(self) -> str:
+        """The two distances that the circular deviation lies between, from the radius."""
+        run, centre = self._run, self._result.centre_offset_mm
+        if run is None or centre is None:
+            return ""
+        part, radius = run.constant_speed, run.path.radius_mm
+        errors = contour_error(run.x_mm[part] - centre[0], y_mm=run.y_mm[part] - centre[1], radius_mm=radius)
+        return f"(r + {short(float(errors.max()))}) - (r + {short(float(errors.min()))})"
+
+    def radius(self) -> str:
+        """Both radii."""
+        run, deviation = self._run, self._result.radius_deviation_mm
+        if run is None or deviation is None:
+            return ""
+        return f"{run.path.radius_mm + deviation:.12g} - {run.path.radius_mm:.12g}"
+
+    def centre(self) -> str:
+        """Over how many points it was fitted."""
+        part = None if self._run is None else self._run.constant_speed
+        return "" if part is None else f"least squares over {part.stop - part.start} steps"
+
+    def constant_speed(self) -> str:
+        """The steps at constant speed."""
+        part = None if self._run is None else self._run.constant_speed
+        return "" if part is None else f"steps {part.start + 1} to {part.stop}"
+
+
+def _verdict(one: _Test, found: Figures) -> Figures:
+    result, tolerance = one.result, one.profile.tolerance
+    limits = tuple(
+        traced(one.profile, f"tolerance.{name}")
+        for name in type(tolerance).model_fields
+        if getattr(tolerance, name) is not None
+    )
+    measures = tuple(found[key] for key in ("bus_fits", "stable", "phase_margin_deg", "gain_margin_db"))
+    contour = (found[key] for key in CONTOUR_MEASURES if getattr(tolerance, key) is not None)
+    parts = (*measures, *contour, *limits)
+    said = "; ".join(failure.text for failure in result.failures) or "none"
+    failures = Traced(
+        [failure._asdict() for failure in result.failures],
+        formula="what of the bus, the loop and the tolerances does not hold",
+        numbers=said,
+        parts=parts,
+    )
+    ranked = result.contributions
+    return {
+        "failures": failures,
+        "passed": Traced(
+            result.passed,
+            formula="no failures: bus, loop, turn and tolerances hold",
+            numbers=f"failures: {said}",
+            parts=(failures,),
+        ),
+        "contributions": Traced(
+            [one._asdict() for one in ranked] if ranked is not None else None,
+            formula="the largest contour error less that of the same circle without the source, in mm, for each source",
+            numbers="; ".join(
+                f"{source.source}: {short(result.max_contour_error_mm)} - {short(source.max_contour_error_mm)}"
+                for source in ranked or ()
+            )
+            or "not run",
+            parts=one.simulation,
+        ),
+    }

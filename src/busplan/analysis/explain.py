@@ -1,0 +1,283 @@
+"""Where a figure comes from: every step to it, in symbols and in numbers, and everything it starts from.
+
+Nothing is computed a second time by other means: the functions that give the figure are given numbers that remember
+what was done with them (`busplan.analysis.trace`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from difflib import get_close_matches
+from typing import Any, Final, NamedTuple
+
+from busplan.analysis.capacity import Capacity, capacity
+from busplan.analysis.derive_bus import capacity_figures, latency_figures
+from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.quantities import FIGURES, Command, Figure
+from busplan.analysis.trace import Input, Traced, inputs, lines, short, written
+from busplan.analysis.verdict import Verdict, verdicts
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+from busplan.timing import TRANSACTION_KINDS, TimingModelName, TransactionKind
+
+Progress = Callable[[int, int], None]
+
+_VERDICT_KEYS: Final = ("models_agree", "cheapest_change", "warnings", "text")
+_GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
+"""From the weakest to the strongest, and what is not for anyone to know."""
+
+
+class Step(NamedTuple):
+    """One line of a derivation.
+
+    Parameters
+    ----------
+    key
+        Name of the figure in the results; one of the derivation's own where it is no figure.
+    symbol
+        What stands for it.
+    reference
+        Numbers of its equations, or where else it comes from.
+    formula
+        How it is computed, in symbols.
+    numbers
+        The same with the numbers put in.
+    value
+        The result: a number, a truth, a word or a list; None where there is none.
+    unit
+        Its unit; empty for counts, shares and words.
+    """
+
+    key: str
+    symbol: str
+    reference: str
+    formula: str
+    numbers: str
+    value: Any
+    unit: str
+
+
+class Derivation(NamedTuple):
+    """A figure and the way to it."""
+
+    command: Command
+    figure: Figure
+    timing_model: TimingModelName
+    transaction: TransactionKind | None
+    """Of a figure of `latency`."""
+    period_us: float
+    value: Any
+    """As the command's JSON has it."""
+    steps: tuple[Step, ...]
+    """What is computed first comes first; the figure itself is last, unless it is an input."""
+    inputs: tuple[Input, ...]
+
+    @property
+    def weakest_grade(self) -> str:
+        """The grade of the least well known of its inputs."""
+        return min((one.grade for one in self.inputs), key=_GRADES.index, default=_GRADES[-1])
+
+
+class Explanation(NamedTuple):
+    """Answer of `explain`."""
+
+    profile: Profile
+    derivations: tuple[Derivation, ...]
+
+
+def figure_named(name: str) -> tuple[Command, Figure]:
+    """Find the figure that a name means.
+
+    Parameters
+    ----------
+    name
+        A key, as "required_us", or one with its command before it, as "circle-test.required_us".
+
+    Raises
+    ------
+    BusplanError
+        There is none; those that are spelt alike are named.
+
+    Examples
+    --------
+    >>> figure_named("latency.gaps_us")[1].meaning
+    'both gaps, after each transaction'
+    """
+    for command, figures in FIGURES.items():
+        key = name.removeprefix(f"{command}.")
+        if key in figures and name in (key, f"{command}.{key}"):
+            return command, figures[key]
+    known = [key for figures in FIGURES.values() for key in figures]
+    close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
+    hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
+    raise BusplanError(f"{name}: no such figure{hint}? Without a figure, explain lists them all")
+
+
+def explain(
+    profile: Profile,
+    figure: str,
+    *,
+    periods_us: Sequence[float] | None = None,
+    timing_models: Sequence[TimingModelName] | None = None,
+    transactions: Sequence[TransactionKind] = TRANSACTION_KINDS,
+    progress: Progress | None = None,
+) -> Explanation:
+    """Derive a figure of `latency`, `capacity` or `circle-test`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    figure
+        Its key, with or without its command, as `figure_named` takes it.
+    periods_us
+        Communication periods T_s [us]; without them the profile's own.
+    timing_models
+        Which timing models; without them the one that decides. A circle test has no other.
+    transactions
+        Which transactions, for a figure of `latency`.
+    progress
+        As for `circle_test`.
+
+    Returns
+    -------
+    Explanation
+        One derivation for each period, transaction and model, in this nesting.
+
+    Raises
+    ------
+    BusplanError
+        There is no such figure, or the command itself refuses.
+    """
+    command, one = figure_named(figure)
+    deciding = profile.bus.timing_model
+    models = [deciding] if timing_models is None or command == "circle-test" else timing_models
+    found = []
+    for period_us in [profile.cycle.period_us] if periods_us is None else periods_us:
+        where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": "period"})
+        kinds: Sequence[TransactionKind | None] = transactions if command == "latency" else [None]
+        for kind in kinds:
+            for model in models:
+                traced = _traced(where, command, one.key, model=model, kind=kind, progress=progress)
+                found.append(_derivation(where, command, one, traced, model=model, kind=kind))
+    return Explanation(profile, tuple(found))
+
+
+def assumptions(profile: Profile) -> tuple[Input, ...]:
+    """Everything that the figures of a profile start from, each with its grade, the least well known first.
+
+    Parameters
+    ----------
+    profile
+        The network; what its circle test starts from is among them where it asks for one.
+
+    Returns
+    -------
+    tuple
+        Inputs of the cycle under both timing models, and of the circle.
+    """
+    found: dict[str, Input] = {}
+    for model in BOTH_MODELS:
+        for one in inputs(capacity_figures(profile, model=model)["fits"]):
+            found.setdefault(one.name, one)
+    if profile.asks_for_circle:
+        from busplan.analysis.derive_circle import simulated_inputs  # loads the simulation, and numpy with it
+
+        for one in simulated_inputs(profile):
+            found.setdefault(one.name, one)
+    return tuple(sorted(found.values(), key=lambda one: _GRADES.index(one.grade)))
+
+
+def _traced(
+    profile: Profile,
+    command: Command,
+    key: str,
+    *,
+    model: TimingModelName,
+    kind: TransactionKind | None,
+    progress: Progress | None,
+) -> Traced:
+    if command == "latency":
+        return latency_figures(profile, model=model, kind=kind or TRANSACTION_KINDS[0])[key]
+    if command == "capacity":
+        return (
+            _verdict(profile, key, model=model) if key in _VERDICT_KEYS else capacity_figures(profile, model=model)[key]
+        )
+    from busplan.analysis.derive_circle import circle_figures  # as above
+
+    return circle_figures(profile, with_contributions=key == "contributions", progress=progress)[key]
+
+
+def _derivation(
+    profile: Profile,
+    command: Command,
+    figure: Figure,
+    traced: Traced,
+    *,
+    model: TimingModelName,
+    kind: TransactionKind | None,
+) -> Derivation:
+    steps = tuple(_steps(traced, command, figure))
+    return Derivation(
+        command=command,
+        figure=figure,
+        timing_model=model,
+        transaction=kind,
+        period_us=profile.cycle.period_us,
+        value=traced.value,
+        steps=steps,
+        inputs=tuple(inputs(traced)),
+    )
+
+
+def _steps(traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
+    for one in lines(traced):
+        known = figure if one is traced else _known(one.key, command)
+        yield Step(
+            key=known.key,
+            symbol=one.symbol or known.symbol,
+            reference=known.reference,
+            formula=written(one, in_numbers=False),
+            numbers=written(one, in_numbers=True),
+            value=one.value,
+            unit=known.unit,
+        )
+
+
+def _known(key: str, command: Command) -> Figure:
+    """What the registry says of a line; one that is no figure stands for itself."""
+    for figures in (FIGURES[command], *FIGURES.values()):
+        if key in figures:
+            return figures[key]
+    return Figure(key, key, "", "")
+
+
+def _verdict(profile: Profile, key: str, *, model: TimingModelName) -> Traced:
+    """A figure of the verdict, which compares the models."""
+    result = capacity(profile, timing_models=(model, *(other for other in BOTH_MODELS if other != model)))
+    (verdict,) = verdicts(result)
+    derived = {one.timing_model: capacity_figures(profile, model=one.timing_model) for one in result.results}
+    fits = tuple(figures["fits"] for figures in derived.values())
+    stories = ", ".join(f"{one.timing_model}: {'fits' if one.fits else 'does not fit'}" for one in result.results)
+    if key == "models_agree":
+        return Traced(
+            verdict.models_agree, formula="fits is the same under every timing model", numbers=stories, parts=fits
+        )
+    if key == "cheapest_change":
+        return _change(verdict, result, fits)
+    parts = {
+        "warnings": ("gap_count_safe",),
+        "text": ("fits", "margin_us", "binding_term", "max_nodes", "gap_count_safe"),
+    }[key]
+    chosen = tuple(figures[part] for figures in derived.values() for part in parts)
+    return Traced("in words", formula="the figures below in words", numbers=stories, parts=chosen)
+
+
+def _change(verdict: Verdict, result: Capacity, fits: tuple[Traced, ...]) -> Traced:
+    change = verdict.change
+    purpose = "carries more nodes" if verdict.all_well else "makes every model fit with a safe gap count"
+    words = f"the first of gap count, slice ratio, period, speed and wiring that {purpose}"
+    if change is None:
+        return Traced(None, formula=words, numbers="none does", parts=fits)
+    settings = ", ".join(f"{key} = {value}" for key, value in change.changes.items())
+    numbers = f"{settings} leaves {short(change.figures.margin_us)} us of {short(result.results[0].margin_us)} us now"
+    return Traced(settings, formula=words, numbers=numbers, parts=fits)

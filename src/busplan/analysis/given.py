@@ -1,0 +1,93 @@
+"""What a profile gives a derivation: its keys as inputs, each with its grade and where it stands."""
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from busplan.analysis.trace import Input, Traced
+from busplan.equations import SYMBOLS
+from busplan.ieee1394 import (
+    PACKET_OVERHEAD_BYTES,
+    PING_PER_NODE_US,
+    PING_US,
+    REFERENCE_CABLE_M,
+    SLICE_RATIO,
+)
+from busplan.profile.model import Profile
+
+if TYPE_CHECKING:
+    from busplan.profile.sections import Section
+
+_DEFAULTS: Final = MappingProxyType(
+    {
+        "bus.cable_length_m": REFERENCE_CABLE_M,
+        "cycle.slice_ratio": SLICE_RATIO,
+        "cycle.sync.ping_us": PING_US,
+        "cycle.sync.ping_per_node_us": PING_PER_NODE_US,
+        "payload.overhead_bytes": PACKET_OVERHEAD_BYTES,
+    }
+)
+"""Keys whose default is a figure with a source."""
+
+_SYMBOLS: Final = MappingProxyType(
+    {
+        "payload.read_bytes": "P_read",
+        "payload.write_bytes": "P_write",
+        "payload.overhead_bytes": "overhead",
+        "cycle.sync.ping_us": "ping",
+        "cycle.sync.ping_per_node_us": "ping_node",
+        "node.axes": "axes_node",
+        "node.execution.base_us": "base",
+        "node.execution.per_byte_us": "per_byte",
+        "circle.feed_mm_per_min": "F",
+        "circle.radius_mm": "r",
+        "circle.ramp_periods": "ramp",
+        "servo.step_us": "h",
+        "servo.position_gain_per_s": "kp",
+        "servo.integral_gain_per_s2": "ki",
+        "servo.derivative_gain": "kd",
+        "servo.velocity_feedforward": "k_vff",
+        "servo.acceleration_feedforward_s": "k_aff",
+        "servo.drive_lag_us": "tau",
+    }
+)
+"""What stands for a key in formulas, where it is no quantity of the equations."""
+
+
+def given(profile: Profile, key: str) -> Input:
+    """Give a key of a profile as the input of a derivation.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    key
+        Dotted key, as "cycle.period_us".
+
+    Returns
+    -------
+    Input
+        Its grade is that of its section where the section has one, "given" for what the profile sets, and for a
+        default that of its source.
+    """
+    *sections, name = key.split(".")
+    section: Section = profile
+    is_set, own_grade = True, None
+    for part in sections:
+        is_set = is_set and part in section.model_fields_set
+        section = getattr(section, part)
+        own_grade = getattr(section, "grade", own_grade)
+    is_set = is_set and name in section.model_fields_set
+    description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
+    value = getattr(section, name)
+    grade, source = own_grade or "given", f"profile {profile.name}"
+    if not is_set:
+        default = _DEFAULTS.get(key)
+        grade, source = (default.grade, f"default: {default.source}") if default is not None else (grade, "default")
+    symbol = _SYMBOLS.get(key) or SYMBOLS.get(name) or name
+    return Input(symbol, key, value, unit, grade, source, description)
+
+
+def traced(profile: Profile, key: str) -> Traced:
+    """Give a key of a profile as a number that remembers where it comes from."""
+    one = given(profile, key)
+    return Traced(one.value, given=one)

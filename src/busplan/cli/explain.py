@@ -1,0 +1,117 @@
+"""`busplan explain`."""
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from busplan.cli.options import (
+    BUS_OPTIONS,
+    GapCountOption,
+    NodesOption,
+    PeriodsOption,
+    ProfileArgument,
+    bus_changes,
+    periods_us,
+    timing_models,
+)
+from busplan.cli.output import emit, emit_text
+
+if TYPE_CHECKING:
+    from busplan.analysis.explain import Explanation
+    from busplan.profile.model import Profile
+
+ExplainFormat = Literal["text", "json", "markdown"]
+
+
+def complete_figure(incomplete: str) -> list[str]:
+    """Figures that begin as typed, for the shell's completion."""
+    from busplan.analysis.quantities import FIGURES
+
+    names = (name for command, keys in FIGURES.items() for key in keys for name in (key, f"{command}.{key}"))
+    return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
+
+
+def explain_command(
+    profile: ProfileArgument,
+    figure: Annotated[
+        str | None,
+        typer.Argument(
+            help="A key of the JSON of latency, capacity or circle-test, as required_us; circle-test.required_us where "
+            "several have it and the first is not meant. Without it, all of them are listed.",
+            autocompletion=complete_figure,
+            show_default=False,
+        ),
+    ] = None,
+    period: PeriodsOption = None,
+    nodes: NodesOption = None,
+    gap_count: GapCountOption = None,
+    timing: Annotated[
+        Literal["paper", "standard", "both"] | None,
+        typer.Option(
+            "--timing",
+            help="Timing model; a circle test has only the one that decides.  "
+            "[default: the profile's bus.timing_model]",
+            show_default=False,
+        ),
+    ] = None,
+    transaction: Annotated[
+        Literal["read", "write", "both"],
+        typer.Option("--transaction", help="Which transaction, for a figure of latency."),
+    ] = "both",
+    format_: Annotated[
+        ExplainFormat, typer.Option("--format", help="Form of the document on standard output.")
+    ] = "text",
+) -> None:
+    """Show where a figure comes from: every step in symbols and in numbers, and what it starts from.
+
+    Each step names its equation. Each constant has its source and how well it is known: published, derived, recalled,
+    measured, calibrated or assumed; "given" is what the profile sets. The lines are what the program itself computed.
+    A figure of the circle test runs the test. Each figure has its unit. A report: it exits 0 whatever the figures are.
+
+    Example: busplan explain paper-4ms required_us
+    """
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    if figure is None:
+        _list(plan, format_)
+        return
+    from busplan.analysis.explain import explain
+    from busplan.cli.progress import progress_bar
+    from busplan.timing import TRANSACTION_KINDS
+
+    with progress_bar("circle test") as progress:
+        found = explain(
+            plan,
+            figure,
+            periods_us=periods_us(period, plan),
+            timing_models=None if timing is None else timing_models(timing),
+            transactions=TRANSACTION_KINDS if transaction == "both" else (transaction,),
+            progress=progress,
+        )
+    _write(found, format_)
+
+
+def _list(plan: "Profile", format_: ExplainFormat) -> None:
+    from busplan.report import explain as report
+    from busplan.report import text
+
+    if format_ == "text":
+        emit(report.figure_lines())
+    elif format_ == "json":
+        emit_text(text.to_json(report.figure_document(plan.name)))
+    else:
+        emit_text(report.figure_markdown())
+
+
+def _write(found: "Explanation", format_: ExplainFormat) -> None:
+    from busplan.report import explain as report
+    from busplan.report import text
+
+    if format_ == "text":
+        emit(report.explain_lines(found))
+    elif format_ == "json":
+        emit_text(text.to_json(report.explain_document(found)))
+    else:
+        emit_text(report.explain_markdown(found))

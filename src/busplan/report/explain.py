@@ -1,0 +1,187 @@
+"""`busplan explain` as text, as Markdown and as plain data."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from busplan.analysis.explain import Derivation, Explanation, Step
+from busplan.analysis.quantities import FIGURES, Command, Figure
+from busplan.analysis.trace import Input, formula_of, short
+from busplan.ieee1394 import CONSTANTS
+from busplan.report import markdown
+from busplan.report.documents import Document, Row, document
+from busplan.report.lines import BLANK, Line, table
+from busplan.report.words import period
+from busplan.sourced import EQUATIONS
+
+_INPUT_HEADINGS = ("symbol", "name", "value", "unit", "grade", "source")
+
+
+def figure_rows() -> list[Row]:
+    """One row a figure that can be explained."""
+    return [
+        {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
+        | {"reference": one.reference, "meaning": one.meaning}
+        for command, one in _all_figures()
+    ]
+
+
+def equation_rows() -> list[Row]:
+    """One row an equation: its numbers, formula, function and source."""
+    return [
+        {
+            "reference": one.reference,
+            "formula": f"{one.symbol} = {formula_of(one)}",
+            "function": name,
+            "source": one.source,
+        }
+        for name, one in EQUATIONS.items()
+    ]
+
+
+def constant_rows() -> list[Row]:
+    """One row a constant: its value, unit, grade and source."""
+    return [
+        {"name": name, "value": float(one), "unit": one.unit}
+        | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
+        for name, one in CONSTANTS.items()
+    ]
+
+
+def figure_document(profile: str) -> Document:
+    """Answer of `busplan explain PROFILE` as JSON: the whole registry."""
+    return document(
+        "explain", profile=profile, figures=figure_rows(), equations=equation_rows(), constants=constant_rows()
+    )
+
+
+def figure_lines() -> list[Line]:
+    """Answer of `busplan explain PROFILE` for people."""
+    rows = ([command, one.key, one.reference, one.unit, one.meaning] for command, one in _all_figures())
+    return table(["command", "figure", "eq", "unit", "what it is"], rows, left=5)
+
+
+def figure_markdown() -> str:
+    """Answer of `busplan explain PROFILE` as Markdown."""
+    rows = (
+        [command, markdown.code(one.key), one.reference, one.unit, markdown.escaped(one.meaning)]
+        for command, one in _all_figures()
+    )
+    return _text(markdown.table(["command", "figure", "eq", "unit", "what it is"], rows, left=5))
+
+
+def explain_document(explanation: Explanation) -> Document:
+    """Answer of `busplan explain PROFILE FIGURE` as JSON."""
+    return document(
+        "explain",
+        profile=explanation.profile.name,
+        derivations=[_derivation(one) for one in explanation.derivations],
+    )
+
+
+def explain_lines(explanation: Explanation) -> list[Line]:
+    """Answer of `busplan explain PROFILE FIGURE` for people."""
+    lines: list[Line] = []
+    for one in explanation.derivations:
+        if lines:
+            lines.append(BLANK)
+        headline = _headline(one, explanation.profile.name)
+        lines.append(Line(f"{headline}: {_result(one.value, one.figure.unit)}", "heading"))
+        lines.append(Line(_about(one.figure)))
+        for number, step in enumerate(one.steps, start=1):
+            lines.extend(_step(number, step))
+        lines.extend((BLANK, *_inputs(one)))
+    return lines
+
+
+def explain_markdown(explanation: Explanation) -> str:
+    """Answer of `busplan explain PROFILE FIGURE` as Markdown."""
+    lines: list[str] = []
+    for one in explanation.derivations:
+        headline = _headline(one, markdown.code(explanation.profile.name), figure=markdown.code(one.figure.key))
+        result = markdown.escaped(_result(one.value, one.figure.unit))
+        lines += [f"### {headline}: {result}", "", markdown.escaped(_about(one.figure)), ""]
+        steps = (
+            [
+                str(number),
+                step.reference,
+                markdown.code(f"{step.symbol} = {step.formula}"),
+                markdown.code(step.numbers),
+                markdown.escaped(_result(step.value, step.unit)),
+            ]
+            for number, step in enumerate(one.steps, start=1)
+        )
+        lines += [*markdown.table(["step", "eq", "formula", "numbers", "result"], steps, left=4), ""]
+        cells = ([markdown.code(cell) for cell in row[:2]] + list(map(markdown.escaped, row[2:])) for row in _rows(one))
+        lines += [*markdown.table(_INPUT_HEADINGS, cells, left=6), ""]
+    return _text(lines[:-1])
+
+
+def _all_figures() -> Iterator[tuple[Command, Figure]]:
+    yield from ((command, one) for command, figures in FIGURES.items() for one in figures.values())
+
+
+def _derivation(one: Derivation) -> Document:
+    return {
+        "command": one.command,
+        "figure": one.figure.key,
+        "symbol": one.figure.symbol,
+        "unit": one.figure.unit,
+        "reference": one.figure.reference,
+        "meaning": one.figure.meaning,
+        "timing_model": one.timing_model,
+        "transaction": one.transaction,
+        "period_us": one.period_us,
+        "value": one.value,
+        "weakest_grade": one.weakest_grade,
+        "steps": [step._asdict() for step in one.steps],
+        "inputs": [input_._asdict() for input_ in one.inputs],
+    }
+
+
+def _headline(one: Derivation, profile: str, *, figure: str | None = None) -> str:
+    kind = f"{one.transaction}, " if one.transaction else ""
+    return f"{figure or one.figure.key} of {profile} at {period(one.period_us)}, {kind}{one.timing_model} model"
+
+
+def _about(figure: Figure) -> str:
+    return f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}."
+
+
+def _result(value: Any, unit: str) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(_item, value)) or "none"
+    return f"{short(value)} {unit}".rstrip() if value is not None else "none"
+
+
+def _item(value: Any) -> str:
+    """One of a list: a number or a word, or what has a name itself."""
+    return str(value.get("name", value.get("source"))) if isinstance(value, dict) else short(value)
+
+
+def _step(number: int, step: Step) -> Iterator[Line]:
+    """A line in symbols, one in numbers and the result, each where it says more than the one before."""
+    head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
+    formula = "" if step.formula == step.symbol else step.formula
+    numbers = "" if step.numbers in (formula, short(step.value)) else step.numbers
+    distinct = [text for text in (formula, numbers, _result(step.value, step.unit)) if text]
+    yield BLANK
+    for at, text in enumerate(distinct):
+        yield Line(f"{head if at == 0 else ' ' * len(head)}= {text}", "table")
+
+
+def _rows(one: Derivation) -> Iterator[Sequence[str]]:
+    yield from map(_row, one.inputs)
+
+
+def _row(given: Input) -> Sequence[str]:
+    value = ", ".join(map(short, given.value)) if isinstance(given.value, (list, tuple)) else short(given.value)
+    return given.symbol, given.name, value, given.unit, given.grade, given.source
+
+
+def _inputs(one: Derivation) -> list[Line]:
+    title = Line(f"It starts from; the least well known is {one.weakest_grade}", "heading")
+    return [title, *table(_INPUT_HEADINGS, _rows(one), left=6)]
+
+
+def _text(lines: Sequence[str]) -> str:
+    return "".join(f"{line}\n" for line in lines)

@@ -1,0 +1,201 @@
+"""Derivations: each ends in the figure that the command gives, and each line reads back as its result."""
+
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.capacity import CapacityFigures, capacity, figures
+from busplan.analysis.circle_test import CircleFigures, circle_test
+from busplan.analysis.derive_bus import capacity_figures, latency_figures
+from busplan.analysis.derive_circle import circle_figures
+from busplan.analysis.explain import assumptions, explain, figure_named
+from busplan.analysis.latency import latency
+from busplan.analysis.quantities import FIGURES
+from busplan.analysis.trace import Traced
+from busplan.analysis.verdict import verdicts
+from busplan.errors import BusplanError
+from busplan.ieee1394 import CONSTANTS
+from busplan.profile.model import Profile
+from busplan.profile.shipped import load, shipped_names
+from busplan.profile.toml import override
+from busplan.report.documents import capacity_document, latency_rows
+from busplan.timing import TimingModelName
+
+MODELS = st.sampled_from(["paper", "standard"])
+Make = Callable[..., Profile]
+GRADES = {"published", "derived", "recalled", "measured", "calibrated", "assumed", "given"}
+ARITHMETIC = re.compile(r"[-+*/^() .\de]+")
+
+
+def value_of(found: Any) -> Any:
+    return found.value if isinstance(found, Traced) else found
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data(), model=MODELS)
+def test_every_figure_of_capacity_is_derived_as_it_is_computed(
+    data: st.DataObject, model: TimingModelName, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    derived, plain = capacity_figures(profile, model=model), figures(profile, model=model)
+    for key, value in plain._asdict().items():
+        assert value_of(derived[key]) == (list(value) if isinstance(value, tuple) else value), key
+        assert isinstance(derived[key], Traced), key
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data(), model=MODELS, kind=st.sampled_from(["read", "write"]))
+def test_every_figure_of_latency_is_derived_as_it_is_computed(
+    data: st.DataObject, model: TimingModelName, kind: Any, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    derived = latency_figures(profile, model=model, kind=kind)
+    rows = latency_rows(latency(profile, timing_models=[model]))
+    row = next(row for row in rows if row["transaction"] == kind)
+    for key, value in row.items():
+        assert value_of(derived[key]) == value, key
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data(), model=MODELS, key=st.sampled_from(sorted(FIGURES["capacity"])))
+def test_every_line_in_numbers_reads_back_as_its_result(
+    data: st.DataObject, model: TimingModelName, key: str, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    for step in explain(profile, f"capacity.{key}", timing_models=[model]).derivations[0].steps:
+        if ARITHMETIC.fullmatch(step.numbers):
+            scale = max(map(abs, map(float, re.findall(r"[\d.]+(?:e[-+]?\d+)?", step.numbers))), default=1.0)
+            found = eval(step.numbers.replace("^", "**"))
+            assert found == pytest.approx(step.value, rel=1e-5, abs=1e-5 * scale), (step.symbol, step.numbers)
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_every_input_has_a_grade_a_source_and_a_meaning(name: str) -> None:
+    profile = load(name).profile
+    for key in ("fits", "text"):
+        for one in explain(profile, key, timing_models=["paper", "standard"]).derivations:
+            assert {given.grade for given in one.inputs} <= GRADES
+            assert all(given.source and given.meaning and given.name for given in one.inputs)
+
+
+def test_the_registry_holds_every_key_of_the_results() -> None:
+    assert set(FIGURES["capacity"]) == {*CapacityFigures._fields, "models_agree", "cheapest_change", "warnings", "text"}
+    assert set(FIGURES["circle-test"]) == set(CircleFigures._fields)
+    assert list(FIGURES["latency"]) == list(latency_rows(latency(load("paper-4ms").profile))[0])
+
+
+CIRCLES = {
+    "paper-1ms": {},
+    "host loop": {"servo.loop": "host", "servo.drive_lag_us": 0.0, "circle.radius_mm": 20.0},
+    "unstable": {"servo.loop": "host", "servo.position_gain_per_s": 3000.0, "circle.radius_mm": 20.0},
+    "bus too slow": {"cycle.period_us": 200.0},
+    "short arc": {"circle.radius_mm": 60.0, "circle.feed_mm_per_min": 10_000.0, "circle.ramp_periods": 2000},
+    "other axis": {"servo.x": {"position_gain_per_s": 120.0}, "mechanics.backlash_mm": 0.002, "circle.radius_mm": 20.0},
+    "misses": {"tolerance.max_contour_error_mm": 0.001, "circle.radius_mm": 20.0, "circle.feed_mm_per_min": 5000.0},
+}
+
+
+@pytest.mark.parametrize("changes", CIRCLES.values(), ids=CIRCLES.keys())
+def test_every_figure_of_the_circle_test_is_derived_as_it_is_computed(changes: dict[str, Any]) -> None:
+    profile = override(load("paper-1ms").profile, changes)
+    derived = circle_figures(profile, with_contributions=True)
+    (result,) = circle_test(profile, with_contributions=True).results
+    for key, value in result._asdict().items():
+        if key in ("failures", "contributions"):
+            assert derived[key].value == (None if value is None else [one._asdict() for one in value])
+        else:
+            assert derived[key].value == (list(value) if isinstance(value, tuple) else value), key
+
+
+def test_the_lines_of_a_circle_read_back_as_its_measures() -> None:
+    profile = override(load("paper-1ms").profile, {"circle.radius_mm": 20.0, "circle.feed_mm_per_min": 5000.0})
+    found = circle_figures(profile)
+    for key in ("max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"):
+        root = found[key].numbers.split(",")[0].replace("^", "**").replace("sqrt", "math.sqrt")
+        assert abs(abs(eval(root, {"math": math})) - abs(found[key].value)) < 2e-5, key
+    total, steps = found["mean_contour_error_mm"].numbers.split(" / ")
+    assert float(total) / int(steps) == pytest.approx(found["mean_contour_error_mm"].value, rel=1e-6)
+    outer, inner = re.findall(r"r \+ (\S+)\)", found["circular_deviation_mm"].numbers)
+    assert float(outer) - float(inner) == pytest.approx(found["circular_deviation_mm"].value, rel=1e-5)
+    assert eval(
+        found["setpoints"].numbers.split(",")[0].replace("2 pi", "2 * math.pi"), {"math": math}
+    ) == pytest.approx(found["setpoints"].value, abs=1)
+
+
+def test_a_verdict_is_explained_by_both_models() -> None:
+    profile = override(load("paper-1ms").profile, {"cycle.period_us": 600.0})
+    (one,) = explain(profile, "models_agree").derivations
+    assert one.value is False
+    assert {"paper: fits, standard: does not fit"} <= {step.numbers for step in one.steps}
+    (change,) = explain(profile, "cheapest_change").derivations
+    assert change.value == "bus.gap_count = 7"
+
+
+def test_periods_models_and_transactions_multiply() -> None:
+    profile = load("paper-4ms").profile
+    found = explain(profile, "latency_us", periods_us=[1000.0, 2000.0], timing_models=["paper", "standard"])
+    assert len({(one.period_us, one.timing_model, one.transaction) for one in found.derivations}) == 8
+    circle = explain(profile, "circle-test.required_us", timing_models=["paper", "standard"])
+    assert [one.timing_model for one in circle.derivations] == ["paper"]
+
+
+def test_the_weakest_grade_is_that_of_the_least_known_input(make: Make) -> None:
+    assert explain(make(), "required_us").derivations[0].weakest_grade == "recalled"
+    assumed = make(node__execution__grade="assumed")
+    assert explain(assumed, "required_us").derivations[0].weakest_grade == "assumed"
+    assert explain(assumed, "available_us").derivations[0].weakest_grade == "given"
+
+
+def test_a_default_is_as_well_known_as_its_source(make: Make) -> None:
+    by_name = {one.name: one for one in explain(make(), "sync_us").derivations[0].inputs}
+    assert by_name["cycle.sync.ping_us"].grade == "measured"
+    assert by_name["cycle.sync.ping_us"].source == "default: paper, section IV-A"
+    own = {one.name: one for one in explain(make(cycle__sync__ping_us=0.4), "sync_us").derivations[0].inputs}
+    assert (own["cycle.sync.ping_us"].grade, own["cycle.sync.ping_us"].source) == ("given", "profile test")
+
+
+def test_assumptions_name_every_constant_of_both_models_and_of_the_circle() -> None:
+    found = {one.name: one for one in assumptions(load("paper-4ms").profile)}
+    assert {"ARBITRATION_HOLD_US", "DATA_END_US", "BASE_RATE_MBIT_S", "PHY_DELAY_TICKS"} <= set(found)
+    assert found["servo.position_gain_per_s"].grade == "calibrated"
+    assert found["node.execution.time_us"].grade == "derived"
+    for name, one in found.items():
+        if name in CONSTANTS:
+            assert (one.value, one.grade, one.source) == (
+                CONSTANTS[name],
+                CONSTANTS[name].grade,
+                CONSTANTS[name].source,
+            )
+    order = [one.grade for one in assumptions(load("paper-4ms").profile)]
+    assert order[0] == "recalled"
+    assert order[-1] == "given"
+
+
+@pytest.mark.parametrize("name", ["required_us", "capacity.required_us"])
+def test_a_figure_is_found_by_its_key(name: str) -> None:
+    assert figure_named(name)[0] == "capacity"
+
+
+def test_the_command_before_a_key_decides() -> None:
+    assert figure_named("circle-test.required_us")[0] == "circle-test"
+    assert figure_named("circular_deviation_mm")[0] == "circle-test"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("requird_us", "did you mean required_us"), ("", "no such figure"), ("circle-test.fits", "fits")]
+)
+def test_an_unknown_figure_is_refused_with_what_it_may_have_been(name: str, said: str) -> None:
+    with pytest.raises(BusplanError, match=said):
+        figure_named(name)
+
+
+def test_the_verdicts_keys_are_all_known() -> None:
+    profile = load("paper-4ms").profile
+    result = capacity(profile)
+    verdict = capacity_document(result, verdicts(result))["verdicts"][0]
+    assert set(verdict) <= set(FIGURES["capacity"])

@@ -1,0 +1,125 @@
+"""Numbers that remember: what they write down is what was computed."""
+
+import inspect
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from busplan import equations
+from busplan.analysis.trace import Input, Traced, formula_of, inputs, lines, written
+from busplan.sourced import EQUATIONS
+
+# As the paper prints them, in this program's symbols; hop is written out as the paper does.
+PRINTED = {
+    "time_slice_us": "alpha T_s / N",
+    "required_time_slice_us": "(T_r + T_w + T_npd + CTS) / N",
+    "transaction_latency_us": "T_req + T_ack1 + T_exec + T_resp + T_ack2",
+    "hop_delay_us": "0.023 L / 4.5 + 14 / C",
+    "arbitration_phase_us": "(0.023 L / 4.5 + 14 / C) H + 4 g / C + 1.63",
+    "data_phase_us": "(0.023 L / 4.5 + 14 / C) H + 8 B / R",
+    "acknowledge_phase_us": "(0.023 L / 4.5 + 14 / C) H + 0.25",
+    "request_us": "ArbP + DTP",
+    "response_us": "ArbP + DTP",
+    "acknowledge_us": "AckP",
+    "subaction_gap_us": "(29 + 16 g) / C",
+    "arbitration_reset_gap_us": "(53 + 32 g) / C",
+    "gaps_us": "(82 + 48 g) / C",
+    "published_nodes": "(alpha T_s - CTS) / (2 (T_lant + T_sum))",
+    "interval_latency_us": "T1 + T2 + T3 + T4 + T5",
+    "request_and_acknowledge_us": "T_req + T_ack",
+    "response_and_acknowledge_us": "T_resp + T_ack",
+    "published_request_and_acknowledge_us": "3.11 + 8 P / 393.216",
+}
+
+
+def number(value: float, symbol: str = "x") -> Traced:
+    return Traced(value, given=Input(symbol, symbol, value, "1", "given", "test", "a number"))
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_every_equation_writes_itself_down_as_printed(name: str) -> None:
+    assert formula_of(EQUATIONS[name]) == PRINTED[name]
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_the_formula_in_a_docstring_is_the_one_that_is_computed(name: str) -> None:
+    equation = EQUATIONS[name]
+    assert f"{equation.symbol} = {PRINTED[name]} [" in str(equation.function.__doc__)
+    assert f"References\n    ----------\n    {equation.source}." in str(equation.function.__doc__)
+
+
+def test_the_registry_holds_equations_1_to_15() -> None:
+    whole = [equation.numbers for equation in EQUATIONS.values() if not equation.part]
+    assert whole == [(number,) for number in range(1, 16)]
+    functions = {
+        name
+        for name, one in vars(equations).items()
+        if inspect.isfunction(one) and one.__module__ == equations.__name__
+    }
+    assert set(EQUATIONS) == functions
+
+
+LEAF = st.integers(1, 9).map(lambda value: number(float(value), f"x{value}"))
+OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
+    "+": lambda left, right: left + right,
+    "-": lambda left, right: left - right,
+    "*": lambda left, right: left * right,
+    "/": lambda left, right: left / right if right != 0 else left,
+}
+EXPRESSION = st.recursive(
+    LEAF | st.integers(2, 9),
+    lambda inner: st.tuples(st.sampled_from(sorted(OPERATIONS)), inner, inner).map(
+        lambda one: OPERATIONS[one[0]](one[1], one[2])
+    ),
+    max_leaves=8,
+)
+
+
+@given(EXPRESSION)
+def test_any_expression_reads_back_as_its_value_in_numbers_and_in_symbols(expression: Any) -> None:
+    if not isinstance(expression, Traced):
+        return
+    in_numbers = written(expression, in_numbers=True)
+    if expression.operation:
+        assert eval(in_numbers) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
+        symbols = {f"x{value}": float(value) for value in range(1, 10)}
+        in_symbols = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", written(expression, in_numbers=False))
+        assert eval(in_symbols, symbols) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+def test_it_compares_as_its_value_does(one: float, other: float) -> None:
+    left, right = number(one), number(other)
+    assert (left < right, left <= right, left > right, left >= right, left == right) == (
+        one < other,
+        one <= other,
+        one > other,
+        one >= other,
+        one == other,
+    )
+    assert (left < other, one < right) == (one < other, one < other)
+
+
+def test_switches_of_a_comparison_leave_no_trace() -> None:
+    x = number(3.0)
+    assert x * True is x
+    assert x * False == 0.0
+    assert (x > 2) * x is x
+    assert x + 0 is x
+    assert x - 0 is x
+    assert 0 + x is x
+
+
+def test_lines_and_inputs_are_listed_once_and_in_order() -> None:
+    x, y = number(2.0, "x"), number(3.0, "y")
+    first = (x * y).named("first_us", "A")
+    second = (first + first * x).named("second_us", "B")
+    assert [one.key for one in lines(second)] == ["first_us", "second_us"]
+    assert [one.symbol for one in inputs(second)] == ["x", "y"]
+    assert written(second, in_numbers=False) == "A + A x"
+    assert math.isclose(second.value, 18.0)

@@ -1,0 +1,106 @@
+"""`busplan explain` as a process: its forms, its options, and what it refuses."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from markdown_it import MarkdownIt
+
+Run = Callable[..., Any]
+Refused = Callable[..., str]
+
+HOSTILE = """schema_version = 1
+name = "<script>alert(1)</script> | `x` @team"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+nodes = 2
+[cycle]
+period_us = 1000
+[payload]
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 }
+"""
+
+
+def test_a_figure_is_derived_down_to_its_constants(run: Run) -> None:
+    done = run("explain", "paper-two-node", "latency.gaps_us", "--transaction", "read")
+    assert done.returncode == 0
+    assert done.stderr == ""
+    assert done.stdout.splitlines()[0] == "gaps_us of paper-two-node at 4 ms, read, paper model: 7.898966 us"
+    assert "T_sum = (82 + 48 g) / R\n" in done.stdout
+    assert "= (82 + 48 * 63) / 393.216\n" in done.stdout
+    assert "GAPS_TICKS " in done.stdout
+    assert "published" in done.stdout
+
+
+@pytest.mark.parametrize("command", ["capacity", "latency", "circle-test"])
+def test_every_key_of_a_commands_json_is_explained_with_its_value(run: Run, command: str) -> None:
+    listed = json.loads(run("explain", "paper-1ms", "--format", "json").stdout)
+    keys = [row["figure"] for row in listed["figures"] if row["command"] == command]
+    extra = ["--contributions"] if command == "circle-test" else ["--timing", "paper"]
+    given = json.loads(run(command, "paper-1ms", *extra, "--format", "json").stdout)
+    rows = given.get("results") or given["transactions"]
+    row = {**given.get("verdicts", [{}])[0], **rows[0]}
+    assert set(row) == set(keys)
+    # The others are compared without a process each, in tests/analysis/test_explain.py.
+    for key in (keys[0], keys[-1], *keys[5:9]):
+        said = json.loads(run("explain", "paper-1ms", f"{command}.{key}", "--format", "json").stdout)
+        (value, *_) = (one["value"] for one in said["derivations"])
+        if key not in ("text", "warnings", "cheapest_change"):
+            assert value == row[key], key
+            assert said["derivations"][0]["steps"] == [] or said["derivations"][0]["steps"][-1]["value"] == row[key]
+
+
+def test_options_multiply_as_in_the_commands(run: Run) -> None:
+    arguments = ("--period", "1ms", "--period", "600us", "--nodes", "3", "--gap-count", "optimal", "--timing", "both")
+    said = json.loads(run("explain", "paper-4ms", "required_us", *arguments, "--format", "json").stdout)
+    given = json.loads(run("capacity", "paper-4ms", *arguments, "--format", "json").stdout)
+    assert [one["value"] for one in said["derivations"]] == [row["required_us"] for row in given["results"]]
+    assert [one["period_us"] for one in said["derivations"]] == [1000.0, 1000.0, 600.0, 600.0]
+
+
+def test_without_a_figure_all_are_listed(run: Run) -> None:
+    done = run("explain", "paper-4ms")
+    assert done.returncode == 0
+    assert "circle-test  circular_deviation_mm" in done.stdout
+    registry = json.loads(run("explain", "paper-4ms", "--format", "json").stdout)
+    assert {"figures", "equations", "constants"} <= set(registry)
+    grades = {"published", "derived", "recalled", "measured", "calibrated", "assumed"}
+    assert {row["grade"] for row in registry["constants"]} <= grades
+    assert run("explain", "paper-4ms", "--format", "markdown").stdout.startswith("| command | figure |")
+
+
+def test_markdown_shows_a_hostile_name_and_does_nothing_with_it(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "hostile.toml").write_text(HOSTILE)
+    done = run("explain", "hostile.toml", "required_us", "--format", "markdown", cwd=tmp_path)
+    page = MarkdownIt("commonmark", {"html": True}).enable("table").render(done.stdout)
+    assert "<script>" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; | `x` @team</code>" in page
+    assert page.count("<table>") == 2
+    widths = {line.count("|") - line.count("\\|") for line in done.stdout.splitlines() if line.startswith("|")}
+    assert len(widths) == 2
+
+
+def test_a_circle_that_is_not_simulated_says_why(run: Run) -> None:
+    done = run("explain", "paper-1ms", "circular_deviation_mm", "--period", "200us")
+    assert done.returncode == 0
+    assert "not simulated: the cycle does not fit the bus" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("paper-4ms", "requird_us"), "did you mean required_us"),
+        (("paper-4ms", "required_us", "--period", "4"), "with its unit"),
+        (("no-such", "required_us"), "no such file"),
+        (("paper-4ms", "max_contour_error_mm", "--period", "1050us"), "multiple"),
+    ],
+)
+def test_what_cannot_be_explained_is_refused(refused: Refused, arguments: tuple[str, ...], said: str) -> None:
+    assert said in refused("explain", *arguments)
