@@ -1,4 +1,4 @@
-"""Write what the program prints today into the README: output blocks, the profile reference, the example profile.
+"""Write what the program prints today into the README: output blocks, references, the example profile.
 
     python tests/readme/refresh.py
 
@@ -50,6 +50,9 @@ def refreshed(readme: str) -> str:
     rows = "\n".join(dict.fromkeys(tests.reference(tests.Profile)))
     head = "| key | values | default | meaning |\n|---|---|---|---|\n"
     readme = re.sub(re.escape(head) + r"(?:\|.*\n)*", lambda _: f"{head}{rows}\n", readme)
+    for first, *others in tests.registry_tables():
+        text = "".join(f"{line}\n" for line in (first, *others))
+        readme = re.sub(re.escape(first) + r"\n(?:\|.*\n)*", lambda _, text=text: text, readme)
     example = (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
     first = re.compile(r"(`paper-4ms`, as it ships:\n\n```toml\n).*?(^```$)", re.MULTILINE | re.DOTALL)
     return first.sub(lambda match: f"{match[1]}{example}{match[2]}", readme)

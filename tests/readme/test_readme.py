@@ -13,14 +13,16 @@ import pytest
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from busplan import equations
 from busplan.analysis.capacity import CapacityFigures, capacity
 from busplan.analysis.circle_test import CircleFigures
 from busplan.analysis.latency import latency
+from busplan.analysis.trace import short
 from busplan.profile.machine import AxisOverride
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.report.documents import capacity_rows, latency_rows
+from busplan.report.explain import constant_rows, equation_rows
+from busplan.report.markdown import code, table
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -116,11 +118,25 @@ def test_the_example_profile_is_the_shipped_one() -> None:
     assert (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8") in blocks
 
 
-def test_equations_table_names_each_function_with_its_equation() -> None:
-    rows = re.findall(r"^\| \((\d+)\)[^|]*\| `(\w+)` \|", README, re.MULTILINE)
-    assert sorted({int(number) for number, _ in rows}) == list(range(1, 16))
-    for number, name in rows:
-        assert f"equation ({number})" in getattr(equations, name).__doc__.splitlines()[0]
+def registry_tables() -> Iterator[list[str]]:
+    """The README's tables of equations and constants, from the registry that `explain` shows."""
+    rows = equation_rows()
+    yield table(
+        list(rows[0]),
+        ([row["reference"], code(row["formula"]), code(row["function"]), row["source"]] for row in rows),
+        left=4,
+    )
+    constants = constant_rows()
+    cells = [
+        [code(row["name"]), short(row["value"]), *(row[key] for key in ("unit", "grade", "source", "meaning"))]
+        for row in constants
+    ]
+    yield table(list(constants[0]), cells, left=6)
+
+
+@pytest.mark.parametrize("lines", list(registry_tables()), ids=["equations", "constants"])
+def test_equations_and_constants_are_those_of_the_registry(lines: list[str]) -> None:
+    assert "".join(f"{line}\n" for line in lines) in README
 
 
 def test_every_json_key_is_listed() -> None:

@@ -234,7 +234,7 @@ def _steps(traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
         known = figure if one is traced else _known(one.key, command)
         yield Step(
             key=known.key,
-            symbol=one.symbol or known.symbol,
+            symbol=figure.symbol if one is traced else one.symbol,
             reference=known.reference,
             formula=written(one, in_numbers=False),
             numbers=written(one, in_numbers=True),

@@ -4,7 +4,10 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-_SPECIAL: Final = re.compile(r"([\\`*_{}\[\]()<>#+\-.!~&@:])")
+_INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:]|(?<=www)\.")
+"""Markup inside a line, and what makes a link or a mention of bare words."""
+_AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=])")
+"""What makes a list, a heading or a rule of the line that it begins."""
 
 BAR: Final = r"\|"
 """A bar inside a cell, also inside code: the table is taken apart before its cells are read."""
@@ -18,7 +21,7 @@ def escaped(text: str) -> str:
     >>> escaped("a *b*")
     'a \\*b\\*'
     """
-    return _SPECIAL.sub(r"\\\1", " ".join(text.split()))
+    return _AT_START.sub(r"\1\\\2", _INSIDE.sub(r"\\\g<0>", " ".join(text.split())))
 
 
 def code(text: str) -> str:
