@@ -76,38 +76,25 @@ class Link(NamedTuple):
 
 
 class Phases(NamedTuple):
-    """Every phase of one transaction, all times in us; the number of the equation behind each."""
+    """Every phase of one transaction [us]; the equation behind each stands in `busplan.analysis.quantities`."""
 
     request_bytes: float
     response_bytes: float
     arbitration_us: float
-    """ArbP of either packet, (4)."""
     request_data_us: float
-    """DTP of the request, (5)."""
     response_data_us: float
-    """DTP of the response, (5)."""
     request_us: float
-    """T_req, (7)."""
     response_us: float
-    """T_resp, (8)."""
     acknowledge_us: float
-    """T_ack1 = T_ack2, (6) and (9)."""
     execution_us: float
-    """T_exec, measured in the node."""
     latency_us: float
-    """T_lant, (3)."""
     request_and_acknowledge_us: float
-    """T1 + T2, (13)."""
     response_and_acknowledge_us: float
-    """T4 + T5, (14)."""
     subaction_gap_us: float
-    """First part of (10)."""
     arbitration_reset_gap_us: float
-    """Second part of (10)."""
     gaps_us: float
-    """T_sum, (10)."""
     latency_with_gaps_us: float
-    """T_lant + T_sum: what the transaction takes of the cycle, the bracket of (11)."""
+    """What the transaction takes of the cycle, T_lant + T_sum."""
 
 
 def _paper_packets(_kind: TransactionKind, payload_bytes: int, overhead_bytes: int) -> PacketSizes:

@@ -50,12 +50,14 @@ def refreshed(readme: str) -> str:
     rows = "\n".join(dict.fromkeys(tests.reference(tests.Profile)))
     head = "| key | values | default | meaning |\n|---|---|---|---|\n"
     readme = re.sub(re.escape(head) + r"(?:\|.*\n)*", lambda _: f"{head}{rows}\n", readme)
-    for first, *others in tests.registry_tables():
-        text = "".join(f"{line}\n" for line in (first, *others))
-        readme = re.sub(re.escape(first) + r"\n(?:\|.*\n)*", lambda _, text=text: text, readme)
+    for lines in tests.registry_tables():
+        new = "".join(f"{line}\n" for line in lines)
+        old = re.search(re.escape(lines[0]) + r"\n(?:\|.*\n)*", readme)
+        assert old is not None
+        readme = readme.replace(old[0], new)
     example = (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
     first = re.compile(r"(`paper-4ms`, as it ships:\n\n```toml\n).*?(^```$)", re.MULTILINE | re.DOTALL)
-    return first.sub(lambda match: f"{match[1]}{example}{match[2]}", readme)
+    return str(first.sub(lambda match: f"{match[1]}{example}{match[2]}", readme))
 
 
 if __name__ == "__main__":

@@ -63,7 +63,7 @@ class Cycle(NamedTuple):
 
 
 class CapacityFigures(NamedTuple):
-    """Capacity at one period under one timing model; the number of the equation behind each figure."""
+    """Capacity at one period under one timing model; what each figure is stands in `busplan.analysis.quantities`."""
 
     timing_model: TimingModelName
     period_us: float
@@ -72,23 +72,14 @@ class CapacityFigures(NamedTuple):
     hops: int
     gap_count: int
     safe_gap_count: int
-    """Smallest safe gap count for the hops."""
     gap_count_safe: bool
-    """Whether gap_count is at least that."""
     available_us: float
-    """alpha T_s."""
     required_us: float
-    """N times (2)."""
     time_slice_us: float
-    """(1)."""
     required_time_slice_us: float
-    """(2)."""
     read_latency_us: float
-    """(3)."""
     write_latency_us: float
-    """(3)."""
     gaps_us: float
-    """(10), after each transaction."""
     subaction_gap_us: float
     arbitration_reset_gap_us: float
     sync_us: float
@@ -99,23 +90,15 @@ class CapacityFigures(NamedTuple):
     cycle_execution_us: float
     cycle_gaps_us: float
     binding_term: Term
-    """The largest part of required_us."""
     utilisation: float
-    """required_us / available_us."""
     margin_us: float
-    """available_us - required_us."""
     nodes_eq11: float
-    """(11) as published, at the profile's own N."""
     max_nodes: int
     max_axes: int
     limited_by: Limit
-    """What keeps max_nodes from being larger."""
     min_period_us: float
-    """Smallest period that these nodes fit in."""
     min_slice_ratio: float
-    """Smallest slice ratio that these nodes fit with; above 1 there is none."""
     exceeded: tuple[Limit, ...]
-    """The limits that the profile breaks; empty when it fits."""
     fits: bool
 
 

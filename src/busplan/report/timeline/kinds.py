@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
+from busplan.analysis.quantities import FIGURES
 from busplan.analysis.schedule import Event, EventKind
 from busplan.timing import TransactionKind
 
@@ -22,18 +23,25 @@ class KindStyle(NamedTuple):
     """Its colour on black."""
 
 
+def _by(key: str) -> str:
+    """Where the time of a kind comes from, as the registry of figures says."""
+    return {**FIGURES["capacity"], **FIGURES["latency"]}[key].reference
+
+
 KINDS: Final[Mapping[EventKind, KindStyle]] = MappingProxyType(
     {
-        "sync": KindStyle("synchronous packet", "measured", "S", "#7c3aed", "#a78bfa"),
-        "arbitration": KindStyle("arbitration", "(4)", "a", "#e08a00", "#f5b041"),
-        "request_data": KindStyle("request data", "(5)", ">", "#1d6fd8", "#5aa9ff"),
-        "acknowledge": KindStyle("acknowledge", "(6) (9)", "k", "#c8327c", "#ff7fb5"),
-        "execution": KindStyle("execution", "measured", "=", "#5aa845", "#6fbf5a"),
-        "response_data": KindStyle("response data", "(5)", "<", "#0a8f94", "#38c6c4"),
-        "subaction_gap": KindStyle("subaction gap", "(10)", ".", "#b4bcc6", "#6b7685"),
-        "arbitration_reset_gap": KindStyle("arbitration reset gap", "(10)", ":", "#8792a0", "#4d5765"),
-        "nonperiodic": KindStyle("non-periodic window", "profile", "N", "#9a5b2e", "#d39a6a"),
-        "idle": KindStyle("idle", "(1) (2)", "~", "#e6eaef", "#252d38"),
+        "sync": KindStyle("synchronous packet", _by("sync_us"), "S", "#7c3aed", "#a78bfa"),
+        "arbitration": KindStyle("arbitration", _by("arbitration_us"), "a", "#e08a00", "#f5b041"),
+        "request_data": KindStyle("request data", _by("request_data_us"), ">", "#1d6fd8", "#5aa9ff"),
+        "acknowledge": KindStyle("acknowledge", _by("acknowledge_us"), "k", "#c8327c", "#ff7fb5"),
+        "execution": KindStyle("execution", _by("execution_us"), "=", "#5aa845", "#6fbf5a"),
+        "response_data": KindStyle("response data", _by("response_data_us"), "<", "#0a8f94", "#38c6c4"),
+        "subaction_gap": KindStyle("subaction gap", _by("subaction_gap_us"), ".", "#b4bcc6", "#6b7685"),
+        "arbitration_reset_gap": KindStyle(
+            "arbitration reset gap", _by("arbitration_reset_gap_us"), ":", "#8792a0", "#4d5765"
+        ),
+        "nonperiodic": KindStyle("non-periodic window", _by("nonperiodic_us"), "N", "#9a5b2e", "#d39a6a"),
+        "idle": KindStyle("idle", _by("margin_us"), "~", "#e6eaef", "#252d38"),
     }
 )
 """Every kind of event, in the order of the protocol."""
