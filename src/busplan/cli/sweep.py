@@ -11,8 +11,8 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from busplan.analysis.grid import Grid
 
-SweepFormat = Literal["table", "csv", "jsonl", "npz"]
-_ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".jsonl": "jsonl", ".npz": "npz"}
+SweepFormat = Literal["table", "csv", "json", "jsonl", "npz"]
+_ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".npz": "npz"}
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "max_axes"
 
@@ -35,8 +35,9 @@ def sweep_command(
         SweepFormat | None,
         typer.Option(
             "--format",
-            help="Form of the document: a table of the top rows, or every row as csv, jsonl (a JSON object a line, the "
-            "first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the ending of -o, else table]",
+            help="Form of the document: a table of the top rows, or every row as csv, json (one document), jsonl (a "
+            "JSON object a line, the first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the "
+            "ending of -o, else table]",
             show_default=False,
         ),
     ] = None,
@@ -102,7 +103,7 @@ def sweep_command(
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
     points take seconds, and writing them as text some minutes. Ctrl-C keeps the rows so far in FILE.partial.csv (or
-    .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
+    .json, .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
 
     Example: busplan sweep paper-4ms --vary bus.nodes=1:16 --vary cycle.period_us=250,500,1000 --sort max_axes
     """
