@@ -166,20 +166,13 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
             raise BusplanError(f"{option}: goes with {needed}")
 
 
-def _known(grid: "Grid", *, circle: bool) -> tuple[str, ...]:
-    """All columns of a sweep."""
-    from busplan.analysis.sweep import FIGURES
-    from busplan.analysis.sweep_circle import CIRCLE_FIGURES
-
-    return (*grid.axes, *FIGURES, *(CIRCLE_FIGURES if circle else ()))
-
-
 def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
     """Refuse a column that is not there or not in numbers, where only a number will do."""
     from busplan.analysis.sweep import WORD_FIGURES
+    from busplan.analysis.sweep_circle import all_columns
 
     words = {*WORD_FIGURES, *(key for key, axis in grid.axes.items() if axis.has_words)}
-    numbers = [name for name in _known(grid, circle=circle) if name not in words]
+    numbers = [name for name in all_columns(grid, with_circle=circle) if name not in words]
     for option, name in asked.items():
         if name is not None and name not in numbers:
             raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
@@ -187,7 +180,9 @@ def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool)
 
 def _columns(asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str) -> tuple[str, ...]:
     """Columns to write: the varied keys and timing_model, then those asked for, or all, or a table's main ones."""
-    known = _known(grid, circle=circle)
+    from busplan.analysis.sweep_circle import all_columns
+
+    known = all_columns(grid, with_circle=circle)
     front = (*grid.axes, "timing_model")
     if asked is not None:
         chosen = tuple(name.strip() for name in asked.split(","))
