@@ -75,6 +75,21 @@ def listed(values: Iterable[object], *, name: str) -> Listed:
     return Listed(tuple(found))
 
 
+def stepped(values: range, *, name: str) -> Steps:
+    """Take a range of whole numbers.
+
+    Raises
+    ------
+    BusplanError
+        None of them, or numbers that are too large.
+    """
+    if not values:
+        raise BusplanError(f"{name}: no values; give at least one")
+    if max(abs(values[0]), abs(values[-1])) >= _EXACT:
+        raise BusplanError(f"{name}: numbers of {_EXACT:,} and more are too large")
+    return Steps(values.start, values.step, 1, len(values))
+
+
 def _is_value(value: object) -> TypeGuard[int | float | str]:
     if isinstance(value, float):
         return isfinite(value)
