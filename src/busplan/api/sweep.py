@@ -23,7 +23,7 @@ from busplan.report.text import csv_cell
 from busplan.timing import TimingModelName
 
 MOST_POINTS: Final = 2_000_000
-"""Points that are kept in memory: about a gigabyte. The command line writes any number of them in flat memory."""
+"""Points that are kept in memory: about half a gigabyte. The command line writes any number of them in flat memory."""
 _SHOWN: Final = 20
 """Rows of the report."""
 
