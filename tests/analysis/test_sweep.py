@@ -141,6 +141,7 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
         ({"node.execution.time_us": Listed((1,))}, "--vary node.execution.time_us: is a list"),
         ({"bus.nodes": Listed((1, 0))}, "bus.nodes 0: must be 1 or more"),
         ({"bus.nodes": Listed((1, 2.5))}, "bus.nodes 2.5: expected a whole number"),
+        ({"bus.nodes": Listed((*range(1, 200), 2.5))}, "bus.nodes 2.5: expected a whole number"),
         ({"bus.gap_count": Steps(0, 1, 1, 200)}, "bus.gap_count 199: expected a whole number from 0 to 63"),
         ({"payload.read_bytes": Steps(4, 1, 1, 5000)}, "payload.read_bytes 5003: is outside the execution table"),
         ({"bus.speed": Listed((1,))}, "bus.speed 1: expected"),

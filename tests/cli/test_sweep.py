@@ -38,12 +38,14 @@ def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(tmp_path: 
 
 def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_rows(tmp_path: Path) -> None:
     grid = ["--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3"]
-    for name in ("rows.csv", "rows.jsonl", "rows.npz"):
+    for name in ("rows.csv", "rows.json", "rows.jsonl", "rows.npz"):
         run = busplan("sweep", "paper-4ms", *grid, "-o", name, cwd=tmp_path)
         assert (run.returncode, run.stdout) == (0, "")
         assert run.stderr.endswith(f"wrote {name}\n")
     header, *lines = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
     assert (header["schema"], header["command"], header["rows"]) == (1, "sweep", len(lines))
+    document = json.loads((tmp_path / "rows.json").read_text())
+    assert document == {**header, "rows": lines, "complete": True}
     rows = list(csv.DictReader((tmp_path / "rows.csv").read_text().splitlines()))
     with np.load(tmp_path / "rows.npz") as archive:
         assert archive["complete"]
@@ -57,7 +59,7 @@ def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_row
                 assert (found if isinstance(value, (int, float)) and name != "bus.gap_count" else str(found)) == (
                     " ".join(value) if isinstance(value, list) else str(value) if name == "bus.gap_count" else value
                 )
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.csv", "rows.jsonl", "rows.npz"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.csv", "rows.json", "rows.jsonl", "rows.npz"]
 
 
 def test_the_table_shows_the_top_rows_and_how_many_fit(tmp_path: Path) -> None:
@@ -74,7 +76,7 @@ def test_the_table_shows_the_top_rows_and_how_many_fit(tmp_path: Path) -> None:
     assert [line.split()[0] for line in lines[-2:]] == ["16", "15"]
 
 
-@pytest.mark.parametrize("name", ["rows.csv", "rows.jsonl", "rows.npz"])
+@pytest.mark.parametrize("name", ["rows.csv", "rows.json", "rows.jsonl", "rows.npz"])
 def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("old", encoding="utf-8")
     with subprocess.Popen(
@@ -104,7 +106,11 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
         return
     text = (tmp_path / partial).read_text(encoding="utf-8")
     assert text.endswith("\n")
-    if name.endswith("jsonl"):
+    if name.endswith("json"):
+        document = json.loads(text)
+        assert not document["complete"]
+        assert 0 < len(document["rows"]) < document["points"] * len(document["timing_models"])
+    elif name.endswith("jsonl"):
         rows = [json.loads(line) for line in text.splitlines()]
         assert len(rows) - 1 < rows[0]["rows"]
     else:

@@ -550,6 +550,9 @@ def test_a_change_that_changes_nothing_gives_an_equal_profile() -> None:
         pytest.param({"bus.nodes": 0}, {"bus.nodes": "--nodes"}, ["--nodes 0: must be 1 or more"], id="option"),
         pytest.param({"bus.nodes": 0}, None, ["bus.nodes 0: must be 1 or more"], id="key"),
         pytest.param(
+            {"bus.nodes.x.y": 0}, None, ["bus.nodes.x.y: no such key; nodes is a value, not a section"], id="no section"
+        ),
+        pytest.param(
             {"bus.nodes": 0, "bus.gap_count": "best"},
             {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"},
             ['--gap-count best: expected a whole number from 0 to 63, or "optimal"', "--nodes 0: must be 1 or more"],

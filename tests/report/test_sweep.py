@@ -14,7 +14,7 @@ from busplan.profile.model import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report import documents, text
-from busplan.report.sweep.rows import block_text, csv_header, jsonl_header
+from busplan.report.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
 from busplan.report.sweep.top import Tally, TopRows
 from busplan.timing import TimingModelName
 
@@ -69,6 +69,29 @@ def test_jsonl_begins_with_what_a_reader_must_know() -> None:
     header = json.loads(jsonl_header(profile.name, checked_grid(profile, AXES, with_circle=False), BOTH))
     assert (header["schema"], header["command"], header["profile"]) == (1, "sweep", "paper-4ms")
     assert (header["points"], header["rows"], header["varied"]["bus.gap_count"]) == (18, 36, 2)
+
+
+@pytest.mark.parametrize("chunk_points", [1, 5, 100])
+@pytest.mark.parametrize("complete", [True, False])
+def test_the_json_document_holds_the_rows_of_json_lines(chunk_points: int, complete: bool) -> None:
+    profile, columns = load("paper-4ms").profile, (*AXES, *FIGURES)
+    grid, parts = checked_grid(profile, AXES, with_circle=False), blocks(chunk_points)
+    # A sweep that was stopped has written some of its blocks.
+    written = parts if complete else parts[:1]
+    rows = "".join(json_rows(block, columns) for block in written)
+    document = json.loads(json_header(profile.name, grid, BOTH) + rows + json_footer(complete=complete))
+    lines = "".join(block_text(block, columns, style="jsonl") for block in written).splitlines()
+    assert document.pop("rows") == [json.loads(line) for line in lines]
+    assert document.pop("complete") is complete
+    header = json.loads(jsonl_header(profile.name, grid, BOTH))
+    assert header.pop("rows") == 36
+    assert document == header
+
+
+def test_a_json_document_without_rows_is_one() -> None:
+    profile = load("paper-4ms").profile
+    grid = checked_grid(profile, AXES, with_circle=False)
+    assert json.loads(json_header(profile.name, grid, BOTH) + json_footer(complete=False))["rows"] == []
 
 
 def test_what_does_not_exist_is_null_and_empty() -> None:

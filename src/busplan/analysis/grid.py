@@ -171,7 +171,14 @@ class Grid(NamedTuple):
         return Chunk(start, shape, values)
 
 
-def checked_grid(profile: Profile, axes: Mapping[str, Values], *, with_circle: bool) -> Grid:
+def checked_grid(
+    profile: Profile,
+    axes: Mapping[str, Values],
+    *,
+    with_circle: bool,
+    option: str = "--vary",
+    circle_option: str = "--circle",
+) -> Grid:
     """Make a grid after asking the profile about its values.
 
     Parameters
@@ -182,6 +189,8 @@ def checked_grid(profile: Profile, axes: Mapping[str, Values], *, with_circle: b
         Values by dotted key.
     with_circle
         Whether a circle test is to be run: without one, keys that only it reads are refused.
+    option, circle_option
+        What messages call the values, and the way to ask for a circle test.
 
     Raises
     ------
@@ -189,12 +198,12 @@ def checked_grid(profile: Profile, axes: Mapping[str, Values], *, with_circle: b
         A key that is not known, that is no number, or that nothing here reads; a value the profile's schema refuses.
     """
     for key in axes:
-        _require_known(profile, key)
+        _require_known(profile, key, name=f"{option} {key}")
     samples = {key: _samples(axis) for key, axis in axes.items()}
     first: dict[str, object] = {key: values[0] for key, values in samples.items()}
     override(profile, first)
     for key in axes:
-        _require_read(key, with_circle=with_circle)
+        _require_read(key, name=f"{option} {key}", circle_option=None if with_circle else circle_option)
     for key, values in samples.items():
         for value in values[1:]:
             override(profile, {**first, key: value})
@@ -203,38 +212,40 @@ def checked_grid(profile: Profile, axes: Mapping[str, Values], *, with_circle: b
         override(profile, {key: end(values) for key, values in samples.items()})
     grid = Grid(dict(axes))
     if grid.points > MAX_POINTS:
-        raise BusplanError(f"--vary: {grid.points:,} points are more than the {MAX_POINTS:,} a sweep takes; vary less")
+        raise BusplanError(
+            f"{option}: {grid.points:,} points are more than the {MAX_POINTS:,} a sweep takes; vary less"
+        )
     return grid
 
 
-def _require_known(profile: Profile, key: str) -> None:
+def _require_known(profile: Profile, key: str, *, name: str) -> None:
     """Refuse a key that is not there, or that is a section or a list; of the rest the profile itself tells."""
     *tables, last = key.split(".")
     table: Any = profile.model_dump()
-    for name in tables:
-        table = table.get(name) if isinstance(table, dict) else None
+    for part in tables:
+        table = table.get(part) if isinstance(table, dict) else None
     if not isinstance(table, dict) or last not in table:
         section = ".".join(tables)
         siblings = list(table) if isinstance(table, dict) and tables else []
-        close = [f"{section}.{name}" for name in get_close_matches(last, siblings, n=1, cutoff=0.7)]
+        close = [f"{section}.{one}" for one in get_close_matches(last, siblings, n=1, cutoff=0.7)]
         close = close or get_close_matches(key, CAPACITY_KEYS, n=1, cutoff=0.8) * (not siblings)
         known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(CAPACITY_KEYS)}"
         hint = f"did you mean {close[0]}?" if close else known
-        raise BusplanError(f"--vary {key}: no such key of this profile; {hint}")
+        raise BusplanError(f"{name}: no such key of this profile; {hint}")
     if isinstance(table[last], dict | list | tuple):
         what = "section" if isinstance(table[last], dict) else "list"
-        raise BusplanError(f"--vary {key}: is a {what}; expected the key of one number")
+        raise BusplanError(f"{name}: is a {what}; expected the key of one number")
 
 
-def _require_read(key: str, *, with_circle: bool) -> None:
-    """Refuse a key that nothing of what is computed depends on."""
+def _require_read(key: str, *, name: str, circle_option: str | None) -> None:
+    """Refuse a key that nothing of what is computed depends on; without an option to ask for, a circle test is."""
     if key in CAPACITY_KEYS:
         return
     section = key.partition(".")[0]
     if section not in CIRCLE_SECTIONS:
-        raise BusplanError(f"--vary {key}: no figure of capacity depends on it")
-    if not with_circle:
-        raise BusplanError(f"--vary {key}: no figure of capacity depends on it; add --circle to run circle tests")
+        raise BusplanError(f"{name}: no figure of capacity depends on it")
+    if circle_option is not None:
+        raise BusplanError(f"{name}: no figure of capacity depends on it; add {circle_option} to run circle tests")
 
 
 def _samples(axis: Values) -> list[Any]:
@@ -243,7 +254,10 @@ def _samples(axis: Values) -> list[Any]:
         if axis.size <= _CHECKED_EACH:
             return list(dict.fromkeys(axis.values))
         numbers = [one for one in axis.values if not isinstance(one, str)]
-        return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *(set(axis.values) - set(numbers))))]
+        # One fraction among whole numbers may be none of the extremes.
+        fractions = [one for one in numbers if isinstance(one, float)][:1]
+        words = set(axis.values) - set(numbers)
+        return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *fractions, *words))]
     chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, axis.size - 1)
     return [axis.part(index, index + 1).item() for index in chosen]
 

@@ -151,6 +151,11 @@ def plan(
     )
 
 
+def nodes_for_axes(profile: Profile, axes: int) -> int:
+    """Nodes that so many axes need, at the profile's axes of each."""
+    return -(-axes // profile.node.axes)
+
+
 def _differing(profile: Profile, changes: Changes) -> Changes:
     """The changes that a profile does not hold already."""
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}

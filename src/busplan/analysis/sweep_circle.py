@@ -8,7 +8,7 @@ import numpy as np
 from busplan.analysis.capacity import figures
 from busplan.analysis.circle_test import bus, circle_test, loop_timing, setup
 from busplan.analysis.grid import Grid
-from busplan.analysis.sweep import Block, Column
+from busplan.analysis.sweep import FIGURES, Block, Column
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
@@ -27,6 +27,11 @@ MAX_CIRCLES: Final = 1000
 """Circle tests that are run without being asked twice: minutes with numba, an hour without."""
 
 Figures = tuple[float | bool | None, ...]
+
+
+def all_columns(grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
+    """All columns of a sweep: the varied keys, the figures of `capacity`, and those of circle tests."""
+    return (*grid.axes, *FIGURES, *(CIRCLE_FIGURES if with_circle else ()))
 
 
 class CircleTask(NamedTuple):

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from busplan.profile.collect import Source
-    from busplan.rules.baseline import Recorded
     from busplan.rules.gate import FileResult
     from busplan.rules.report import CheckReport
 
@@ -74,11 +73,12 @@ def check_command(
     if update_baseline and baseline is None:
         raise BusplanError("--update-baseline: needs --baseline FILE")
     from busplan.profile.collect import collect
+    from busplan.rules.gate import check_source
 
     collection = collect(paths, stdin_name=stdin_filename)
     recorded = _read_baseline(baseline, needed=not update_baseline)
     one = partial(
-        _check_source, recorded=None if update_baseline else recorded, with_circle=circle, record=update_baseline
+        check_source, recorded=None if update_baseline else recorded, with_circle=circle, record=update_baseline
     )
     report = _check(collection.sources, one, jobs=jobs)
     _write(report, format_=format_, output=output)
@@ -89,7 +89,9 @@ def check_command(
     if update_baseline and baseline is not None:
         _update_baseline(baseline, recorded or {}, report, quiet=quiet)
     if not quiet:
-        say(_summary(report))
+        from busplan.report.gate.plain import summary_line
+
+        say(summary_line(report))
     if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
@@ -112,25 +114,6 @@ def _check(sources: "Sequence[Source]", one: "Callable[[Source], FileResult]", *
         results = pool.map(one, others, chunksize=max(1, len(others) // (4 * workers)))
         found = own | dict(zip(others, results, strict=True))
     return CheckReport(tuple(found[source] for source in sources))
-
-
-def _check_source(source: "Source", *, recorded: Recordings | None, with_circle: bool, record: bool) -> "FileResult":
-    from busplan.errors import PlacedError
-    from busplan.profile.toml import decode, read_bytes
-    from busplan.rules.gate import FileResult, check_document, unreadable
-
-    if source.failure is not None:
-        return FileResult(source.name, None, (), {}, failure=source.failure)
-    try:
-        content = read_bytes(source.path, name=source.name)
-    except BusplanError as error:
-        return FileResult(source.name, None, (), {}, failure=str(error))
-    try:
-        document = decode(content, name=source.name)
-    except PlacedError as error:
-        return unreadable(source.name, error, content)
-    before: Recorded | None = None if recorded is None else recorded.get(source.name, {})
-    return check_document(document, with_circle=with_circle, baseline=before, record=record)
 
 
 def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
@@ -173,11 +156,3 @@ def _write(
     if format_ == "github":
         # GitHub shows ten annotations of a kind a step: the log has them all.
         say(*render(report, file_format="text").splitlines())
-
-
-def _summary(report: "CheckReport") -> str:
-    counts = report.summary
-    failed = sum(file.failure is not None for file in report.files)
-    words = (("profile", counts.files - failed), ("error", counts.errors), ("warning", counts.warnings))
-    profiles, errors, warnings = (f"{number} {word}{'s' * (number != 1)}" for word, number in words)
-    return f"checked {profiles}: {errors}, {warnings}{f'; {failed} could not be checked' if failed else ''}"

@@ -151,11 +151,12 @@ def _wanted(
     profile: "Profile", *, nodes: int | None, axes: int | None, period: str | None, gap_count: str | None
 ) -> "dict[str, Value]":
     """What the options ask for by dotted key, checked."""
+    from busplan.analysis.plan import nodes_for_axes
     from busplan.profile.toml import override
 
     origin = dict(BUS_OPTIONS)
     if axes is not None:
-        nodes = -(-axes // profile.node.axes)
+        nodes = nodes_for_axes(profile, axes)
         origin["bus.nodes"] = f"--axes {axes}, nodes"
     wanted = bus_changes(nodes=nodes, gap_count=gap_count)
     override(profile, wanted, origin=origin)

@@ -11,8 +11,8 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from busplan.analysis.grid import Grid
 
-SweepFormat = Literal["table", "csv", "jsonl", "npz"]
-_ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".jsonl": "jsonl", ".npz": "npz"}
+SweepFormat = Literal["table", "csv", "json", "jsonl", "npz"]
+_ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".npz": "npz"}
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "max_axes"
 
@@ -35,8 +35,9 @@ def sweep_command(
         SweepFormat | None,
         typer.Option(
             "--format",
-            help="Form of the document: a table of the top rows, or every row as csv, jsonl (a JSON object a line, the "
-            "first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the ending of -o, else table]",
+            help="Form of the document: a table of the top rows, or every row as csv, json (one document), jsonl (a "
+            "JSON object a line, the first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the "
+            "ending of -o, else table]",
             show_default=False,
         ),
     ] = None,
@@ -102,7 +103,7 @@ def sweep_command(
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
     points take seconds, and writing them as text some minutes. Ctrl-C keeps the rows so far in FILE.partial.csv (or
-    .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
+    .json, .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
 
     Example: busplan sweep paper-4ms --vary bus.nodes=1:16 --vary cycle.period_us=250,500,1000 --sort max_axes
     """
@@ -165,20 +166,13 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
             raise BusplanError(f"{option}: goes with {needed}")
 
 
-def _known(grid: "Grid", *, circle: bool) -> tuple[str, ...]:
-    """All columns of a sweep."""
-    from busplan.analysis.sweep import FIGURES
-    from busplan.analysis.sweep_circle import CIRCLE_FIGURES
-
-    return (*grid.axes, *FIGURES, *(CIRCLE_FIGURES if circle else ()))
-
-
 def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
     """Refuse a column that is not there or not in numbers, where only a number will do."""
     from busplan.analysis.sweep import WORD_FIGURES
+    from busplan.analysis.sweep_circle import all_columns
 
     words = {*WORD_FIGURES, *(key for key, axis in grid.axes.items() if axis.has_words)}
-    numbers = [name for name in _known(grid, circle=circle) if name not in words]
+    numbers = [name for name in all_columns(grid, with_circle=circle) if name not in words]
     for option, name in asked.items():
         if name is not None and name not in numbers:
             raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
@@ -186,7 +180,9 @@ def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool)
 
 def _columns(asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str) -> tuple[str, ...]:
     """Columns to write: the varied keys and timing_model, then those asked for, or all, or a table's main ones."""
-    known = _known(grid, circle=circle)
+    from busplan.analysis.sweep_circle import all_columns
+
+    known = all_columns(grid, with_circle=circle)
     front = (*grid.axes, "timing_model")
     if asked is not None:
         chosen = tuple(name.strip() for name in asked.split(","))

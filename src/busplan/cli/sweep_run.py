@@ -134,7 +134,7 @@ def _blocks(job: SweepJob) -> "Iterator[Iterable[Block]]":
     from busplan.report.sweep.rows import TEXT_POINTS
 
     if job.jobs is None:
-        chunk_points = TEXT_POINTS if job.format_ in {"csv", "jsonl"} else CHUNK_POINTS
+        chunk_points = TEXT_POINTS if job.format_ in {"csv", "jsonl", "json"} else CHUNK_POINTS
         yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=chunk_points)
         return
     from busplan.analysis.sweep_circle import with_circles
@@ -177,7 +177,8 @@ def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> Iterator[_Sin
         with NpzColumns(job.columns, folder=Path(os.path.realpath(job.output)).parent) as columns:
             yield _NpzSink(job, file, columns)
     else:
-        yield _TextSink(job, emit_text if file is None else lambda text: _write(file, text))
+        sink = _JsonSink if job.format_ == "json" else _TextSink
+        yield sink(job, emit_text if file is None else lambda text: _write(file, text))
 
 
 def _write(file: BinaryIO, text: str) -> None:
@@ -204,7 +205,7 @@ class _TableSink:
 
 
 class _TextSink:
-    """Writes every row as it comes."""
+    """Writes every row as it comes, and each ends itself."""
 
     def __init__(self, job: SweepJob, write: Callable[[str], None]) -> None:
         from busplan.report.sweep.rows import csv_header, jsonl_header
@@ -222,7 +223,29 @@ class _TextSink:
         self._write(block_text(block, self._job.columns, style="csv" if self._job.format_ == "csv" else "jsonl"))
 
     def finish(self, *, complete: bool) -> None:
-        """Nothing: each row ends itself."""
+        """Nothing is left to write."""
+
+
+class _JsonSink:
+    """Writes one document, row by row."""
+
+    def __init__(self, job: SweepJob, write: Callable[[str], None]) -> None:
+        from busplan.report.sweep.rows import json_header
+
+        self._columns, self._write = job.columns, write
+        write(json_header(job.profile.name, job.grid, job.timing_models))
+
+    def add(self, block: "Block") -> None:
+        """Write one more block."""
+        from busplan.report.sweep.rows import json_rows
+
+        self._write(json_rows(block, self._columns))
+
+    def finish(self, *, complete: bool) -> None:
+        """Close the document; one that is not whole says so, and is still JSON."""
+        from busplan.report.sweep.rows import json_footer
+
+        self._write(json_footer(complete=complete))
 
 
 class _NpzSink:

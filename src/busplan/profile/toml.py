@@ -135,6 +135,8 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
         table = data
         for name in tables:
             table = table.setdefault(name, {})
+            if not isinstance(table, dict):
+                raise BusplanError(f"{key}: no such key; {name} is a value, not a section")
         table[last] = value
     try:
         return Profile.model_validate(data)

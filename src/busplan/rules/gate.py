@@ -1,11 +1,12 @@
 """The gate itself: one document in, its findings out."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
-from busplan.errors import PlacedError
+from busplan.errors import BusplanError, PlacedError
+from busplan.profile.collect import Source
 from busplan.profile.document import Document
-from busplan.profile.toml import LoadedProfile, validate
+from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.rules import bus, circle
 from busplan.rules.baseline import Recorded, figures_of, regressions
 from busplan.rules.file import BY_KIND
@@ -37,6 +38,40 @@ class FileResult(NamedTuple):
         if self.failure is not None:
             return "error"
         return "findings" if self.findings else "ok"
+
+
+def check_source(
+    source: Source,
+    *,
+    with_circle: bool = True,
+    recorded: Mapping[str, Recorded] | None = None,
+    record: bool = False,
+) -> FileResult:
+    """Read one file and check it against all rules.
+
+    Parameters
+    ----------
+    source
+        The file; one that cannot be read or followed is a result too.
+    with_circle
+        Whether to run the circle test of profiles that ask for one.
+    recorded
+        What no profile may lose, by the name of its file; nothing without it.
+    record
+        Whether to give the figures that a baseline records.
+    """
+    if source.failure is not None:
+        return FileResult(source.name, None, (), {}, failure=source.failure)
+    try:
+        content = read_bytes(source.path, name=source.name)
+    except BusplanError as error:
+        return FileResult(source.name, None, (), {}, failure=str(error))
+    try:
+        document = decode(content, name=source.name)
+    except PlacedError as error:
+        return unreadable(source.name, error, content)
+    before = None if recorded is None else recorded.get(source.name, {})
+    return check_document(document, with_circle=with_circle, baseline=before, record=record)
 
 
 def check_document(

@@ -21,6 +21,15 @@ def finding_line(path: str, finding: Finding) -> str:
     return printable(f"{path}:{finding.line}:{finding.column}: {finding.code} {finding.message}")
 
 
+def summary_line(report: CheckReport) -> str:
+    """Say how many profiles were checked, and what was found."""
+    counts = report.summary
+    failed = sum(file.failure is not None for file in report.files)
+    words = (("profile", counts.files - failed), ("error", counts.errors), ("warning", counts.warnings))
+    profiles, errors, warnings = (f"{number} {word}{'s' * (number != 1)}" for word, number in words)
+    return f"checked {profiles}: {errors}, {warnings}{f'; {failed} could not be checked' if failed else ''}"
+
+
 def as_text(report: CheckReport) -> str:
     """One line a finding."""
     return "".join(f"{finding_line(one.path, one.finding)}\n" for one in report.located)

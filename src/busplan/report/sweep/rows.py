@@ -1,4 +1,4 @@
-"""Rows of a sweep as CSV and JSON lines, a block at a time.
+"""Rows of a sweep as CSV, JSON lines and one JSON document, a block at a time.
 
 A value is written once for all the rows that share it: that, and one join a row, is what makes millions of rows quick.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from busplan.analysis.grid import Array, Grid
 from busplan.analysis.sweep import Block, Column
-from busplan.report.documents import document
+from busplan.report.documents import Document, document
 from busplan.report.text import csv_cell
 
 Style = Literal["csv", "jsonl"]
@@ -27,16 +27,36 @@ def csv_header(columns: Sequence[str]) -> str:
 
 def jsonl_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
     """First line of a sweep's JSON lines: what the rows are, and how many make it whole."""
-    points = grid.points
-    facts = document(
+    facts = {**_facts(profile, grid, timing_models), "rows": grid.points * len(timing_models)}
+    return json.dumps(facts, ensure_ascii=False) + "\n"
+
+
+def json_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
+    """Beginning of a sweep's JSON document, up to its first row."""
+    facts = json.dumps(_facts(profile, grid, timing_models), ensure_ascii=False)
+    return facts.removesuffix("}") + ', "rows": [\n'
+
+
+def json_rows(block: Block, columns: Sequence[str]) -> str:
+    """Write a block's rows for the JSON document, a line each: the lines of JSON lines, with commas between."""
+    rows = block_text(block, columns, style="jsonl").removesuffix("\n").replace("\n", ",\n")
+    return rows if block.chunk.start == 0 else ",\n" + rows
+
+
+def json_footer(*, complete: bool) -> str:
+    """End of a sweep's JSON document: it is valid JSON even where the sweep was stopped, and says so."""
+    return f'\n], "complete": {json.dumps(complete)}}}\n'
+
+
+def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> Document:
+    """What every JSON form of a sweep begins with."""
+    return document(
         "sweep",
         profile=profile,
         varied={key: axis.size for key, axis in grid.axes.items()},
         timing_models=list(timing_models),
-        points=points,
-        rows=points * len(timing_models),
+        points=grid.points,
     )
-    return json.dumps(facts, ensure_ascii=False) + "\n"
 
 
 def block_text(block: Block, columns: Sequence[str], *, style: Style) -> str:

@@ -1,0 +1,100 @@
+"""`busplan.capacity`."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from busplan.analysis import capacity as analysis
+from busplan.analysis.capacity import Capacity, CapacityFigures
+from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.verdict import Verdict, verdicts
+from busplan.api.answer import Answer
+from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
+from busplan.profile.model import Profile
+from busplan.report import documents
+from busplan.report.capacity import capacity_lines
+from busplan.report.lines import Line
+from busplan.report.text import to_json
+from busplan.timing import TimingModelName
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CapacityAnswer(Answer):
+    """Answer of `capacity`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    periods
+        Figures of each period, a set for each timing model.
+    verdicts
+        What to act on, one for each period.
+    """
+
+    profile: Profile
+    periods: tuple[tuple[CapacityFigures, ...], ...]
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def results(self) -> tuple[CapacityFigures, ...]:
+        """All sets of figures in one row: a period after the other, a timing model after the other within each."""
+        return self._found.results
+
+    def to_json(self) -> str:
+        """Write the document of `busplan capacity --format json`."""
+        return to_json(documents.capacity_document(self._found, self.verdicts))
+
+    def _report(self) -> list[Line]:
+        return capacity_lines(self._found, self.verdicts)
+
+    @property
+    def _found(self) -> Capacity:
+        return Capacity(self.profile, self.periods)
+
+
+def capacity(
+    profile: ProfileLike,
+    *,
+    periods_us: Iterable[float] | None = None,
+    timing_models: Iterable[TimingModelName] = BOTH_MODELS,
+) -> CapacityAnswer:
+    """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    periods_us
+        Communication periods T_s [us], shape (n,); without them the profile's own.
+    timing_models
+        "paper" for the paper's equations as published, "standard" for the standard's clock and packets, in this order.
+
+    Returns
+    -------
+    CapacityAnswer
+        Its `results` have n entries for each timing model, its `verdicts` n. Times are in us, shares are 0..1.
+
+    Raises
+    ------
+    BusplanError
+        No profile, a period that a profile cannot have, or another timing model.
+
+    References
+    ----------
+    Paper, equations (1), (2), (11).
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.capacity("paper-1ms", periods_us=[600])
+    >>> [(one.timing_model, one.fits, one.max_axes) for one in answer.results]
+    [('paper', True, 8), ('standard', False, 4)]
+    >>> answer.verdicts[0].change.changes
+    {'bus.gap_count': 7}
+    """
+    found = analysis.capacity(
+        load_profile(profile),
+        periods_us=None if periods_us is None else items(periods_us, name="periods_us"),
+        timing_models=checked_models(timing_models),
+    )
+    return CapacityAnswer(*found, verdicts=verdicts(found))

@@ -1,0 +1,94 @@
+"""`busplan.check`."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from busplan.api.answer import Answer
+from busplan.api.inputs import Path, argument
+from busplan.errors import BusplanError
+from busplan.profile.collect import collect
+from busplan.report.gate import render
+from busplan.report.gate.plain import summary_line
+from busplan.report.lines import Line
+from busplan.rules.gate import FileResult, check_source
+from busplan.rules.report import CheckReport, Located, Summary
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CheckAnswer(Answer):
+    """Answer of `check`.
+
+    Parameters
+    ----------
+    files
+        Each file with its `status`, its `findings` and, where it could not be checked, the `failure`.
+    """
+
+    files: tuple[FileResult, ...]
+
+    @property
+    def findings(self) -> tuple[Located, ...]:
+        """All findings in the order of files and places, each with the `path` and the line of its file."""
+        return self._found.located
+
+    @property
+    def summary(self) -> Summary:
+        """Number of files, errors and warnings."""
+        return self._found.summary
+
+    @property
+    def passed(self) -> bool:
+        """Whether every file could be checked, and none has an error."""
+        return not self._found.failed and not self._found.has_findings("error")
+
+    def to_json(self) -> str:
+        """Write the document of `busplan check --format json`."""
+        return render(self._found, file_format="json")
+
+    def _report(self) -> list[Line]:
+        text = render(self._found, file_format="text")
+        failures = [file.failure for file in self.files if file.failure is not None]
+        return [Line(line) for line in (*text.splitlines(), *failures, self._headline())]
+
+    def _headline(self) -> str:
+        return summary_line(self._found)
+
+    @property
+    def _found(self) -> CheckReport:
+        return CheckReport(self.files)
+
+
+def check(paths: Path | Iterable[Path], *, with_circle: bool = True) -> CheckAnswer:
+    """Find what of some profiles no longer fits its bus or its circle.
+
+    Parameters
+    ----------
+    paths
+        Files, folders (every *.toml below that claims a `schema_version`) and shipped names; one, or several.
+    with_circle
+        Run the circle test of profiles that ask for one.
+
+    Returns
+    -------
+    CheckAnswer
+        Findings with code, message, key, line and column. A file that cannot be read is no error here: its `failure`
+        says why, and the others are checked.
+
+    Raises
+    ------
+    BusplanError
+        No path at all, or standard input.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.check(["paper-4ms", "paper-dma"])
+    >>> answer.passed, answer.summary
+    (True, Summary(files=2, errors=0, warnings=0))
+    """
+    several = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    if not several:
+        raise BusplanError("paths: none; give files, folders or shipped names")
+    sources = collect([argument(path) for path in several]).sources
+    return CheckAnswer(tuple(check_source(source, with_circle=with_circle) for source in sources))

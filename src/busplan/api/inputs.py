@@ -1,0 +1,114 @@
+"""What callers give: a profile in any of its forms, and values as lists, ranges or NumPy arrays."""
+
+import os
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from busplan.analysis.latency import BOTH_MODELS
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.sections import MAX_COUNT
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.timing import TimingModelName
+
+Path = str | os.PathLike[str]
+"""A text may also be the name of a shipped profile; a path object is always a path."""
+ProfileLike = Profile | Path
+
+
+def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None = None) -> Profile:
+    """Read and check a profile, and change values of it.
+
+    Parameters
+    ----------
+    profile
+        A path, the name of a shipped profile, or a `Profile`, which is taken as it is. A text that is a shipped name
+        means the shipped profile; "./paper-4ms" and path objects are always files.
+    changes
+        New values by dotted key, in the key's unit: {"bus.nodes": 3, "cycle.period_us": 500}. They are checked like a
+        file; the file stays as it is.
+
+    Returns
+    -------
+    Profile
+        Frozen, with a typed attribute for every key: `profile.cycle.period_us` [us].
+
+    Raises
+    ------
+    BusplanError
+        Not there, not readable, no TOML or no profile, with the place of every problem; or a change that the profile's
+        schema refuses.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> busplan.load_profile("paper-4ms").cycle.period_us
+    4000.0
+    >>> busplan.load_profile("paper-4ms", changes={"bus.nodes": 3, "bus.gap_count": "optimal"}).bus.nodes
+    3
+    """
+    found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
+    return override(found, {key: plain(value) for key, value in (changes or {}).items()})
+
+
+def argument(path: Path) -> str:
+    """What a path would be on the command line.
+
+    Raises
+    ------
+    BusplanError
+        Standard input, which is the command line's.
+    """
+    if path == "-":
+        raise BusplanError("-: standard input is read by the command line alone; give a file or a shipped profile")
+    return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib has none that keeps links
+
+
+def plain(value: Any) -> Any:
+    """A number of NumPy as Python's own, and an array as a list; all else as it is."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def items(values: Iterable[Any], *, name: str) -> list[Any]:
+    """Values one by one, each plain.
+
+    Raises
+    ------
+    BusplanError
+        A single value, or none.
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise BusplanError(f"{name} {values!r}: expected several values, as a list")
+    found = [plain(value) for value in values]
+    if not found:
+        raise BusplanError(f"{name}: no values; give at least one")
+    return found
+
+
+def checked_models(timing_models: Iterable[TimingModelName]) -> tuple[TimingModelName, ...]:
+    """Timing models, each once.
+
+    Raises
+    ------
+    BusplanError
+        Others, or one twice.
+    """
+    found = items(timing_models, name="timing_models")
+    if sorted(map(str, found)) not in (["paper"], ["standard"], sorted(BOTH_MODELS)):
+        raise BusplanError(f"timing_models {found!r}: expected 'paper', 'standard' or both, in a list")
+    return tuple(found)
+
+
+def whole(value: object, *, name: str) -> int:
+    """A whole number above zero.
+
+    Raises
+    ------
+    BusplanError
+        Anything else, or more than a profile may have of anything.
+    """
+    found = plain(value)
+    if type(found) is not int or not 1 <= found <= MAX_COUNT:
+        raise BusplanError(f"{name} {found!r}: expected a whole number from 1 to {MAX_COUNT:,}")
+    return found

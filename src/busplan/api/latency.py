@@ -1,0 +1,93 @@
+"""`busplan.latency`."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from busplan.analysis import latency as analysis
+from busplan.analysis.latency import BOTH_MODELS, Transaction
+from busplan.api.answer import Answer
+from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
+from busplan.profile.model import Profile
+from busplan.report import documents
+from busplan.report.latency import latency_lines
+from busplan.report.lines import Line, plural
+from busplan.report.text import to_json
+from busplan.timing import TimingModelName
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class LatencyAnswer(Answer):
+    """Answer of `latency`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    transactions
+        One for each payload, kind and timing model, in this nesting, each taken apart in its `phases`.
+    """
+
+    profile: Profile
+    transactions: tuple[Transaction, ...]
+
+    def to_json(self) -> str:
+        """Write the document of `busplan latency --format json`."""
+        return to_json(documents.latency_document(self._found))
+
+    def _report(self) -> list[Line]:
+        return latency_lines(self._found, self.profile)
+
+    def _headline(self) -> str:
+        return f"{self.profile.name}: {plural(len(self.transactions), 'transaction')} of the farthest node"
+
+    @property
+    def _found(self) -> analysis.LatencyResult:
+        return analysis.LatencyResult(self.profile.name, self.transactions)
+
+
+def latency(
+    profile: ProfileLike,
+    *,
+    payloads_bytes: Iterable[int] | None = None,
+    timing_models: Iterable[TimingModelName] = BOTH_MODELS,
+) -> LatencyAnswer:
+    """Show every phase of one read and one write of the farthest node.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    payloads_bytes
+        Payloads of both read and write [bytes], shape (n,); without them the profile's own of each.
+    timing_models
+        "paper" for the paper's equations as published, "standard" for the standard's clock and packets, in this order.
+
+    Returns
+    -------
+    LatencyAnswer
+        Its `transactions` have 2 n entries for each timing model; times are in us.
+
+    Raises
+    ------
+    BusplanError
+        No profile, a payload that is none or whose execution time is not known, or another timing model.
+
+    References
+    ----------
+    Paper, equations (3)-(10), (12)-(14).
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.latency("paper-two-node", payloads_bytes=[4, 1024], timing_models=["paper"])
+    >>> [(one.transaction, one.payload_bytes, round(one.phases.latency_us, 2)) for one in answer.transactions]
+    [('read', 4, 43.07), ('write', 4, 43.07), ('read', 1024, 453.07), ('write', 1024, 453.07)]
+    """
+    network = load_profile(profile)
+    sizes = None if payloads_bytes is None else items(payloads_bytes, name="payloads_bytes")
+    found = analysis.latency(
+        network,
+        payloads_bytes=sizes and [whole(size, name="payloads_bytes") for size in sizes],
+        timing_models=checked_models(timing_models),
+    )
+    return LatencyAnswer(network, found.transactions)

@@ -1,0 +1,199 @@
+"""`busplan.sweep`."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from busplan.analysis import sweep as analysis
+from busplan.analysis.grid import Array, Grid, Values, checked_grid
+from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.sweep import Block, Column
+from busplan.analysis.sweep_circle import MAX_CIRCLES, all_columns, require_circles, run_task, with_circles
+from busplan.analysis.values import listed, parse_values, stepped
+from busplan.api.answer import Answer
+from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.report.lines import Line
+from busplan.report.sweep.rows import json_footer, json_header, json_rows
+from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
+from busplan.report.text import csv_cell
+from busplan.timing import TimingModelName
+
+MOST_POINTS: Final = 2_000_000
+"""Points that are kept in memory: about half a gigabyte. The command line writes any number of them in flat memory."""
+_SHOWN: Final = 20
+"""Rows of the report."""
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class SweepAnswer(Answer):
+    """Answer of `sweep`: a table with a row for each point and timing model, in the order of the grid.
+
+    `answer["max_axes"]` is a column as an array of shape (rows,), made anew with each call: numbers as numbers, words
+    as text, NaN what does not exist. Iterating gives the columns' names, `len(answer)` the rows.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    grid
+        Which keys go through which values.
+    timing_models
+        The timing models, in the order of the rows of a point.
+    columns
+        Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests.
+    blocks
+        The figures as they were computed.
+    """
+
+    profile: Profile
+    grid: Grid
+    timing_models: tuple[TimingModelName, ...]
+    columns: tuple[str, ...]
+    blocks: tuple[Block, ...]
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.columns:
+            raise KeyError(f"no column {name!r}; there are {', '.join(self.columns)}")
+        return np.concatenate([_rows(block, name) for block in self.blocks])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return self.grid.points * len(self.timing_models)
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of all columns, so that `dict(answer)` is a table."""
+        return self.columns
+
+    def to_json(self) -> str:
+        """Write the document of `busplan sweep --format json`."""
+        header = json_header(self.profile.name, self.grid, self.timing_models)
+        rows = "".join(json_rows(block, self.columns) for block in self.blocks)
+        return header + rows + json_footer(complete=True)
+
+    def _report(self) -> list[Line]:
+        circle = [name for name in CIRCLE_COLUMNS if name in self.columns]
+        shown = dict.fromkeys((*self.grid.axes, "timing_model", *DEFAULT_COLUMNS, *circle))
+        top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
+        for block in self.blocks:
+            top.add(block)
+        return top.lines(self._tally, self.profile.name, expected=self.grid.points)
+
+    def _headline(self) -> str:
+        return self._tally.lines(self.profile.name, expected=self.grid.points)[0].text
+
+    @property
+    def _tally(self) -> Tally:
+        tally = Tally(self.timing_models)
+        for block in self.blocks:
+            tally.add(block)
+        return tally
+
+
+def _rows(block: Block, name: str) -> Array:
+    """One column of a block, words spelled out."""
+    parts = [np.broadcast_to(_spelled(column), block.chunk.shape).ravel() for column in block.columns(name)]
+    return np.stack(parts, axis=1).ravel()
+
+
+def _spelled(column: Column) -> Array:
+    if column.words is None:
+        return column.values
+    words: Array = np.array([str(csv_cell(word)) for word in column.words])
+    return words[column.values]
+
+
+def sweep(
+    profile: ProfileLike,
+    *,
+    vary: Mapping[str, str | Iterable[Any]],
+    timing_models: Iterable[TimingModelName] = BOTH_MODELS,
+    with_circle: bool = False,
+    force: bool = False,
+) -> SweepAnswer:
+    """Compute capacity over a grid: any keys of the profile, every combination.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    vary
+        Values by dotted key, in the key's unit: a list, range or array of shape (n,), or the command line's text as
+        "250:8000:250". "bus.gap_count" also takes "optimal". The last key changes fastest.
+    timing_models
+        "paper" for the paper's equations as published, "standard" for the standard's clock and packets, in this order.
+    with_circle
+        Also run the circle test of every point, one after the other, and add its columns (errors in mm, margins).
+    force
+        Run more circle tests than are sane without being asked twice.
+
+    Returns
+    -------
+    SweepAnswer
+        Columns by name, each an array of shape (points times timing models,), a point after the other and a timing
+        model after the other within each.
+
+    Raises
+    ------
+    BusplanError
+        No profile, a key or value that it cannot have, a point without a circle test, or more points than are kept in
+        memory.
+
+    References
+    ----------
+    Paper, equations (1)-(11).
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [500, 1000, 4000]}, timing_models=["standard"])
+    >>> answer["max_axes"]
+    array([ 4, 12, 44])
+    >>> answer["limited_by"].tolist(), len(answer)
+    (['time', 'time', 'time'], 3)
+    """
+    network, models = load_profile(profile), checked_models(timing_models)
+    if not vary:
+        raise BusplanError('vary: nothing to vary; give a key and its values, as {"bus.nodes": range(1, 17)}')
+    grid = checked_grid(
+        network,
+        {key: _values(key, given) for key, given in vary.items()},
+        with_circle=with_circle,
+        option="vary",
+        circle_option="with_circle=True",
+    )
+    if grid.points > MOST_POINTS:
+        raise BusplanError(
+            f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
+            "write them with busplan sweep -o FILE.npz"
+        )
+    blocks = analysis.sweep(network, grid, timing_models=models)
+    if with_circle:
+        _require_circles(network, grid, force=force)
+        blocks = (with_circles(network, block, timing_models=models, run=_run_here) for block in blocks)
+    return SweepAnswer(network, grid, models, all_columns(grid, with_circle=with_circle), tuple(blocks))
+
+
+def _values(key: str, given: str | Iterable[Any]) -> Values:
+    if isinstance(given, str):
+        return parse_values(given, name=f"vary {key}={given}")
+    name = f"vary {key}"
+    return stepped(given, name=name) if isinstance(given, range) else listed(items(given, name=name), name=name)
+
+
+def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:
+    if grid.points > MAX_CIRCLES and not force:
+        raise BusplanError(
+            f"with_circle: {grid.points:,} points are more circle tests than the {MAX_CIRCLES:,} that are run without "
+            "force=True; vary less, or give it"
+        )
+    require_circles(profile, grid)
+
+
+def _run_here(tasks: Iterable[Any]) -> Iterable[Any]:
+    return map(run_task, tasks)

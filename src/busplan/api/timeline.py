@@ -1,0 +1,109 @@
+"""`busplan.timeline`."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from busplan.analysis.capacity import CapacityFigures
+from busplan.analysis.schedule import Event, Schedule, Total, schedule, totals, zoom
+from busplan.api.answer import Answer
+from busplan.api.inputs import ProfileLike, checked_models, load_profile
+from busplan.profile.model import Profile
+from busplan.report.lines import Line
+from busplan.report.text import to_json
+from busplan.report.timeline.documents import timeline_document
+from busplan.report.timeline.terminal import timeline_lines
+from busplan.timing import TimingModelName, TransactionKind
+
+_COLUMNS: Final = 80
+"""Width of the drawing."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class TimelineAnswer(Answer):
+    """Answer of `timeline`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    figures
+        Capacity of the cycle: what it needs, what it may take, and whether it fits.
+    cycle_events
+        Every event of the cycle, and what is left of its slice.
+    from_us, to_us
+        Start and end of the window [us].
+    """
+
+    profile: Profile
+    figures: CapacityFigures
+    cycle_events: tuple[Event, ...]
+    from_us: float
+    to_us: float
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Events inside the window, cut off at its edges."""
+        return self._found.events
+
+    @property
+    def totals(self) -> tuple[Total, ...]:
+        """What the events of the window add up to, by kind."""
+        return totals(self._found)
+
+    def to_json(self) -> str:
+        """Write the document of `busplan timeline --format json`."""
+        return to_json(timeline_document(self._found))
+
+    def _report(self) -> list[Line]:
+        return timeline_lines(self._found, width=_COLUMNS)
+
+    @property
+    def _found(self) -> Schedule:
+        return Schedule(self.profile, self.figures, self.cycle_events, self.from_us, self.to_us)
+
+
+def timeline(
+    profile: ProfileLike,
+    *,
+    timing_model: TimingModelName | None = None,
+    from_us: float | None = None,
+    to_us: float | None = None,
+    transaction: tuple[TransactionKind, int] | None = None,
+) -> TimelineAnswer:
+    """Show one communication cycle as events, node by node.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    timing_model
+        "paper" or "standard"; without it the profile's own, which decides.
+    from_us, to_us
+        Start and end of the window, counted from the start of the cycle [us]; without them the cycle's own.
+    transaction
+        One transaction of one node with its gaps, as ("read", 1).
+
+    Returns
+    -------
+    TimelineAnswer
+        Its `events` touch each other; times are in us.
+
+    Raises
+    ------
+    BusplanError
+        No profile, more nodes than can be laid out, another timing model, or a window with nothing in it.
+
+    References
+    ----------
+    Paper, section III-C and equation (2), Figs. 4, 5 and 7.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.timeline("paper-4ms", transaction=("read", 1))
+    >>> [(one.kind, round(one.duration_us, 3)) for one in answer.events][:3]
+    [('arbitration', 2.388), ('request_data', 0.768), ('acknowledge', 0.367)]
+    """
+    model = None if timing_model is None else checked_models([timing_model])[0]
+    whole = schedule(load_profile(profile), model=model)
+    return TimelineAnswer(*zoom(whole, from_us=from_us, to_us=to_us, transaction=transaction))

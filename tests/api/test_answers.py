@@ -1,0 +1,89 @@
+"""What every answer can do: it is frozen, shows itself, and can be pickled."""
+
+import pickle
+from collections.abc import Callable
+
+import pytest
+
+import busplan
+from busplan.api.answer import Answer
+
+ANSWERS: dict[str, Callable[[busplan.Profile], Answer]] = {
+    "latency": busplan.latency,
+    "capacity": busplan.capacity,
+    "circle_test": busplan.circle_test,
+    "plan": busplan.plan,
+    "timeline": busplan.timeline,
+    "check": lambda _profile: busplan.check("paper-1ms"),
+    "sweep": lambda profile: busplan.sweep(profile, vary={"bus.gap_count": [63, "optimal"], "bus.nodes": "1:3"}),
+}
+
+
+@pytest.fixture(scope="module", params=ANSWERS)
+def answer(request: pytest.FixtureRequest) -> Answer:
+    return ANSWERS[request.param](busplan.load_profile("paper-1ms"))
+
+
+def test_nothing_of_an_answer_can_be_set(answer: Answer) -> None:
+    names = [name for name in dir(answer) if not name.startswith("_")]
+    assert {"to_dict", "to_json"} < set(names)
+    for name in [*names, "new"]:
+        with pytest.raises((AttributeError, TypeError)):
+            setattr(answer, name, None)
+    with pytest.raises((AttributeError, TypeError)):
+        del answer.to_dict
+
+
+def test_a_changed_document_changes_no_answer(answer: Answer) -> None:
+    before = answer.to_json()
+    document = answer.to_dict()
+    for value in document.values():
+        if isinstance(value, list | dict):
+            value.clear()
+    assert answer.to_json() == before
+    assert answer.to_dict() != document
+
+
+def test_an_answer_can_be_pickled(answer: Answer) -> None:
+    copy = pickle.loads(pickle.dumps(answer))
+    assert (type(copy), copy.to_json(), str(copy)) == (type(answer), answer.to_json(), str(answer))
+
+
+def test_records_are_frozen() -> None:
+    found = busplan.capacity("paper-4ms")
+    with pytest.raises(AttributeError):
+        found.results[0].max_axes = 99  # type: ignore[misc]
+    with pytest.raises(ValueError, match="frozen"):
+        found.profile.bus.nodes = 99  # type: ignore[misc]
+
+
+def test_the_same_question_has_the_same_answer() -> None:
+    assert busplan.capacity("paper-4ms") == busplan.capacity("paper-4ms")
+    assert busplan.capacity("paper-4ms") != busplan.capacity("paper-1ms")
+
+
+HEADLINES = {
+    "latency": "<LatencyAnswer: paper-1ms: 4 transactions of the farthest node>",
+    "capacity": "<CapacityAnswer: paper-1ms at 1 ms: fits, 294.083 us to spare, 41.2% of 500.000 us used (paper model; "
+    "standard agrees).>",
+    "circle_test": "<CircleTestAnswer: paper-1ms at 1 ms and 10000 mm/min: the circle holds every tolerance.>",
+    "plan": "<PlanAnswer: paper-1ms with 2 nodes (8 axes) at 1 ms: nothing to change; it fits both timing models with "
+    "179.601 us to spare in the tighter one and passes the circle.>",
+    "timeline": "<TimelineAnswer: paper-1ms at 1 ms: fits, 294.083 us to spare, 41.2% of 500.000 us used (paper "
+    "model).>",
+    "check": "<CheckAnswer: checked 1 profile: 0 errors, 0 warnings>",
+    "sweep": "<SweepAnswer: paper-1ms: 6 points; 6 by the paper model and 6 by the standard model fit.>",
+}
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_it_shows_its_verdict(name: str) -> None:
+    assert repr(ANSWERS[name](busplan.load_profile("paper-1ms"))) == HEADLINES[name]
+
+
+def test_a_notebook_shows_the_report_and_no_name_is_markup() -> None:
+    found = busplan.capacity(busplan.load_profile("paper-4ms", changes={"name": "<b>&x"}))
+    shown = found._repr_html_()
+    assert shown.startswith("<pre>&lt;b&gt;&amp;x at 4 ms: fits")
+    assert shown.count("<") == 2
+    assert "most axes" in shown

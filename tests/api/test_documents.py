@@ -1,0 +1,87 @@
+"""Each answer's document is the one that the command writes, as a process, with `--format json`."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import busplan
+from busplan.api.answer import Answer
+from busplan.profile.shipped import shipped_names
+
+EVERY: dict[str, Callable[[str], Answer]] = {
+    "latency": busplan.latency,
+    "capacity": busplan.capacity,
+    "circle-test": busplan.circle_test,
+    "plan": busplan.plan,
+    "timeline": busplan.timeline,
+    "check": busplan.check,
+    "sweep --vary bus.nodes=1:4 --vary bus.gap_count=63,optimal": lambda profile: busplan.sweep(
+        profile, vary={"bus.nodes": range(1, 5), "bus.gap_count": [63, "optimal"]}
+    ),
+}
+OPTIONS: dict[str, Callable[[], Answer]] = {
+    "latency paper-4ms --payload 4,16 --timing standard": lambda: busplan.latency(
+        "paper-4ms", payloads_bytes=[4, 16], timing_models=["standard"]
+    ),
+    "latency paper-4ms --nodes 5 --gap-count optimal": lambda: busplan.latency(
+        busplan.load_profile("paper-4ms", changes={"bus.nodes": 5, "bus.gap_count": "optimal"})
+    ),
+    "capacity paper-1ms --period 600us --period 0.25ms --timing paper": lambda: busplan.capacity(
+        "paper-1ms", periods_us=[600, 250], timing_models=["paper"]
+    ),
+    "circle-test paper-4ms --period 4ms --period 100us --contributions": lambda: busplan.circle_test(
+        "paper-4ms", periods_us=[4000, 100], with_contributions=True
+    ),
+    "circle-test paper-1ms --feed 10000 --radius 20": lambda: busplan.circle_test(
+        busplan.load_profile("paper-1ms", changes={"circle.feed_mm_per_min": 10000.0, "circle.radius_mm": 20.0})
+    ),
+    "plan paper-1ms --axes 15 --no-circle": lambda: busplan.plan("paper-1ms", axes=15, with_circle=False),
+    "plan paper-1ms --nodes 6 --period 500us --gap-count 63 --max-circles 2": lambda: busplan.plan(
+        "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
+    ),
+    "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
+        "paper-1ms", timing_model="standard", from_us=50, to_us=100
+    ),
+    "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
+    "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], with_circle=False),
+    "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing paper": lambda: busplan.sweep(
+        "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_models=["paper"]
+    ),
+    "sweep paper-4ms --vary circle.radius_mm=10,20 --vary cycle.period_us=200,4000 --circle": lambda: busplan.sweep(
+        "paper-4ms", vary={"circle.radius_mm": [10, 20], "cycle.period_us": [200.0, 4000.0]}, with_circle=True
+    ),
+}
+
+
+def printed(line: str) -> Any:
+    done = subprocess.run(
+        [sys.executable, "-m", "busplan", *line.split(), "--format", "json"], capture_output=True, check=False
+    )
+    assert done.stdout, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("command", EVERY)
+def test_of_every_shipped_profile(command: str, name: str) -> None:
+    first, *rest = command.split(" ", 1)
+    assert EVERY[command](name).to_dict() == printed(" ".join((first, name, *rest)))
+
+
+@pytest.mark.parametrize("line", OPTIONS)
+def test_with_the_options_of_the_command(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert OPTIONS[line]().to_dict() == printed(line)
+
+
+@pytest.mark.parametrize("name", ["latency", "capacity", "plan", "timeline"])
+def test_the_text_is_what_the_command_prints(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+    answer = EVERY[name]("paper-1ms")
+    done = subprocess.run([sys.executable, "-m", "busplan", name, "paper-1ms"], capture_output=True, check=True)
+    assert f"{answer}\n" == done.stdout.decode()
+    assert capfd.readouterr() == ("", "")

@@ -1,0 +1,92 @@
+"""`import busplan`: what it loads and when, and what names it has."""
+
+import pkgutil
+import subprocess
+import sys
+from importlib import import_module
+
+import pytest
+
+import busplan
+
+HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "numba", "scipy", "tomllib", "tomli_w", "json"}
+FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check")
+
+
+def loaded(program: str) -> set[str]:
+    """Modules that a fresh interpreter has after a program."""
+    code = f"import sys\n{program}\nprint('\\n', *sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_the_package_alone_loads_nothing() -> None:
+    found = loaded("import busplan; busplan.__version__; dir(busplan)")
+    assert not found & HEAVY
+    assert {name for name in found if name.startswith("busplan")} == {"busplan"}
+
+
+def test_an_error_or_a_type_loads_no_analysis() -> None:
+    assert {name for name in loaded("import busplan; busplan.BusplanError") if name.startswith("busplan")} == {
+        "busplan",
+        "busplan.errors",
+    }
+    assert not loaded("import busplan; busplan.Profile") & {"numpy", "busplan.analysis", "busplan.report"}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_a_name_loads_what_it_needs(name: str) -> None:
+    found = loaded(f"import busplan; busplan.{name}")
+    assert not found & {"typer", "rich", "matplotlib", "busplan.cli"}
+    assert ("numpy" in found) == (name in {"circle_test", "sweep"})
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "latency('paper-4ms').to_dict()",
+        "capacity('paper-4ms').to_dict()",
+        "timeline('paper-4ms').to_dict()",
+        "plan('paper-4ms', with_circle=False).to_dict()",
+        "check('paper-4ms', with_circle=False).to_dict()",
+    ],
+)
+def test_what_simulates_nothing_loads_no_numpy(call: str) -> None:
+    assert not loaded(f"import busplan; str(busplan.{call})") & {"numpy", "typer", "rich", "matplotlib"}
+
+
+def test_the_command_line_does_not_load_the_interface() -> None:
+    program = "sys.argv = ['busplan', 'capacity', 'paper-4ms']\nfrom busplan.__main__ import main\n"
+    found = loaded(f"{program}try:\n    main()\nexcept SystemExit:\n    pass")
+    assert "busplan.cli.capacity" in found
+    assert not {name for name in found if name.startswith("busplan.api")}
+
+
+def test_all_names_are_there_and_listed() -> None:
+    assert set(busplan.__all__) <= set(dir(busplan))
+    for name in busplan.__all__:
+        assert getattr(busplan, name) is getattr(busplan, name)
+    for name in FUNCTIONS:
+        function = getattr(busplan, name)
+        assert (function.__name__, function.__module__.startswith("busplan.api.")) == (name, True)
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'busplan' has no attribute 'nope'"):
+        _ = busplan.nope  # type: ignore[attr-defined]
+    with pytest.raises(ImportError):
+        from busplan import nope  # type: ignore[attr-defined] # noqa: F401, PLC0415
+
+
+def test_functions_stay_functions_whatever_submodules_are_loaded() -> None:
+    names = [name for _, name, _ in pkgutil.walk_packages(busplan.__path__, "busplan.") if "__main__" not in name]
+    # A submodule of that name would take its place as soon as it is imported.
+    assert not {name.removeprefix("busplan.") for name in names} & set(busplan.__all__)
+    for name in names:
+        import_module(name)
+    assert all(callable(getattr(busplan, name)) for name in FUNCTIONS)
+
+
+def test_a_star_import_gives_every_name() -> None:
+    program = "from busplan import *\nprint(' ', capacity('paper-4ms').results[0].max_axes, file=sys.stderr)"
+    assert "numpy" in loaded(program)

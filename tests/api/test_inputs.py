@@ -1,0 +1,158 @@
+"""What callers may give, and what they are told of what they may not."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.profile.shipped import load, shipped_folder
+
+TEXT = (shipped_folder() / "paper-4ms.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A profile of one's own in the working folder, with the name of a shipped one."""
+    monkeypatch.chdir(tmp_path)
+    path = Path("paper-4ms")
+    path.write_text(TEXT.replace("nodes = 2", "nodes = 5"), encoding="utf-8")
+    return path
+
+
+def test_a_shipped_name_is_the_shipped_profile_and_a_path_the_file(own: Path) -> None:
+    assert busplan.load_profile("paper-4ms") == load("paper-4ms").profile
+    for path in (own, own.absolute(), "./paper-4ms", str(own.absolute())):
+        assert busplan.load_profile(path).bus.nodes == 5
+        assert busplan.capacity(path).results[0].nodes == 5
+    (file,) = busplan.check(own, with_circle=False).files
+    assert (file.path, file.status) == ("paper-4ms", "ok")
+
+
+def test_a_profile_is_taken_as_it_is() -> None:
+    profile = load("paper-4ms").profile
+    assert busplan.load_profile(profile) is profile
+    assert busplan.capacity(profile).profile is profile
+
+
+def test_changes_are_checked_and_numbers_of_numpy_are_numbers() -> None:
+    changes = {"bus.nodes": np.int64(3), "cycle.period_us": np.float64(500), "servo.x.drive_lag_us": 7.0}
+    profile = busplan.load_profile("paper-4ms", changes=changes)
+    assert (profile.bus.nodes, profile.cycle.period_us) == (3, 500.0)
+    assert type(profile.bus.nodes) is int
+    assert busplan.load_profile(profile, changes={"bus.nodes": 4}).cycle.period_us == 500.0
+    assert profile.bus.nodes == 3
+
+
+def test_arrays_ranges_and_lists_are_the_same_values() -> None:
+    wanted = busplan.capacity("paper-4ms", periods_us=[500.0, 750.0, 1000.0])
+    for periods in (range(500, 1001, 250), np.arange(500, 1001, 250), np.linspace(500, 1000, 3), (500, 750, 1000)):
+        assert busplan.capacity("paper-4ms", periods_us=periods).to_json() == wanted.to_json()
+    sizes = busplan.latency("paper-4ms", payloads_bytes=np.array([4, 16]))
+    assert sizes == busplan.latency("paper-4ms", payloads_bytes=[4, 16])
+
+
+REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
+    "no file": (lambda: busplan.capacity("nope"), "nope: no such file, and no shipped profile of that name"),
+    "no file at a path": (lambda: busplan.capacity(Path("nope.toml")), "nope.toml: no such file"),
+    "a folder": (lambda: busplan.load_profile(Path()), "is a directory"),
+    "standard input": (lambda: busplan.load_profile("-"), "-: standard input is read by the command line alone"),
+    "standard input to check": (lambda: busplan.check(["-"]), "-: standard input is read by the command line alone"),
+    "a change of no key": (
+        lambda: busplan.load_profile("paper-4ms", changes={"bus.nods": 3}),
+        "bus.nods 3: unknown key; did you mean nodes?",
+    ),
+    "a change below a value": (
+        lambda: busplan.load_profile("paper-4ms", changes={"bus.nodes.x": 3}),
+        "bus.nodes.x: no such key; nodes is a value, not a section",
+    ),
+    "a change out of range": (
+        lambda: busplan.load_profile("paper-4ms", changes={"bus.nodes": 0}),
+        "bus.nodes 0: must be 1 or more",
+    ),
+    "one period": (lambda: busplan.capacity("paper-4ms", periods_us=500), "periods_us 500: expected several values"),  # type: ignore[arg-type]
+    "a period in words": (
+        lambda: busplan.circle_test("paper-4ms", periods_us="4ms"),  # type: ignore[arg-type]
+        "periods_us '4ms': expected several values, as a list",
+    ),
+    "no period": (lambda: busplan.capacity("paper-4ms", periods_us=[]), "periods_us: no values; give at least one"),
+    "a period that is none": (lambda: busplan.capacity("paper-4ms", periods_us=[0]), "period 0: must be 0.001 or more"),
+    "a period without end": (lambda: busplan.capacity("paper-4ms", periods_us=[np.inf]), "period inf: must be finite"),
+    "no model": (lambda: busplan.capacity("paper-4ms", timing_models=[]), "timing_models: no values"),
+    "one model as a word": (
+        lambda: busplan.capacity("paper-4ms", timing_models="paper"),  # type: ignore[arg-type]
+        "timing_models 'paper': expected several values, as a list",
+    ),
+    "another model": (
+        lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, timing_models=["both"]),  # type: ignore[list-item]
+        "timing_models ['both']: expected 'paper', 'standard' or both, in a list",
+    ),
+    "a model twice": (
+        lambda: busplan.latency("paper-4ms", timing_models=["paper", "paper"]),
+        "timing_models ['paper', 'paper']: expected 'paper', 'standard' or both, in a list",
+    ),
+    "another model of a timeline": (
+        lambda: busplan.timeline("paper-4ms", timing_model="both"),  # type: ignore[arg-type]
+        "timing_models ['both']: expected 'paper', 'standard' or both, in a list",
+    ),
+    "no payload": (
+        lambda: busplan.latency("paper-4ms", payloads_bytes=[0]),
+        "payloads_bytes 0: expected a whole number from 1 to 1,000,000",
+    ),
+    "half a payload": (
+        lambda: busplan.latency("paper-4ms", payloads_bytes=[4.5]),  # type: ignore[list-item]
+        "payloads_bytes 4.5: expected a whole number from 1 to 1,000,000",
+    ),
+    "a payload beyond the table": (
+        lambda: busplan.latency("paper-4ms", payloads_bytes=[100_000]),
+        "payload 100000 bytes: outside the execution table",
+    ),
+    "nodes and axes": (lambda: busplan.plan("paper-4ms", nodes=2, axes=8), "nodes 2 and axes 8: give one of them"),
+    "no axes": (lambda: busplan.plan("paper-4ms", axes=0), "axes 0: expected a whole number from 1"),
+    "no nodes": (lambda: busplan.plan("paper-4ms", nodes=0), "bus.nodes 0: must be 1 or more"),
+    "no circles": (lambda: busplan.plan("paper-4ms", max_circles=0), "max_circles 0: expected a whole number from 1"),
+    "a window of nothing": (
+        lambda: busplan.timeline("paper-4ms", from_us=50, to_us=20),
+        "the window from 50 us to 20 us shows nothing: the cycle runs from 0 to 2000 us",
+    ),
+    "a transaction that is none": (
+        lambda: busplan.timeline("paper-4ms", transaction=("read", 9)),
+        "read:9: no such transaction in this cycle",
+    ),
+    "no paths": (lambda: busplan.check([]), "paths: none; give files, folders or shipped names"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_wrong_is_a_busplan_error_and_nothing_is_printed(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    call, message = REFUSED[case]
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        call()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_broken_profile_is_an_error_with_its_places_and_a_finding_of_check(own: Path) -> None:
+    own.write_text(TEXT.replace("nodes = 2", "nodes = 0"), encoding="utf-8")
+    with pytest.raises(busplan.BusplanError, match=r"paper-4ms:[0-9]+:1: bus\.nodes = 0: must be 1 or more"):
+        busplan.load_profile(own)
+    answer = busplan.check([own, "paper-1ms"], with_circle=False)
+    (found,) = answer.findings
+    assert (found.path, found.finding.code, found.finding.key) == ("paper-4ms", "BP005", "bus.nodes")
+    assert (answer.passed, answer.summary.errors, repr(answer)) == (
+        False,
+        1,
+        "<CheckAnswer: checked 2 profiles: 1 error, 0 warnings>",
+    )
+
+
+def test_a_warning_passes_and_a_file_that_is_not_there_does_not(own: Path) -> None:
+    own.write_text(TEXT.replace("period_us = 4000", "period_us = 600"), encoding="utf-8")
+    answer = busplan.check(own, with_circle=False)
+    assert (answer.passed, [one.finding.code for one in answer.findings]) == (True, ["BP102"])
+    assert busplan.check("nowhere.toml").passed is False

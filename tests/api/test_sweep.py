@@ -1,0 +1,136 @@
+"""A sweep as columns: the rows of the document, as arrays."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.analysis.sweep import FIGURES
+from busplan.api.sweep import MOST_POINTS
+
+GRID: Mapping[str, Any] = {
+    "bus.gap_count": [63, "optimal"],
+    "cycle.period_us": np.linspace(100, 400, 4),
+    "bus.nodes": (1, 3),
+}
+
+
+@pytest.mark.parametrize("models", [["paper", "standard"], ["standard"], ["standard", "paper"]])
+def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
+    answer = busplan.sweep("paper-4ms", vary=GRID, timing_models=models)
+    document = answer.to_dict()
+    assert (document["points"], document["complete"], document["timing_models"]) == (16, True, models)
+    assert len(answer) == len(document["rows"]) == 16 * len(models)
+    assert list(answer) == list(answer.columns) == list(document["rows"][0]) == [*GRID, *FIGURES]
+    for name, column in dict(answer).items():
+        expected = [row[name] for row in document["rows"]]
+        if column.dtype.kind == "U":
+            expected = [" ".join(one) if isinstance(one, list) else str(one) for one in expected]
+        assert column.tolist() == expected
+        assert column.shape == (len(answer),)
+
+
+def test_numbers_are_numbers_and_words_are_text() -> None:
+    answer = busplan.sweep("paper-4ms", vary=GRID)
+    kinds = {name: answer[name].dtype.kind for name in answer}
+    words = {"bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded"}
+    assert {name for name, kind in kinds.items() if kind == "U"} == words
+    assert (kinds["max_axes"], kinds["margin_us"], kinds["fits"], kinds["bus.nodes"]) == ("i", "f", "b", "i")
+    assert kinds["gap_count"] == "i"
+
+
+def test_a_point_is_what_capacity_says_of_it() -> None:
+    periods = range(250, 4001, 250)
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_models=["standard"])
+    found = busplan.capacity("paper-4ms", periods_us=periods, timing_models=["standard"]).results
+    for name in ("max_axes", "margin_us", "limited_by", "fits"):
+        assert answer[name].tolist() == [getattr(one, name) for one in found]
+
+
+@pytest.mark.parametrize(
+    "values", [range(250, 1001, 250), [250, 500, 750, 1000], np.arange(250, 1001, 250), np.linspace(250, 1000, 4)]
+)
+def test_values_in_any_form_are_those_of_the_text(values: Any) -> None:
+    wanted = busplan.sweep("paper-4ms", vary={"cycle.period_us": "250:1000:250"})
+    assert busplan.sweep("paper-4ms", vary={"cycle.period_us": values}).to_json() == wanted.to_json()
+
+
+def test_whole_numbers_as_floats_count_nodes() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": np.linspace(1, 3, 3)}, timing_models=["paper"])
+    assert answer["bus.nodes"].tolist() == [1, 2, 3]
+
+
+def test_many_blocks_are_one_table() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": range(100, 40_100)}, timing_models=["paper"])
+    assert len(answer.blocks) > 1
+    assert answer["cycle.period_us"].tolist() == list(range(100, 40_100))
+    assert [row["period_us"] for row in answer.to_dict()["rows"]] == answer["period_us"].tolist()
+
+
+def test_an_array_is_the_callers_own() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
+    answer["max_axes"][:] = -1
+    answer["bus.nodes"][:] = -1
+    assert answer["max_axes"].min() > 0
+    assert answer["bus.nodes"].tolist() == [1, 1, 2, 2]
+
+
+def test_circle_tests_add_their_columns() -> None:
+    vary = {"cycle.period_us": [100.0, 4000.0], "circle.radius_mm": [10.0]}
+    answer = busplan.sweep("paper-4ms", vary=vary, with_circle=True)
+    assert answer.columns[-1] == "passed"
+    (result,) = busplan.circle_test(busplan.load_profile("paper-4ms", changes={"circle.radius_mm": 10.0})).results
+    assert np.isnan(answer["max_contour_error_mm"][:2]).all()
+    assert answer["max_contour_error_mm"][2] == result.max_contour_error_mm
+    assert answer["passed"].tolist() == [False, False, result.passed, result.passed]
+    assert answer.to_dict()["rows"][0]["max_contour_error_mm"] is None
+    assert "The circle holds every tolerance at" in str(answer)
+
+
+def test_a_column_that_is_not_there_is_a_key_error() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})
+    with pytest.raises(KeyError, match=r"no column 'axis'; there are bus\.nodes, timing_model"):
+        _ = answer["axis"]
+    assert "axis" not in answer
+    assert "max_axes" in answer
+
+
+def test_the_text_is_the_table_of_the_command() -> None:
+    lines = str(busplan.sweep("paper-4ms", vary={"bus.nodes": "1:16"})).splitlines()
+    assert lines[1] == "20 of 32 rows."
+    assert len(lines) == 2 + 1 + 2 + 20
+
+
+@pytest.mark.parametrize(
+    ("vary", "options", "message"),
+    [
+        ({}, {}, "vary: nothing to vary; give a key and its values"),
+        ({"bus.nods": [1]}, {}, "vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
+        ({"bus.nodes": []}, {}, "vary bus.nodes: no values; give at least one"),
+        ({"bus.nodes": range(0)}, {}, "vary bus.nodes: no values; give at least one"),
+        ({"bus.nodes": 3}, {}, "vary bus.nodes 3: expected several values, as a list"),
+        ({"bus.nodes": "1:x"}, {}, "vary bus.nodes=1:x: 'x' is no number"),
+        ({"bus.nodes": "2:1"}, {}, "vary bus.nodes=2:1: steps of 1 never lead from 2 to 1"),
+        ({"bus.nodes": [1, 1]}, {}, "vary bus.nodes: 1 is there twice"),
+        ({"bus.nodes": [1, 2.5]}, {}, "bus.nodes 2.5: expected a whole number"),
+        ({"bus.nodes": [True]}, {}, "vary bus.nodes: True is no finite number"),
+        ({"bus.nodes": range(10**30, 10**30 + 2)}, {}, "vary bus.nodes: numbers of"),
+        ({"cycle.period_us": np.array([1.0, np.nan])}, {}, "vary cycle.period_us: nan is no finite number"),
+        ({"cycle.period_us": np.ones((2, 2))}, {}, "vary cycle.period_us: [1.0, 1.0] is no finite number"),
+        ({"cycle.period_us": range(1, MOST_POINTS + 2)}, {}, "more than the 2,000,000 that are kept in memory"),
+        ({"cycle.period_us": "1:1e9", "bus.nodes": "1:10000"}, {}, "vary: 10,000,000,000,000 points are more than"),
+        (
+            {"servo.drive_lag_us": [1]},
+            {},
+            "vary servo.drive_lag_us: no figure of capacity depends on it; add with_circ",
+        ),
+        ({"cycle.period_us": range(1, 1002)}, {"with_circle": True}, "that are run without force=True"),
+        ({"cycle.period_us": [1050]}, {"with_circle": True}, "at cycle.period_us = 1050: step_us = 100.0"),
+    ],
+)
+def test_what_makes_no_sweep_is_refused(vary: Any, options: Any, message: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        busplan.sweep("paper-4ms", vary=vary, **options)

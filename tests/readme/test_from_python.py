@@ -1,0 +1,54 @@
+"""The README's Python blocks run as they stand, and draw the true numbers."""
+
+import doctest
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import busplan
+
+README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
+SECTION = README.partition("\n## From Python\n")[2].partition("\n## ")[0]
+
+
+def block(language: str) -> str:
+    (found,) = re.findall(rf"^```{language}\n(.*?)^```$", SECTION, re.MULTILINE | re.DOTALL)
+    assert isinstance(found, str)
+    return found
+
+
+def test_the_plot_of_axes_against_period_is_five_lines_and_true(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.chdir(tmp_path)
+    script = block("python")
+    assert len(script.split("\n\n")) == 2
+    assert sum(map(bool, script.splitlines())) == 5
+    names: dict[str, Any] = {}
+    exec(compile(script, "README.md", "exec"), names)
+    figure = names["plt"].gcf()
+    try:
+        (line,) = figure.axes[0].lines
+        periods = list(range(250, 4001, 250))
+        found = busplan.capacity("paper-4ms", periods_us=periods, timing_models=["standard"]).results
+        assert line.get_xdata().tolist() == periods
+        assert line.get_ydata().tolist() == [one.max_axes for one in found]
+        assert len(set(line.get_ydata())) > 5
+    finally:
+        names["plt"].close(figure)
+    assert (tmp_path / "axes.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_example_of_an_answer_is_the_programs_own() -> None:
+    example = doctest.DocTestParser().get_doctest(block("pycon"), {}, "README.md", "README.md", 0)
+    assert len(example.examples) >= 5
+    assert doctest.DocTestRunner().run(example).failed == 0
+
+
+def test_every_function_is_named() -> None:
+    functions = [name for name in busplan.__all__ if name.islower() and not name.startswith("_")]
+    assert [name for name in functions if not re.search(rf"`{name}`|busplan\.{name}\(", SECTION)] == []
