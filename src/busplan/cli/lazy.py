@@ -21,6 +21,7 @@ COMMANDS: Final = (
     "check",
     "rule",
     "schema",
+    "manual",
     "paper",
     "profiles",
     "init",
