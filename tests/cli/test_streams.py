@@ -12,6 +12,8 @@ from typing import IO, Any
 
 import pytest
 
+from busplan.cli.lazy import COMMANDS
+
 Run = Callable[..., Any]
 OnTerminal = Callable[..., tuple[int, str]]
 
@@ -267,6 +269,14 @@ def test_what_needs_no_profile_loads_nothing_heavy(run: Run, option: str) -> Non
     loaded = modules(run, option)
     assert "typer" in loaded
     assert not loaded & {"numpy", "pydantic", "rich", "tomllib", "tomli_w", "csv", "json", "matplotlib"}
+    assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.report"))}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_a_command_loads_nothing_of_its_work(run: Run, command: str) -> None:
+    loaded = modules(run, command, "--help")
+    # Typer reads the program's own options before a command's, and takes pydantic for it.
+    assert not loaded & {"numpy", "rich", "tomllib", "tomli_w", "matplotlib"}
     assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.report"))}
 
 

@@ -17,8 +17,15 @@ from busplan.errors import BusplanError
 app = typer.Typer(
     name="busplan",
     cls=LazyGroup,
-    help="Does this motion network fit its period, and how many axes can it carry?",
-    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job. Start with: busplan capacity paper-4ms",
+    help="""Does this motion network fit its period, how many axes can it carry, and is the circle still round?
+
+    busplan answers from one TOML profile of an IEEE 1394 (FireWire) network with a host and motion nodes. Some profiles
+    are shipped (see `busplan profiles`); `busplan init` writes one to start from. `busplan COMMAND --help` says more of
+    a command.
+
+    Example: busplan capacity paper-4ms
+    """,
+    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -16,7 +16,7 @@ def calibrate_command(
     measurements: Annotated[
         str,
         typer.Argument(
-            help="CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.",
+            help="A CSV file of measured latencies, the shipped example table-1.csv, or - for standard input.",
             show_default=False,
         ),
     ],
@@ -24,7 +24,8 @@ def calibrate_command(
         Literal["table", "linear"] | None,
         typer.Option(
             "--form",
-            help="table: T_exec at each payload; linear: base and us per byte.  [default: as the profile has it]",
+            help="Form of the execution time: T_exec [us] at each payload, or a base [us] and us per byte.  "
+            "[default: the profile's node.execution.kind]",
             show_default=False,
         ),
     ] = None,
@@ -32,7 +33,7 @@ def calibrate_command(
         Literal["paper", "standard"] | None,
         typer.Option(
             "--timing",
-            help="Timing model that says what the packets take.  [default: the one that decides in the profile]",
+            help="Timing model that says what the packets take.  [default: the profile's bus.timing_model]",
             show_default=False,
         ),
     ] = None,
@@ -49,7 +50,8 @@ def calibrate_command(
     apply: Annotated[
         bool,
         typer.Option(
-            "--apply", help="Write [node.execution] into the profile's file in place, with a comment where it is from."
+            "--apply",
+            help="Write [node.execution] into PROFILE, a file, with a comment where it is from; the rest stays.",
         ),
     ] = False,
     format_: FormatOption = "table",
@@ -63,7 +65,7 @@ def calibrate_command(
     T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
     where the bench was not as the profile. With a column request_and_acknowledge_us, the measured T1+T2, T_exec is
     T_lant - 2 (T1+T2) as measured, and the report shows how far the timing model is from it. Measurements far from the
-    others are named by their line. Times in us. A report: it exits 0 whatever the figures are.
+    others are named by their line. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """

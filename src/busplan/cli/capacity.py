@@ -25,7 +25,7 @@ def capacity_command(
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
-    The verdict comes first: it is that of the profile's own timing_model, with the largest term and the cheapest
+    The verdict comes first: it is that of the profile's bus.timing_model, with the largest term and the cheapest
     change. Times are in us. A report: it exits 0 whatever the verdict is.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us

@@ -25,35 +25,51 @@ def check_command(
         list[str],
         typer.Argument(
             metavar="PATH",
-            help="Profile files, folders (every *.toml below that claims a schema_version), shipped names, "
-            "or - for standard input.",
+            help="Profile files, folders (every `*.toml` below that claims a `schema_version`), names of shipped "
+            "profiles, or - for standard input.",
             autocompletion=complete_profile,
             show_default=False,
         ),
     ],
     format_: Annotated[
         Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"],
-        typer.Option("--format", envvar="BUSPLAN_FORMAT", help="Form of the report."),
+        typer.Option(
+            "--format",
+            envvar="BUSPLAN_FORMAT",
+            help="Form of the report; github, gitlab, junit and sarif are for the build service.",
+        ),
     ] = "text",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="Write the report to a file instead of standard output."),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write the report to FILE; an old file is replaced.  [default: standard output]",
+        ),
     ] = None,
     fail_on: Annotated[
         Literal["error", "warning"], typer.Option("--fail-on", help="Least severity that fails the check.")
     ] = "error",
-    exit_zero: Annotated[bool, typer.Option("--exit-zero", help="Exit 0 even with findings.")] = False,
+    exit_zero: Annotated[bool, typer.Option("--exit-zero", help="Exit 0 even with findings; 2 stays 2.")] = False,
     circle: Annotated[
-        bool, typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one.")
+        bool,
+        typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one, or leave it out."),
     ] = True,
     baseline: Annotated[
         Path | None,
-        typer.Option("--baseline", metavar="FILE", help="No profile may lose axes or margin against this record."),
+        typer.Option(
+            "--baseline",
+            metavar="FILE",
+            help="Record that no profile may lose axes or margin against.  [default: no record]",
+        ),
     ] = None,
     update_baseline: Annotated[
         bool, typer.Option("--update-baseline", help="Record what the profiles carry now in the --baseline file.")
     ] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Processes to check with.")] = 1,
+    jobs: Annotated[
+        int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")
+    ] = 1,
     stdin_filename: Annotated[
         str, typer.Option("--stdin-filename", metavar="NAME", help="What to call standard input in the report.")
     ] = "<stdin>",
@@ -64,11 +80,11 @@ def check_command(
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
-    Each finding is a line: path:line:column: CODE message. `busplan rule CODE` explains it. A comment
+    Each finding is a line: `path:line:column: CODE message`. `busplan rule CODE` explains it. A comment
     `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. Exits 0 when clean, 1 with
     findings at or above --fail-on, 2 when it could not do the job; one broken file does not stop the others.
 
-    Example: busplan check profiles/ --format github --baseline baseline.json
+    Example: busplan check paper-1ms paper-4ms --format github
     """
     if update_baseline and baseline is None:
         raise BusplanError("--update-baseline: needs --baseline FILE")

@@ -23,34 +23,50 @@ def circle_test_command(
     period: PeriodsOption = None,
     feed: Annotated[
         float | None,
-        typer.Option("--feed", metavar="MM_PER_MIN", help="Speed along the circle, instead of the profile's [mm/min]."),
+        typer.Option(
+            "--feed",
+            metavar="MM_PER_MIN",
+            help="Speed along the circle [mm/min].  [default: the profile's circle.feed_mm_per_min]",
+        ),
     ] = None,
     radius: Annotated[
         float | None,
-        typer.Option("--radius", metavar="MM", help="Radius of the circle, instead of the profile's [mm]."),
+        typer.Option(
+            "--radius", metavar="MM", help="Radius of the circle [mm].  [default: the profile's circle.radius_mm]"
+        ),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option("--seed", metavar="N", help="Seed of jitter and lost set-points, instead of the profile's."),
+        typer.Option(
+            "--seed",
+            metavar="N",
+            help="Seed of jitter and lost set-points: the same seed, the same run.  "
+            "[default: the profile's delivery.seed]",
+        ),
     ] = None,
     contributions: Annotated[
-        bool, typer.Option("--contributions", help="Remove each error source in turn and rank them.")
+        bool, typer.Option("--contributions", help="Rank the error sources: test again without each in turn.")
     ] = False,
     trace: Annotated[
         Path | None,
-        typer.Option("--trace", metavar="FILE.csv", help="Write time, command, actual position and contour error."),
+        typer.Option(
+            "--trace",
+            metavar="FILE.csv",
+            help="Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is "
+            "replaced.  [default: no file]",
+        ),
     ] = None,
     every: Annotated[
         int | None,
-        typer.Option("--every", metavar="N", help="Write every n-th step to --trace.  [default: 10]"),
+        typer.Option("--every", metavar="N", help="Write one of N steps of the simulation to --trace.  [default: 10]"),
     ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
             "--plot",
             metavar="FILE",
-            help="Draw the magnified polar error and the error over time into FILE.png, FILE.svg or FILE.pdf; "
-            "needs the extra plot.",
+            help="Draw the magnified polar error and the error over time into FILE.png, FILE.svg or FILE.pdf; an old "
+            "file is replaced. Needs the extra plot (matplotlib).  [default: no figure]",
         ),
     ] = None,
     format_: FormatOption = "table",
@@ -62,7 +78,7 @@ def circle_test_command(
     in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4. Exits 0 when every
     tolerance holds and 1 when one does not.
 
-    Example: busplan circle-test paper-4ms --contributions --plot circle.png
+    Example: busplan circle-test paper-4ms --contributions
     """
     if every is not None and trace is None:
         raise BusplanError("--every: goes with --trace FILE.csv")

@@ -14,20 +14,23 @@ from busplan.errors import BusplanError
 def init_command(
     name: Annotated[
         str,
-        typer.Argument(help="Name of the new profile, or the path of its file."),
+        typer.Argument(help="Name of the new profile, or the path of its file; .toml is added where it is missing."),
     ] = "my-machine",
     source: Annotated[
         str,
         typer.Option(
             "--from",
             metavar="SHIPPED",
-            help="Shipped profile to start from (see `busplan profiles`).",
+            help="Name of the shipped profile to start from (see `busplan profiles`).",
             autocompletion=complete_profile,
         ),
     ] = "paper-4ms",
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is already there.")] = False,
 ) -> None:
     """Write a commented starter profile into the working directory.
+
+    It is the shipped profile of --from under a name of its own, with its comments: edit it, then run `busplan capacity`
+    on it. Exits 0 when the file is written; a file that is already there stays as it is, unless --force is given.
 
     Example: busplan init press-line --from paper-1ms
     """

@@ -25,7 +25,8 @@ def latency_command(
         typer.Option(
             "--payload",
             metavar="BYTES[,BYTES...]",
-            help="Payloads of both read and write in bytes, instead of the profile's, as 4,16,32.",
+            help="Payload of both read and write in bytes, or several between commas, as 4,16,32.  "
+            "[default: the profile's payload.read_bytes and payload.write_bytes]",
             show_default=False,
         ),
     ] = None,
@@ -34,10 +35,10 @@ def latency_command(
     timing: TimingOption = "both",
     format_: FormatOption = "table",
 ) -> None:
-    """Show every phase of one read and one write, under both timing models.
+    """Show where the microseconds of one read and one write go, phase by phase, under both timing models.
 
     The transaction is that of the farthest node. Times are in us, sizes in bytes; each row names the paper's
-    equation it comes from. A report: it exits 0 whatever the figures are.
+    equation that it comes from. A report: it exits 0 whatever the figures are.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """

@@ -5,8 +5,9 @@ from importlib import import_module
 from typing import Any, Final
 
 import typer
-from typer.core import TyperGroup
 from typer.main import get_command
+
+from busplan.cli.help import FAILURES, PlainCommand, PlainGroup
 
 SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 COMMANDS: Final = (
@@ -21,6 +22,7 @@ COMMANDS: Final = (
     "check",
     "rule",
     "schema",
+    "manual",
     "paper",
     "profiles",
     "init",
@@ -46,7 +48,7 @@ class LazyCommands(Mapping[str, Any]):
                 pretty_exceptions_enable=False,
                 context_settings=SETTINGS,
             )
-            single.command(name)(getattr(module, f"{stem}_command"))
+            single.command(name, cls=PlainCommand, epilog=FAILURES)(getattr(module, f"{stem}_command"))
             self._made[name] = get_command(single)
         return self._made[name]
 
@@ -57,7 +59,7 @@ class LazyCommands(Mapping[str, Any]):
         return len(COMMANDS)
 
 
-class LazyGroup(TyperGroup):
+class LazyGroup(PlainGroup):
     """The program's group of commands."""
 
     def __init__(self, **settings: Any) -> None:

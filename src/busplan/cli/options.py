@@ -41,8 +41,8 @@ PeriodsOption = Annotated[
     typer.Option(
         "--period",
         metavar="TIME",
-        help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s. "
-        "May be given several times.",
+        help="Communication period with its unit, as 4ms, 250us or 0.001s. May be given several times.  "
+        "[default: the profile's cycle.period_us]",
         show_default=False,
     ),
 ]
@@ -51,7 +51,7 @@ NodesOption = Annotated[
     typer.Option(
         "--nodes",
         metavar="N",
-        help="Distributed nodes, instead of the profile's bus.nodes.",
+        help="Number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
         show_default=False,
     ),
 ]
@@ -60,7 +60,8 @@ GapCountOption = Annotated[
     typer.Option(
         "--gap-count",
         metavar="0..63|optimal",
-        help="Gap count, instead of the profile's bus.gap_count.",
+        help="Gap count of all nodes; optimal is the smallest safe one for the hops.  "
+        "[default: the profile's bus.gap_count]",
         show_default=False,
     ),
 ]

@@ -25,7 +25,9 @@ def plan_command(
     nodes: Annotated[
         int | None,
         typer.Option(
-            "--nodes", metavar="N", help="Goal: so many distributed nodes.  [default: the profile's bus.nodes]"
+            "--nodes",
+            metavar="N",
+            help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
         ),
     ] = None,
     axes: Annotated[
@@ -35,7 +37,8 @@ def plan_command(
             metavar="N",
             min=1,
             max=_MAX_AXES,
-            help="Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.",
+            help="Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.  "
+            "[default: those of the nodes]",
         ),
     ] = None,
     period: Annotated[
@@ -44,7 +47,7 @@ def plan_command(
             "--period",
             metavar="TIME",
             help="Communication period with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
-            "[default: the profile's, which may be changed]",
+            "[default: the profile's cycle.period_us, which may be changed]",
         ),
     ] = None,
     gap_count: GapCountOption = None,
@@ -52,7 +55,8 @@ def plan_command(
         bool,
         typer.Option(
             "--circle/--no-circle",
-            help="Run the circle test, where the profile has a section for it: servo, circle, tolerance, ...",
+            help="Run the circle test, where the profile has a section for it (servo, circle, tolerance, ...), or "
+            "leave it out.",
         ),
     ] = True,
     max_circles: Annotated[
@@ -78,7 +82,7 @@ def plan_command(
             "--output",
             "-o",
             metavar="NEW.toml",
-            help="Write the recommended profile as a new file, without comments.",
+            help="Write the recommended profile as a new file, without comments.  [default: no file]",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
@@ -88,14 +92,14 @@ def plan_command(
 
     Each option changes the profile in one way, and is computed again with it in place: the smallest period that fits
     the bus and passes the circle, the best gap count for the hops, the largest payload (read and write alike), the
-    smallest slice ratio, the most nodes, under the profile's own timing_model. Margins are in us.
+    smallest slice ratio, the most nodes, under the profile's bus.timing_model. Margins are in us.
 
-    One is recommended: the cheapest after which the goal fits under BOTH timing models with a safe gap count, and
+    One is recommended: the cheapest after which the goal fits under both timing models with a safe gap count, and
     passes the circle. Cheapest comes first: nothing, gap count, slice ratio (up to 0.9), both, period, period and gap
     count. What is given by an option is kept, and so is the number of nodes; a payload, speed or wiring is changed only
     where the standard's limits demand it. Exits 0 when there is such a plan, 1 when there is none.
 
-    Example: busplan plan my-machine.toml --axes 24 --apply
+    Example: busplan plan paper-1ms --axes 16
     """
     _check_options(nodes=nodes, axes=axes, apply=apply, output=output, force=force)
     from busplan.analysis.plan import plan

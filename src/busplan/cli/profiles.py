@@ -15,6 +15,8 @@ def profiles_command(
 ) -> None:
     """List the shipped profiles: what every command takes by name.
 
+    Each with its number of nodes, its period, the timing model that decides and what it is about. A report: it exits 0.
+
     Example: busplan profiles
     """
     from busplan.profile.shipped import load, shipped_names

@@ -18,13 +18,15 @@ def complete_code(incomplete: str) -> list[str]:
 def rule_command(
     code: Annotated[
         str | None,
-        typer.Argument(help="Code of a rule, as BP101; all of them without it.", autocompletion=complete_code),
+        typer.Argument(help="Code of a rule, as BP101.  [default: all of them]", autocompletion=complete_code),
     ] = None,
     format_: Annotated[
         Literal["text", "json"], typer.Option("--format", help="Form of the document on standard output.")
     ] = "text",
 ) -> None:
     """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
+
+    Without a code it lists all rules with their severity. A report: it exits 0.
 
     Example: busplan rule BP110
     """

@@ -7,6 +7,7 @@ def schema_command() -> None:
     """Print the JSON Schema of profiles (draft 2020-12), with every description and unit.
 
     Editors that read `#:schema ./busplan.schema.json` at the top of a profile complete and check it.
+    It exits 0.
 
     Example: busplan schema > busplan.schema.json
     """

@@ -26,7 +26,7 @@ def sweep_command(
             metavar="KEY=VALUES",
             help="A key of the profile in numbers, and its values in the profile's unit: 250,500,1000 or a range "
             "A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). bus.gap_count also takes "
-            "optimal. Given several times, every combination is computed; the last key changes fastest.",
+            "optimal. Given several times, every combination is computed; the last key changes fastest.  [required]",
             show_default=False,
         ),
     ] = None,
@@ -44,7 +44,11 @@ def sweep_command(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Write the document there instead of to standard output; as a whole."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Write the document to FILE.csv, .jsonl or .npz, or as a table to any other name; an old file is "
+            "replaced.  [default: standard output]",
         ),
     ] = None,
     columns: Annotated[
@@ -52,8 +56,8 @@ def sweep_command(
         typer.Option(
             "--columns",
             metavar="NAMES",
-            help="Figures to write, between commas, by their names in capacity --format json.  [default: all; in a "
-            "table the main ones]",
+            help="Figures to write, between commas, as margin_us,max_axes: the names in "
+            "`busplan capacity --format json`.  [default: all of them; in a table the main ones]",
         ),
     ] = None,
     sort: Annotated[
@@ -65,7 +69,7 @@ def sweep_command(
         ),
     ] = None,
     top: Annotated[
-        int | None, typer.Option("--top", metavar="N", help="Table: how many rows.  [default: 20]", show_default=False)
+        int | None, typer.Option("--top", metavar="N", help="Table: number of rows.  [default: 20]", show_default=False)
     ] = None,
     plot: Annotated[
         Path | None,
@@ -73,12 +77,17 @@ def sweep_command(
             "--plot",
             metavar="FILE",
             help="Draw --figure into FILE.png, FILE.svg or FILE.pdf: curves where one key varies, heat maps where two "
-            "do; needs the extra plot.",
+            "do; an old file is replaced. Needs the extra plot (matplotlib).  [default: no figure]",
         ),
     ] = None,
     figure: Annotated[
         str | None,
-        typer.Option("--figure", metavar="COLUMN", help="What --plot draws.  [default: max_axes]", show_default=False),
+        typer.Option(
+            "--figure",
+            metavar="COLUMN",
+            help="What --plot draws, by its name in --columns.  [default: max_axes]",
+            show_default=False,
+        ),
     ] = None,
     circle: Annotated[
         bool,
@@ -91,12 +100,12 @@ def sweep_command(
         typer.Option(
             "--jobs",
             metavar="N",
-            help="Processes for --circle.  [default: one for each processor]",
+            help="Number of processes for --circle.  [default: one for each processor]",
             show_default=False,
         ),
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Run more circle tests than are sane without being asked twice (1,000).")
+        bool, typer.Option("--force", help="Run more than 1,000 circle tests: --circle alone refuses so many.")
     ] = False,
 ) -> None:
     """Compute capacity over a grid: any keys of the profile, every combination, both timing models.
@@ -105,7 +114,7 @@ def sweep_command(
     points take seconds, and writing them as text some minutes. Ctrl-C keeps the rows so far in FILE.partial.csv (or
     .json, .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
 
-    Example: busplan sweep paper-4ms --vary bus.nodes=1:16 --vary cycle.period_us=250,500,1000 --sort max_axes
+    Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
     wanted = format_ or (_ENDINGS.get(output.suffix.lower(), "table") if output else "table")
     _require_sense(wanted, output=output, sort=sort, top=top)

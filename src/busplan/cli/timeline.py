@@ -44,7 +44,8 @@ def timeline_command(
         typer.Option(
             "--from",
             metavar="TIME",
-            help="Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.",
+            help="Show the cycle from this time on, counted from its start, with its unit, as 50us or 0.1ms.  "
+            "[default: its start]",
             show_default=False,
         ),
     ] = None,
@@ -53,7 +54,7 @@ def timeline_command(
         typer.Option(
             "--to",
             metavar="TIME",
-            help="Show the cycle up to this time, with its unit; beyond its end means its end.",
+            help="Show the cycle up to this time, with its unit; beyond its end means its end.  [default: its end]",
             show_default=False,
         ),
     ] = None,
@@ -62,7 +63,8 @@ def timeline_command(
         typer.Option(
             "--transaction",
             metavar="read:N|write:N",
-            help="Show one transaction of one node with its gaps, as read:1; --from and --to may narrow it further.",
+            help="Show one transaction of one node (from 1) with its gaps, as read:1; --from and --to may narrow it "
+            "further.  [default: all of them]",
             show_default=False,
         ),
     ] = None,
@@ -71,7 +73,8 @@ def timeline_command(
         typer.Option(
             "--period",
             metavar="TIME",
-            help="Communication period with its unit, instead of the profile's, as 4ms, 250us or 0.001s.",
+            help="Communication period with its unit, as 4ms, 250us or 0.001s.  "
+            "[default: the profile's cycle.period_us]",
             show_default=False,
         ),
     ] = None,
@@ -82,7 +85,7 @@ def timeline_command(
         typer.Option(
             "--timing",
             help="Timing model: the paper's equations as published, or the standard's clock and packets. "
-            "A cycle has one.  [default: the profile's bus.timing_model, which decides]",
+            "A cycle has one.  [default: the profile's bus.timing_model]",
             show_default=False,
         ),
     ] = None,
@@ -90,8 +93,8 @@ def timeline_command(
         TimelineFormat | None,
         typer.Option(
             "--format",
-            help="Form of the document. png needs the extra plot, and --output.  "
-            "[default: what the name of --output says, else table]",
+            help="Form of the document. png needs -o, and the extra plot (matplotlib).  "
+            "[default: by the ending of -o, else table]",
             show_default=False,
         ),
     ] = None,
@@ -101,7 +104,8 @@ def timeline_command(
             "--output",
             "-o",
             metavar="FILE",
-            help="Write it to FILE instead of standard output: .svg, .png, .mmd (mermaid), .json, .csv or .txt.",
+            help="Write it to FILE.svg, .png, .mmd (mermaid), .json, .csv or .txt; an old file is replaced.  "
+            "[default: standard output]",
             show_default=False,
         ),
     ] = None,
@@ -109,9 +113,9 @@ def timeline_command(
     """Show one communication cycle as events, node by node and to scale.
 
     The synchronous packet, a read and then a write of every node with each arbitration, packet, acknowledge, execution
-    and gap, the non-periodic window, and what is left of the slice. It is the second way to the time that capacity
-    gives in closed form. A cycle that overruns its slice is drawn whole, and said. Every node is charged the hops of
-    the farthest. Times are in us. A report: it exits 0 whatever the figures are.
+    and gap, the non-periodic window, and what is left of the slice. It is the second way to the time that `busplan
+    capacity` gives in closed form. A cycle that overruns its slice is drawn whole, and said. Every node is charged the
+    hops of the farthest. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """

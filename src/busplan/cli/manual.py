@@ -1,0 +1,53 @@
+"""`busplan manual`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from busplan.cli.output import emit_text, say, write_file
+
+
+def manual_command(
+    context: typer.Context,
+    format_: Annotated[
+        Literal["markdown", "man"] | None,
+        typer.Option(
+            "--format",
+            help="Form of the manual: GitHub's Markdown, or a man page in roff.  "
+            "[default: man where -o ends in .1, else markdown]",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="Write it to FILE, as busplan.1 or reference.md; an old file is replaced.  [default: standard output]",
+        ),
+    ] = None,
+) -> None:
+    """Write the whole manual: every command with its arguments, options and example, exit codes, variables and files.
+
+    It is made of what `busplan COMMAND --help` says, and is installed with busplan as a man page, which `man busplan`
+    shows, and as Markdown. It exits 0 when the manual is written.
+
+    Example: busplan manual --format man -o busplan.1
+    """
+    from busplan.cli.tree import manual_of
+
+    manual = manual_of(context.find_root().command)
+    if (format_ or ("man" if output and output.suffix == ".1" else "markdown")) == "man":
+        from busplan.report.manual.man import man_page
+
+        text = man_page(manual)
+    else:
+        from busplan.report.manual.markdown import markdown_page
+
+        text = markdown_page(manual)
+    if output is None:
+        emit_text(text)
+    else:
+        write_file(output, text.encode(), overwrite=True)
+        say(f"wrote {output}")

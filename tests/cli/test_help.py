@@ -1,0 +1,165 @@
+"""Every command's --help reads well alone: whatever is added to the tree of commands has to pass."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+from typer.main import get_command
+
+from busplan.cli import app
+from busplan.cli.help import FAILURES
+from busplan.cli.lazy import COMMANDS
+from busplan.profile.shipped import shipped_folder
+
+ROOT: Any = get_command(app)
+TOP: Any = ROOT.context_class(ROOT, info_name="busplan", **ROOT.context_settings)
+UNIT = re.compile(r"\[(us|ms|s|mm|um|mm/min|mm/s|bytes|axes|nodes|deg|dB|%|1)\]|with its unit")
+GATE = re.compile(r"[Ee]xits 0 [^.]*\b1\b")
+
+
+def context(name: str) -> Any:
+    """What a command's help is made in; that of the program itself by an empty name."""
+    if not name:
+        return TOP
+    command = ROOT.get_command(TOP, name)
+    return command.context_class(command, info_name=name, parent=TOP, **command.context_settings)
+
+
+def shown(name: str, *, columns: int) -> list[str]:
+    """Lines of the help on a terminal."""
+    with mock.patch.dict(os.environ, {"COLUMNS": str(columns)}):
+        lines: list[str] = context(name).get_help().splitlines()
+    return lines
+
+
+def paragraphs(name: str) -> list[str]:
+    return [" ".join(text.split()) for text in context(name).command.help.split("\n\n")]
+
+
+def examples(name: str) -> list[str]:
+    marked = (text for text in paragraphs(name) if text.startswith("Example: "))
+    return [text.removeprefix("Example: ") for text in marked]
+
+
+def parameters() -> Iterator[Any]:
+    """Every argument and option of every command, with its help as typer writes it."""
+    for name in ("", *COMMANDS):
+        here = context(name)
+        for param in here.command.get_params(here):
+            yield pytest.param(param, param.get_help_record(here)[1], id=f"{name} {param.opts[-1]}".strip())
+
+
+EVERY_PARAMETER = pytest.mark.parametrize(("param", "said"), list(parameters()))
+EVERY_COMMAND = pytest.mark.parametrize("name", ["", *COMMANDS])
+
+
+@EVERY_COMMAND
+def test_it_begins_with_one_sentence(name: str) -> None:
+    assert re.fullmatch(r"[A-Z][^.?!]*[.?]", paragraphs(name)[0])
+
+
+@EVERY_COMMAND
+def test_it_says_what_the_exit_codes_mean(name: str) -> None:
+    said = " ".join(" ".join(shown(name, columns=80)).split())
+    if name:
+        assert re.search(r"\b[Ee]xits 0\b", said)
+        assert said.endswith(FAILURES)
+    else:
+        assert said.endswith("Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted.")
+
+
+@EVERY_COMMAND
+def test_its_example_is_one_line_that_can_be_copied(name: str) -> None:
+    lines = shown(name, columns=80)
+    assert examples(name)
+    for example in examples(name):
+        assert f"  Example: {example}" in lines
+        assert example.startswith(f"busplan {name}".strip())
+
+
+@pytest.mark.parametrize(
+    ("name", "example"), [pytest.param(name, one, id=one) for name in ("", *COMMANDS) for one in examples(name)]
+)
+def test_its_example_runs_as_it_stands(name: str, example: str, tmp_path: Path) -> None:
+    words = shlex.split(example)
+    for before, word in pairwise(words):
+        # A profile that a user must have; what follows -o is written.
+        if word.endswith(".toml") and before not in {"-o", "--output", ">"}:
+            (tmp_path / word).write_bytes((shipped_folder() / "paper-4ms.toml").read_bytes())
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    run = subprocess.run(
+        ["bash", "-c", example],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PATH": path},
+        check=False,
+        timeout=60,
+    )
+    is_gate = GATE.search(" ".join(paragraphs(name))) is not None
+    assert run.returncode in ({0, 1} if is_gate else {0}), run.stderr
+    # A gate with nothing to find says so beside the document.
+    assert run.stdout or list(tmp_path.iterdir()) or (is_gate and run.stderr)
+
+
+@EVERY_COMMAND
+@pytest.mark.parametrize("columns", [60, 80, 100, 200])
+def test_no_line_is_wider_than_the_terminal(name: str, columns: int) -> None:
+    lines = shown(name, columns=columns)
+    assert max(map(len, lines)) <= min(columns, 100)
+    # Not a column of words one below the other either: meanings keep room.
+    assert len(lines) < 2 * len(shown(name, columns=80))
+
+
+def test_the_list_of_commands_has_their_sentences_whole() -> None:
+    said = " ".join(" ".join(shown("", columns=80)).split())
+    for name in COMMANDS:
+        assert f"{name} {paragraphs(name)[0]}" in said
+
+
+@EVERY_COMMAND
+def test_it_speaks_of_no_types_of_python(name: str) -> None:
+    text = "\n".join(shown(name, columns=100))
+    assert not re.search(r"<(str|int|float|bool|path|list\[|.* range)|[{}]", text)
+    usage = text.partition("\n\n")[0]
+    here = context(name)
+    for param in here.command.params:
+        if param.param_type_name == "argument":
+            assert param.metavar in usage
+            assert param.metavar == param.metavar.upper()
+
+
+@EVERY_PARAMETER
+def test_every_parameter_has_help_in_a_sentence(param: Any, said: str) -> None:
+    assert param.help
+    assert re.fullmatch(r"[A-Za-z][^\n]*\.(  \[[^\n]+\])*", said), said
+
+
+@EVERY_PARAMETER
+def test_a_number_has_its_unit_or_is_a_count(param: Any, said: str) -> None:
+    kind, meant = param.type_descriptor.annotation, f"{param.metavar} {said}"
+    if kind is float or (kind is int and param.metavar != "N") or "TIME" in meant:
+        assert UNIT.search(said), said
+    if "BYTES" in meant:
+        assert "bytes" in said
+
+
+@EVERY_PARAMETER
+def test_every_option_names_its_default_or_what_it_falls_back_on(param: Any, said: str) -> None:
+    is_switch = param.param_type_name == "option" and param.is_flag and not param.secondary_opts
+    assert is_switch or re.search(r"[\[ ]default: [^\]]|[\[ ]required\]", said), said
+
+
+@EVERY_PARAMETER
+def test_what_stands_for_a_value_says_what_may_stand_there(param: Any, said: str) -> None:
+    del said
+    if param.param_type_name == "option" and not param.is_flag:
+        assert param.metavar or param.type_descriptor.is_choice
