@@ -18,6 +18,7 @@ COMMANDS: Final = (
     "timeline",
     "sweep",
     "check",
+    "diff",
     "rule",
     "schema",
     "paper",
