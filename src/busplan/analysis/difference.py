@@ -39,6 +39,8 @@ class Measure(NamedTuple):
 
 
 PLAN: Final = (
+    Measure("timing_model"),
+    Measure("verdict_fits", "more"),
     Measure("period_us"),
     Measure("nodes"),
     Measure("axes"),
@@ -49,7 +51,8 @@ PLAN: Final = (
     Measure("available_us"),
     Measure("time_slice_us"),
 )
-"""What both timing models share. A longer period or one more node is a choice, neither good nor bad by itself."""
+"""The verdict of the model that decides, and what both models share. A longer period or one more node is a choice,
+neither good nor bad by itself."""
 CYCLE: Final = (
     Measure("fits", "more"),
     Measure("margin_us", "more", scale="available_us"),
@@ -212,14 +215,18 @@ def _figures(
     timing_models: Sequence[TimingModelName],
     circles: tuple[CircleSide, CircleSide] | None,
 ) -> Iterator[Figure]:
-    cycles = [(model, _cycle(a, model), _cycle(b, model)) for model in timing_models]
-    _, plan_a, plan_b = cycles[0]
-    yield from _compared("plan", PLAN, plan_a, plan_b)
-    for model, cycle_a, cycle_b in cycles:
-        yield from _compared(model, CYCLE, cycle_a, cycle_b)
+    yield from _compared("plan", PLAN, _plan(a), _plan(b))
+    for model in timing_models:
+        yield from _compared(model, CYCLE, _cycle(a, model), _cycle(b, model))
     if circles is not None:
         circle_a, circle_b = ({} if side.figures is None else side.figures._asdict() for side in circles)
         yield from _compared("circle", CIRCLE, circle_a, circle_b)
+
+
+def _plan(profile: Profile) -> dict[str, Any]:
+    """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
+    deciding = figures(profile, model=profile.bus.timing_model)
+    return deciding._asdict() | {"verdict_fits": deciding.fits}
 
 
 def _cycle(profile: Profile, model: TimingModelName) -> dict[str, Any]:

@@ -60,14 +60,13 @@ def diff_command(
     """Tell what changed between two profiles, and what that does to every figure.
 
     First the keys whose values differ, defaults applied; then the figures of capacity, latency and circle-test for
-    both, each with B - A, the share of A's that it is, and whether B is better, worse, the same or neutral. What
-    describes the plan (period, nodes, axes, hops, gap count, time available, largest term, limit) is neutral. Times
-    are in us, contour errors in um in the table and in mm in JSON. With --fail-on-regression every figure that the
-    report calls worse counts, under either timing model whichever decides, and in the circle: leave some out with
-    --timing and --no-circle. A circle that cannot be run counts as not passed. Exits 0 whatever the figures are, and
-    1 on a regression that was to fail.
+    both, with B - A, its share of A, and whether B is better, worse, the same or neutral: what describes the plan
+    (period, nodes, gap count, time available, largest term) is neutral. Times are in us, contour errors in um in the
+    table and in mm in JSON. Exits 0 whatever the figures are; with --fail-on-regression 1 when the report calls any
+    figure worse, under either timing model whichever decides, or of the circle; --timing and --no-circle leave some
+    out, but never whether B fits as its own timing_model decides. A circle that cannot be run is not passed.
 
-    Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression --tolerance 5
+    Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     from busplan.analysis.difference import difference

@@ -86,7 +86,7 @@ def _content(place: _Place) -> bytes:
         state = "ambiguous" if tree.endswith(" ambiguous") else "unknown"
         raise BusplanError(
             f"{place.argument}: revision {place.revision} is {state} in the git repository of "
-            f"{place.folder.absolute()}; expected a commit, branch or tag, as HEAD~1 or main"
+            f"{place.folder.resolve()}; expected a commit, branch or tag, as HEAD~1 or main"
         )
     said = rest.partition("\n")[0]
     file = _OBJECT.fullmatch(said)
@@ -104,8 +104,8 @@ def _no_file(place: _Place, said: str, *, is_object: bool) -> str:
     if said.startswith(("symlink ", "dangling ", "loop ")):
         return f"is a link in revision {place.revision} that leads to no file of it; name the file itself"
     return (
-        f"no file {place.rest} in revision {place.revision}, seen from {place.folder.absolute()}; "
-        "a path starts at the current folder"
+        f"no such file in revision {place.revision}; the path starts at the current folder, not at the top of the "
+        "repository"
     )
 
 
@@ -142,5 +142,5 @@ def _refusal(place: _Place, stderr: bytes) -> str:
         "fatal: "
     )
     if reason.startswith("not a git repository"):
-        return f"no git repository to read REV:path from at {place.folder.absolute()}"
+        return f"no git repository to read REV:path from at {place.folder.resolve()}"
     return f"git cannot read it as REV:path: {reason}"

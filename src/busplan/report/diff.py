@@ -25,6 +25,8 @@ def _two(value: float) -> str:
 
 
 _OWN_ROWS: Final = (
+    GridRow("timing that decides", "", "", "timing_model", str),
+    GridRow("fits, as that decides", "", "", "verdict_fits", yes),
     GridRow("period T_s", "", "us", "period_us", us),
     GridRow("nodes N", "", "nodes", "nodes", count),
     GridRow("axes", "", "axes", "axes", count),
@@ -48,15 +50,16 @@ _HEADINGS: Final = ("figure", "of", "unit", "A", "B", "B - A", "relative", "B is
 _WORDS: Final = 3
 """Columns of words, in front of those of figures."""
 
+_FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
 _LOUD: Final[dict[str, dict[Judgement, str]]] = {
-    "fits": {"worse": "B does not fit where A does", "better": "B fits where A does not"},
     "gap_count_safe": {
         "worse": "B has an unsafe gap count where A has a safe one",
         "better": "B has a safe gap count where A has an unsafe one",
     },
     "passed": {"worse": "B does not pass the circle where A does", "better": "B passes the circle where A does not"},
 }
-"""Figures that speak for themselves."""
+"""Figures that speak for themselves, beside whether it fits."""
+_TOLD: Final = {"verdict_fits", "fits", *_LOUD}
 _MOST_NAMED: Final = 4
 """Figures that a headline names."""
 _MOST_KEYS: Final = 20
@@ -77,7 +80,7 @@ def diff_markdown(found: Difference, *, arguments: Arguments) -> str:
     """A comment for a pull request: the verdict, the keys that differ, and the figures that do."""
     named = zip("AB", arguments, (found.a, found.b), strict=True)
     lines = [
-        f"**busplan diff:** {markdown.escaped(_headline(found).text)}",
+        f"**busplan diff:** {_headline(found).text}",
         "",
         ", ".join(f"{side}: {markdown.code(argument)}{_profile_code(argument, one)}" for side, argument, one in named),
     ]
@@ -86,9 +89,11 @@ def diff_markdown(found: Difference, *, arguments: Arguments) -> str:
         lines += ["", *markdown.table(CHANGE_HEADINGS, rows, left=len(CHANGE_HEADINGS)), ""]
         hidden = len(found.keys) - len(rows)
         lines += [f"And {plural(hidden, 'more key')}.", ""] if hidden else []
-        changed = [figure for figure in found.figures if figure.judgement != "same"]
+        # Of a circle that one side has not, a note says why: it needs no rows.
+        told = [one for one in found.figures if one.judgement != "neutral" or None not in (one.a, one.b)]
+        changed = [one for one in told if one.judgement != "same"]
         lines += [*markdown.table(_HEADINGS, map(_markdown_cells, changed), left=_WORDS), ""] if changed else []
-        same = len(found.figures) - len(changed)
+        same = len(told) - len(changed)
         lines += [f"{plural(same, 'figure')} {'is' if same == 1 else 'are'} the same."] if same else []
         lines += [part for note in _notes(found) for part in ("", markdown.escaped(note.text))]
     return "\n".join((*lines, ""))
@@ -133,15 +138,19 @@ def _headline(found: Difference) -> Line:
 
 
 def _loud(figures: Sequence[Figure]) -> Iterator[str]:
+    judged = {one.measure.key: one.judgement for one in figures}
+    models = " and ".join(one.part for one in figures if one.measure.key == "fits")
+    if "verdict_fits" in judged:
+        yield f"{_FITS[judged['verdict_fits']]} ({f'{models} timing' if models else 'each by the timing that decides'})"
+    elif models:
+        yield f"{_FITS[judged['fits']]} ({models} timing, which does not change the verdict)"
     for key, words in _LOUD.items():
-        ofs = [one for one in figures if one.measure.key == key]
-        if ofs:
-            models = " and ".join(one.part for one in ofs)
-            yield words[ofs[0].judgement] + (f" ({models} timing)" if key == "fits" else "")
+        if key in judged:
+            yield words[judged[key]]
 
 
 def _counted(judgement: Judgement, figures: Sequence[Figure]) -> Iterator[str]:
-    names = _named([one for one in figures if one.measure.key not in _LOUD])
+    names = _named([one for one in figures if one.measure.key not in _TOLD])
     if names:
         hidden = len(names) - _MOST_NAMED
         more = f" and {hidden} more" if hidden > 0 else ""
@@ -199,7 +208,8 @@ def _changes(figure: Figure, row: GridRow) -> tuple[str, str]:
 
 
 def _markdown_cells(figure: Figure) -> tuple[str, ...]:
-    *cells, judgement = map(markdown.escaped, _cells(figure))
+    # Nothing here is a profile's text: labels, figures and words of ours, none of them markup.
+    *cells, judgement = _cells(figure)
     return (*cells, f"**{judgement}**" if figure.judgement == "worse" else judgement)
 
 
