@@ -78,11 +78,15 @@ def diff_lines(found: Difference, *, arguments: Arguments) -> list[Line]:
 
 def diff_markdown(found: Difference, *, arguments: Arguments) -> str:
     """A comment for a pull request: the verdict, the keys that differ, and the figures that do."""
-    named = zip("AB", arguments, (found.a, found.b), strict=True)
+    # In a table code is text whatever it holds; in a line of its own a bar would need other escapes.
+    sides = [
+        (side, markdown.code(argument), markdown.code(profile.name))
+        for side, argument, profile in zip("AB", arguments, (found.a, found.b), strict=True)
+    ]
     lines = [
         f"**busplan diff:** {_headline(found).text}",
         "",
-        ", ".join(f"{side}: {markdown.code(argument)}{_profile_code(argument, one)}" for side, argument, one in named),
+        *markdown.table(("", "given as", "name"), sides, left=len(sides[0])),
     ]
     if found.keys:
         rows = [tuple(map(markdown.code, row)) for row in change_rows(found.keys[:_MOST_KEYS])]
@@ -173,10 +177,6 @@ def _sides(found: Difference, arguments: Arguments) -> Iterator[str]:
         name = "" if profile.name == argument else f" ({profile.name})"
         at = period(profile.cycle.period_us)
         yield f"{side}: {argument}{name} at {at}, the {profile.bus.timing_model} model decides."
-
-
-def _profile_code(argument: str, profile: Profile) -> str:
-    return "" if profile.name == argument else f" ({markdown.code(profile.name)})"
 
 
 def _notes(found: Difference) -> Iterator[Line]:
