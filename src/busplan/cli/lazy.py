@@ -20,6 +20,7 @@ COMMANDS: Final = (
     "timeline",
     "sweep",
     "check",
+    "diff",
     "rule",
     "schema",
     "manual",

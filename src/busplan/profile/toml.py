@@ -42,8 +42,7 @@ def decode(content: bytes, *, name: str) -> Document:
         Too large, or not UTF-8; the latter with its place.
     """
     if len(content) > MAX_FILE_BYTES:
-        message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML"
-        raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
+        raise too_large(name)
     # The mark goes first: what the codec that knows it says of places, it says of the bytes behind.
     content = content.removeprefix(BOM_UTF8)
     try:
@@ -55,6 +54,12 @@ def decode(content: bytes, *, name: str) -> Document:
         raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
     # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
     return Document(name, text.replace("\r\n", "\n"))
+
+
+def too_large(name: str) -> PlacedError:
+    """Make the error for a file that is longer than a profile may be."""
+    message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML"
+    return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 
 def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:

@@ -9,7 +9,7 @@ from busplan.analysis.verdict import Verdict
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, percent, plural, us, yes
 from busplan.report.words import verdict_lines
 
-_CAPACITY_ROWS: Final = (
+CAPACITY_ROWS: Final = (
     GridRow("available alpha T_s", "us", "available_us", us),
     GridRow("required N T_cs", "us", "required_us", us),
     GridRow("  arbitration", "us", "cycle_arbitration_us", us),
@@ -35,6 +35,7 @@ _CAPACITY_ROWS: Final = (
     GridRow("limited by", "", "limited_by", str),
     GridRow("fits", "", "fits", yes),
 )
+"""How each figure is called and written."""
 
 
 def capacity_lines(result: Capacity, verdicts: Sequence[Verdict]) -> list[Line]:
@@ -51,4 +52,4 @@ def _grid(figures: Sequence[CapacityFigures]) -> list[Line]:
     first = figures[0]
     nodes = f"{plural(first.nodes, 'node')}, {plural(first.axes, 'axis')}"
     heading = f"{nodes}\n{plural(first.hops, 'hop')}, gap count {first.gap_count}"
-    return grid(heading, [(one.timing_model, one) for one in figures], _CAPACITY_ROWS, figures=FIGURES["capacity"])
+    return grid(heading, [(one.timing_model, one) for one in figures], CAPACITY_ROWS, figures=FIGURES["capacity"])

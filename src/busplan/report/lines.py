@@ -70,6 +70,11 @@ def plural(number: int, noun: str) -> str:
     return f"{number} {noun.removesuffix('is')}es" if noun.endswith("is") else f"{number} {noun}s"
 
 
+def printable(text: str) -> str:
+    """One line that commands no terminal, whatever a file or key is called."""
+    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
+
+
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) -> list[Line]:
     """Lay out a table.
 

@@ -4,7 +4,8 @@ import re
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from busplan.report.gate.plain import finding_line, printable
+from busplan.report.gate.plain import finding_line
+from busplan.report.lines import printable
 from busplan.rules.gate import FileResult
 from busplan.rules.report import CheckReport
 

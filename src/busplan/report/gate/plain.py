@@ -4,16 +4,12 @@ from collections.abc import Iterator
 from typing import Final
 from unicodedata import category, east_asian_width
 
+from busplan.report.lines import printable
 from busplan.rules.finding import Finding
 from busplan.rules.report import CheckReport
 
 _WIDEST: Final = 160
 """Of a line that is longer, `full` shows what stands around the finding."""
-
-
-def printable(text: str) -> str:
-    """One line that commands no terminal, whatever a file or key is called."""
-    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
 
 
 def finding_line(path: str, finding: Finding) -> str:

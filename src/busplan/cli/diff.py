@@ -1,0 +1,144 @@
+"""`busplan diff`."""
+
+from math import isfinite
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from busplan.cli.options import TimingOption, complete_profile, timing_models
+from busplan.cli.output import PlanFailsError, emit, emit_text, say
+from busplan.cli.progress import progress_bar
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.analysis.circle_test import CircleFigures, Progress
+    from busplan.analysis.difference import Difference
+    from busplan.profile.model import Profile
+
+_PARTS = 1000
+"""Parts of one circle test that progress counts."""
+
+
+def diff_command(
+    a: Annotated[
+        str,
+        typer.Argument(
+            metavar="A",
+            help="The profile to compare with: a file, a shipped name, - for standard input, or REV:path for a file "
+            "as it stood in a git revision, as HEAD~1:profiles/line.toml; the path starts at the current folder.",
+            autocompletion=complete_profile,
+            show_default=False,
+        ),
+    ],
+    b: Annotated[
+        str,
+        typer.Argument(
+            metavar="B", help="The profile to judge, likewise.", autocompletion=complete_profile, show_default=False
+        ),
+    ],
+    timing: TimingOption = "both",
+    circle: Annotated[
+        bool,
+        typer.Option("--circle/--no-circle", help="Run both circle tests when either profile asks for one."),
+    ] = True,
+    fail_on_regression: Annotated[
+        bool, typer.Option("--fail-on-regression", help="Exit 1 when a figure of B is worse.")
+    ] = False,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            metavar="PERCENT",
+            help="With --fail-on-regression, how much worse a number may be, in % of A's.  [default: 0]",
+        ),
+    ] = None,
+    format_: Annotated[
+        Literal["table", "json", "markdown"],
+        typer.Option("--format", help="Form of the document on standard output; markdown is for a pull request."),
+    ] = "table",
+) -> None:
+    """Tell what changed between two profiles, and what that does to every figure.
+
+    First the keys whose values differ, defaults applied; then the figures of capacity, latency and circle-test for
+    both, with B - A, its share of A, and whether B is better, worse, the same or neutral: what describes the plan
+    (period, nodes, gap count, time available, largest term) is neutral. Times are in us, contour errors in um in the
+    table and in mm in JSON. Exits 0 whatever the figures are; with --fail-on-regression 1 when the report calls any
+    figure worse, under either timing model whichever decides, or of the circle; --timing and --no-circle leave some
+    out, but never whether B fits as its own timing_model decides. A circle that cannot be run is not passed.
+
+    Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
+    """
+    allowed = _tolerance(tolerance, wanted=fail_on_regression)
+    from busplan.analysis.difference import difference
+
+    one, other = _profiles(a, b)
+    with progress_bar("circle tests") as progress:
+        found = difference(
+            one, other, timing_models=timing_models(timing), circle=_Circles(progress) if circle else None
+        )
+    _emit(found, (a, b), format_=format_)
+    regressions = found.regressions(tolerance=allowed / 100)
+    if fail_on_regression and regressions:
+        from busplan.report.diff import regression_words
+
+        say(regression_words(regressions, tolerance=allowed))
+        raise PlanFailsError
+
+
+def _tolerance(percent: float | None, *, wanted: bool) -> float:
+    if percent is None:
+        return 0.0
+    if not wanted:
+        raise BusplanError("--tolerance: goes with --fail-on-regression")
+    if not (isfinite(percent) and percent >= 0):
+        raise BusplanError(f"--tolerance {percent:g}: must be 0 or more, in percent")
+    return percent
+
+
+def _profiles(a: str, b: str) -> "tuple[Profile, Profile]":
+    """Read both; what is wrong with either is said together."""
+    if a == b == "-":
+        raise BusplanError("A and B are both standard input, which can be read once: give a file for one of them")
+    from busplan.profile.revision import load_revision
+
+    profiles: list[Profile] = []
+    problems: list[str] = []
+    for argument in (a, b):
+        try:
+            profiles.append(load_revision(argument).profile)
+        except BusplanError as error:
+            problems.extend(error.problems)
+    if problems:
+        raise BusplanError(*dict.fromkeys(problems))
+    one, other = profiles
+    return one, other
+
+
+class _Circles:
+    """The circle tests of both profiles, with one progress."""
+
+    def __init__(self, progress: "Progress") -> None:
+        self._progress = progress
+        self._done = 0
+
+    def __call__(self, profile: "Profile") -> "CircleFigures":
+        from busplan.analysis.circle_test import circle_test
+
+        before = self._done
+        self._done += _PARTS
+
+        def report(done: int, total: int) -> None:
+            self._progress(before + done * _PARTS // total, 2 * _PARTS)
+
+        return circle_test(profile, explain=False, progress=report).results[0]
+
+
+def _emit(found: "Difference", arguments: tuple[str, str], *, format_: str) -> None:
+    from busplan.report import diff, text
+
+    if format_ == "table":
+        emit(diff.diff_lines(found, arguments=arguments))
+    elif format_ == "markdown":
+        emit_text(diff.diff_markdown(found, arguments=arguments))
+    else:
+        emit_text(text.to_json(diff.diff_document(found, arguments=arguments)))

@@ -1,0 +1,96 @@
+"""Keys whose values differ between two profiles: what they are, shown so that the difference is seen."""
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import takewhile
+from operator import eq
+from typing import Any, Final
+
+from busplan.analysis.difference import KeyDifference
+from busplan.profile.keys import KeyValue
+
+CHANGE_HEADINGS: Final = ("key", "A", "B")
+
+_MOST_ITEMS: Final = 8
+"""Longest list that is shown in full."""
+_MOST_CHARACTERS: Final = 40
+"""Longest text that is shown in full."""
+_CONTEXT: Final = 8
+"""Characters that are shown in front of the first that differs."""
+
+
+def change_rows(keys: Iterable[KeyDifference]) -> Iterator[tuple[str, str, str]]:
+    """One row a key: its values, and where they come from when that is not the file."""
+    for one in keys:
+        yield one.key, change_cell(one.a, one.b), change_cell(one.b, one.a)
+
+
+def change_cell(value: KeyValue | None, other: KeyValue | None) -> str:
+    """Write one side of a difference; the other side tells which part of a long value matters."""
+    if value is None:
+        return "-"
+    shown = shown_value(value.value, None if other is None else other.value)
+    return shown if value.source == "file" else f"{shown} (default)"
+
+
+def shown_value(value: Any, other: Any = None) -> str:
+    """Write a value as TOML does, and of a long one what is not as in the other.
+
+    Examples
+    --------
+    >>> shown_value(4000.0), shown_value(None), shown_value("S400")
+    ('4000', 'none', '"S400"')
+    >>> shown_value((1, 2, 3, 4, 5, 6, 7, 8, 10), (1, 2, 3, 4, 5, 6, 7, 9, 10))
+    '[7 alike, 8, 1 alike]'
+    """
+    match value:
+        case None:
+            return "none"
+        case str():
+            return _text(value, other if isinstance(other, str) else "")
+        case tuple():
+            return _list(value, other if isinstance(other, tuple) else ())
+        case float():
+            return repr(value).removesuffix(".0")
+    return str(value)
+
+
+def _alike(one: Sequence[Any], other: Sequence[Any]) -> int:
+    """How many elements two sequences begin with in common."""
+    return sum(takewhile(bool, map(eq, one, other)))
+
+
+def _list(items: tuple[Any, ...], other: tuple[Any, ...]) -> str:
+    if len(items) <= _MOST_ITEMS:
+        return f"[{', '.join(map(shown_value, items))}]"
+    before = _alike(items, other)
+    after = _alike(items[before:][::-1], other[before:][::-1])
+    middle = items[before : len(items) - after]
+    more = len(middle) - _MOST_ITEMS
+    parts = (
+        *([f"{before} alike"] if before else []),
+        *map(shown_value, middle[:_MOST_ITEMS]),
+        *([f"{more} more"] if more > 0 else []),
+        *([f"{after} alike"] if after else []),
+    )
+    return f"[{', '.join(parts)}]"
+
+
+def _text(text: str, other: str) -> str:
+    if len(text) <= _MOST_CHARACTERS:
+        return json.dumps(text, ensure_ascii=False)
+    start = max(0, _alike(text, other) - _CONTEXT)
+    end = start + _MOST_CHARACTERS
+    piece = json.dumps(text[start:end], ensure_ascii=False)
+    return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
+
+
+def change_document(one: KeyDifference) -> dict[str, Any]:
+    """Write a difference as plain data: both values in full."""
+    return {
+        "key": one.key,
+        "a": one.a and one.a.value,
+        "a_source": "absent" if one.a is None else one.a.source,
+        "b": one.b and one.b.value,
+        "b_source": "absent" if one.b is None else one.b.source,
+    }

@@ -1,0 +1,235 @@
+"""`busplan diff`: for people, for a pull request, and as plain data."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from busplan.analysis.difference import CircleSide, Difference, Figure, Judgement
+from busplan.profile.model import Profile
+from busplan.report import markdown
+from busplan.report.capacity import CAPACITY_ROWS
+from busplan.report.changes import CHANGE_HEADINGS, change_document, change_rows
+from busplan.report.documents import Document, document
+from busplan.report.lines import BLANK, GridRow, Line, count, plural, printable, table, us, yes
+from busplan.report.words import period
+
+Arguments = tuple[str, str]
+"""A and B as they were typed."""
+
+
+def _um(value_mm: float) -> str:
+    return us(value_mm * 1e3)
+
+
+def _two(value: float) -> str:
+    return f"{value:.2f}"
+
+
+_OWN_ROWS: Final = (
+    GridRow("timing that decides", "", "", "timing_model", str),
+    GridRow("fits, as that decides", "", "", "verdict_fits", yes),
+    GridRow("period T_s", "", "us", "period_us", us),
+    GridRow("nodes N", "", "nodes", "nodes", count),
+    GridRow("axes", "", "axes", "axes", count),
+    GridRow("hops", "", "1", "hops", count),
+    GridRow("gap count", "", "1", "gap_count", count),
+    GridRow("gap count is safe", "", "", "gap_count_safe", yes),
+    GridRow("read T_lant + T_sum", "", "us", "read_latency_with_gaps_us", us),
+    GridRow("write T_lant + T_sum", "", "us", "write_latency_with_gaps_us", us),
+    GridRow("largest term", "", "", "binding_term", str),
+    GridRow("passed", "", "", "passed", yes),
+    GridRow("stable", "", "", "stable", yes),
+    GridRow("phase margin", "", "deg", "phase_margin_deg", _two),
+    GridRow("gain margin", "", "dB", "gain_margin_db", _two),
+    GridRow("mean contour error", "", "um", "mean_contour_error_mm", _um),
+    GridRow("largest contour error", "", "um", "max_contour_error_mm", _um),
+    GridRow("circular deviation G", "", "um", "circular_deviation_mm", _um),
+    GridRow("servo values", "", "", "servo_grade", str),
+)
+_ROWS: Final = {row.key: row for row in (*CAPACITY_ROWS, *_OWN_ROWS)}
+_HEADINGS: Final = ("figure", "of", "unit", "A", "B", "B - A", "relative", "B is")
+_WORDS: Final = 3
+"""Columns of words, in front of those of figures."""
+
+_FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
+_LOUD: Final[dict[str, dict[Judgement, str]]] = {
+    "gap_count_safe": {
+        "worse": "B has an unsafe gap count where A has a safe one",
+        "better": "B has a safe gap count where A has an unsafe one",
+    },
+    "passed": {"worse": "B does not pass the circle where A does", "better": "B passes the circle where A does not"},
+}
+"""Figures that speak for themselves, beside whether it fits."""
+_TOLD: Final = {"verdict_fits", "fits", *_LOUD}
+_MOST_NAMED: Final = 4
+"""Figures that a headline names."""
+_MOST_KEYS: Final = 20
+"""Keys that a comment on a pull request lists."""
+
+
+def diff_lines(found: Difference, *, arguments: Arguments) -> list[Line]:
+    """The verdict, the keys that differ, and every figure of both."""
+    lines = [_headline(found), *(Line(printable(one)) for one in _sides(found, arguments))]
+    if not found.keys:
+        return lines
+    lines.extend(_notes(found))
+    changes = table(CHANGE_HEADINGS, change_rows(found.keys), left=len(CHANGE_HEADINGS))
+    return [*lines, BLANK, *changes, BLANK, *table(_HEADINGS, map(_cells, found.figures), left=_WORDS)]
+
+
+def diff_markdown(found: Difference, *, arguments: Arguments) -> str:
+    """A comment for a pull request: the verdict, the keys that differ, and the figures that do."""
+    # In a table code is text whatever it holds; in a line of its own a bar would need other escapes.
+    sides = [
+        (side, markdown.code(argument), markdown.code(profile.name))
+        for side, argument, profile in zip("AB", arguments, (found.a, found.b), strict=True)
+    ]
+    lines = [
+        f"**busplan diff:** {_headline(found).text}",
+        "",
+        *markdown.table(("", "given as", "name"), sides, left=len(sides[0])),
+    ]
+    if found.keys:
+        rows = [tuple(map(markdown.code, row)) for row in change_rows(found.keys[:_MOST_KEYS])]
+        lines += ["", *markdown.table(CHANGE_HEADINGS, rows, left=len(CHANGE_HEADINGS)), ""]
+        hidden = len(found.keys) - len(rows)
+        lines += [f"And {plural(hidden, 'more key')}.", ""] if hidden else []
+        # Of a circle that one side has not, a note says why: it needs no rows.
+        told = [one for one in found.figures if one.judgement != "neutral" or None not in (one.a, one.b)]
+        changed = [one for one in told if one.judgement != "same"]
+        lines += [*markdown.table(_HEADINGS, map(_markdown_cells, changed), left=_WORDS), ""] if changed else []
+        same = len(told) - len(changed)
+        lines += [f"{plural(same, 'figure')} {'is' if same == 1 else 'are'} the same."] if same else []
+        lines += [part for note in _notes(found) for part in ("", markdown.escaped(note.text))]
+    return "\n".join((*lines, ""))
+
+
+def diff_document(found: Difference, *, arguments: Arguments) -> Document:
+    """Answer of `busplan diff`."""
+    circles = found.circles or (None, None)
+    a, b = (
+        _side_document(argument, profile, circle)
+        for argument, profile, circle in zip(arguments, (found.a, found.b), circles, strict=True)
+    )
+    return document(
+        "diff",
+        a=a,
+        b=b,
+        verdict=_headline(found).text,
+        same=not found.keys,
+        changes=[change_document(one) for one in found.keys],
+        figures=[_figure_document(figure) for figure in found.figures],
+    )
+
+
+def regression_words(regressions: Sequence[Figure], *, tolerance: float) -> str:
+    """Say which figures fail a gate."""
+    by = f" by more than {tolerance:.12g} %" if tolerance else ""
+    names = _named(regressions)
+    return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}"
+
+
+def _headline(found: Difference) -> Line:
+    if not found.keys:
+        return Line("A and B are the same profile: every key has the same value.")
+    worse, better = found.judged("worse"), found.judged("better")
+    if worse or better:
+        verdicts = [*_loud(worse), *_counted("worse", worse), *_loud(better), *_counted("better", better)]
+        return Line(f"{'; '.join(verdicts)}.", "bad" if worse else "good")
+    differ = f"{plural(len(found.keys), 'key')} {'differs' if len(found.keys) == 1 else 'differ'}"
+    if found.judged("neutral"):
+        return Line(f"B is neither better nor worse: {differ}, and only figures that are neither.")
+    return Line(f"B is neither better nor worse: {differ}, and no figure.")
+
+
+def _loud(figures: Sequence[Figure]) -> Iterator[str]:
+    judged = {one.measure.key: one.judgement for one in figures}
+    models = " and ".join(one.part for one in figures if one.measure.key == "fits")
+    if "verdict_fits" in judged:
+        yield f"{_FITS[judged['verdict_fits']]} ({f'{models} timing' if models else 'each by the timing that decides'})"
+    elif models:
+        yield f"{_FITS[judged['fits']]} ({models} timing, which does not change the verdict)"
+    for key, words in _LOUD.items():
+        if key in judged:
+            yield words[judged[key]]
+
+
+def _counted(judgement: Judgement, figures: Sequence[Figure]) -> Iterator[str]:
+    names = _named([one for one in figures if one.measure.key not in _TOLD])
+    if names:
+        hidden = len(names) - _MOST_NAMED
+        more = f" and {hidden} more" if hidden > 0 else ""
+        yield f"B is {judgement} in {plural(len(names), 'figure')}: {', '.join(names[:_MOST_NAMED])}{more}"
+
+
+def _named(figures: Sequence[Figure]) -> list[str]:
+    """Names of figures, each once, with the timing model where that is not both."""
+    parts: dict[str, list[str]] = {}
+    for one in figures:
+        parts.setdefault(_ROWS[one.measure.key].label, []).append(one.part)
+    return [
+        f"{label} ({of[0]})" if len(of) == 1 and of[0] in ("paper", "standard") else label
+        for label, of in parts.items()
+    ]
+
+
+def _sides(found: Difference, arguments: Arguments) -> Iterator[str]:
+    for side, argument, profile in zip("AB", arguments, (found.a, found.b), strict=True):
+        name = "" if profile.name == argument else f" ({profile.name})"
+        at = period(profile.cycle.period_us)
+        yield f"{side}: {argument}{name} at {at}, the {profile.bus.timing_model} model decides."
+
+
+def _notes(found: Difference) -> Iterator[Line]:
+    """Say why a circle fails or has no figures, and what the figures rest on."""
+    if found.circles is None:
+        return
+    for side, circle in zip("AB", found.circles, strict=True):
+        if circle.problems:
+            state = "FAILED" if circle.simulated else "is not simulated"
+            yield Line(f"The circle of {side} {state}: {', and '.join(circle.problems)}.", "warning")
+    if any(circle.simulated for circle in found.circles):
+        a, b = found.a.servo.grade, found.b.servo.grade
+        yield Line(f"The servo values behind the circle's figures are {a if a == b else f'{a} in A and {b} in B'}.")
+
+
+def _cells(figure: Figure) -> tuple[str, ...]:
+    row = _ROWS[figure.measure.key]
+    a, b = ("-" if value is None else row.write(value) for value in (figure.a, figure.b))
+    return (row.label.strip(), figure.part, row.unit, a, b, *_changes(figure, row), figure.judgement)
+
+
+def _changes(figure: Figure, row: GridRow) -> tuple[str, str]:
+    """Write the difference and the share that it is; what is but rounding is none."""
+    if figure.difference is None or figure.judgement == "same":
+        return "-", "-"
+    share = figure.relative_difference
+    size = row.write(abs(figure.difference))
+    return f"{'-' if figure.difference < 0 else '+'}{size}", "-" if share is None else f"{share:+.1%}"
+
+
+def _markdown_cells(figure: Figure) -> tuple[str, ...]:
+    # Nothing here is a profile's text: labels, figures and words of ours, none of them markup.
+    *cells, judgement = _cells(figure)
+    return (*cells, f"**{judgement}**" if figure.judgement == "worse" else judgement)
+
+
+def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> Document:
+    return {
+        "argument": argument,
+        "profile": profile.name,
+        "timing_model": profile.bus.timing_model,
+        "circle_problems": None if circle is None else list(circle.problems),
+    }
+
+
+def _figure_document(figure: Figure) -> Document:
+    return {
+        "part": figure.part,
+        "figure": figure.measure.key,
+        "better": figure.measure.better,
+        "a": figure.a,
+        "b": figure.b,
+        "difference": figure.difference,
+        "relative_difference": figure.relative_difference,
+        "judgement": figure.judgement,
+    }

@@ -1,0 +1,184 @@
+"""`busplan diff` as users and gates call it: figures of the other commands, exit codes, revisions, refusals."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from busplan.profile.shipped import shipped_names
+
+Run = Callable[..., Any]
+Refused = Callable[..., str]
+
+PAIRS = [("paper-1ms", "paper-optimal-gap"), ("paper-4ms", "paper-two-node"), ("paper-dma", "paper-1ms")]
+JSON = ("--format", "json")
+GATE = "--fail-on-regression"
+
+
+def answer(run: Run, *arguments: str, **options: Any) -> Any:
+    return json.loads(run(*arguments, *JSON, **options).stdout)
+
+
+def expected(run: Run, name: str) -> dict[tuple[str, str], Any]:
+    """Figures of one profile by part and name, as the commands that compute them give them."""
+    capacity = answer(run, "capacity", name)
+    by_model = {one["timing_model"]: one for one in capacity["results"]}
+    (verdict,) = capacity["verdicts"]
+    (circle,) = answer(run, "circle-test", name)["results"]
+    deciding = by_model[verdict["timing_model"]]
+    found = {("plan", key): value for key, value in deciding.items()} | {("plan", "verdict_fits"): verdict["fits"]}
+    found |= {(model, key): value for model, one in by_model.items() for key, value in one.items()}
+    for one in answer(run, "latency", name)["transactions"]:
+        key = f"{one['transaction']}_latency"
+        found[one["timing_model"], f"{key}_us"] = one["latency_us"]
+        found[one["timing_model"], f"{key}_with_gaps_us"] = one["latency_with_gaps_us"]
+    return found | {("circle", key): value for key, value in circle.items()}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_every_figure_is_that_of_its_own_command(run: Run, pair: tuple[str, str]) -> None:
+    figures = answer(run, "diff", *pair)["figures"]
+    assert {one["part"] for one in figures} == {"plan", "paper", "standard", "circle"}
+    for side, name in zip("ab", pair, strict=True):
+        known = expected(run, name)
+        for one in figures:
+            assert one[side] == known[one["part"], one["figure"]], one
+    for one in figures:
+        if one["difference"] is not None:
+            assert one["difference"] == one["b"] - one["a"]
+        if one["relative_difference"] is not None:
+            assert one["relative_difference"] == pytest.approx((one["b"] - one["a"]) / abs(one["a"]))
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_profile_is_the_same_as_itself(run: Run, name: str) -> None:
+    document = answer(run, "diff", name, name, GATE)
+    assert document["same"] is True
+    assert document["changes"] == []
+    assert {one["judgement"] for one in document["figures"]} == {"same"}
+    done = run("diff", name, name)
+    assert done.stdout.startswith("A and B are the same profile: every key has the same value.\n")
+
+
+@pytest.mark.parametrize("timing", ["paper", "standard", "both"])
+@pytest.mark.parametrize("circle", [True, False])
+def test_only_what_is_asked_for_is_shown(run: Run, timing: str, circle: bool) -> None:
+    options = ("--timing", timing, "--circle" if circle else "--no-circle")
+    document = answer(run, "diff", "paper-1ms", "paper-optimal-gap", *options)
+    models = {"paper", "standard"} if timing == "both" else {timing}
+    assert {one["part"] for one in document["figures"]} == {"plan", *models, *(["circle"] if circle else [])}
+    assert (document["a"]["circle_problems"] is None) == (not circle)
+
+
+def test_forms_say_the_same_verdict(run: Run) -> None:
+    pair = ("diff", "paper-optimal-gap", "paper-1ms")
+    verdict = answer(run, *pair)["verdict"]
+    assert run(*pair).stdout.startswith(f"{verdict}\n")
+    assert run(*pair, "--format", "markdown").stdout.startswith(f"**busplan diff:** {verdict}\n")
+
+
+# --- the gate ---------------------------------------------------------------------------------------------
+
+
+def test_a_report_exits_0_and_a_gate_1_on_a_regression(run: Run) -> None:
+    worse, better = ("diff", "paper-optimal-gap", "paper-1ms"), ("diff", "paper-1ms", "paper-optimal-gap")
+    assert (run(*worse).returncode, run(*worse).stderr) == (0, "")
+    assert (run(*better, GATE).returncode, run(*better, GATE).stderr) == (0, "")
+    done = run(*worse, GATE)
+    assert (done.returncode, done.stdout) == (1, run(*worse).stdout)
+    assert done.stderr.startswith("regression: B is worse in 10 figures: margin, utilisation, required N T_cs, ")
+    for form in ("json", "markdown"):
+        assert run(*worse, GATE, "--format", form).returncode == 1
+
+
+def test_a_gate_as_a_process(run: Run) -> None:
+    done = run("diff", "paper-optimal-gap", "paper-1ms", GATE, env={})
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert run("diff", "paper-1ms", "paper-optimal-gap", GATE, env={}).returncode == 0
+    assert run("diff", "paper-1ms", "nope", GATE, env={}).returncode == 2
+
+
+def test_a_regression_under_the_model_that_does_not_decide_counts(run: Run, repository: Path) -> None:
+    line = repository / "profiles" / "line.toml"
+    text = line.read_text(encoding="utf-8")
+    # More payload overhead costs the paper's packets only; the standard's have their own.
+    line.write_text(text.replace("write_bytes = 12", "write_bytes = 12\noverhead_bytes = 24"), encoding="utf-8")
+    arguments = ("diff", "HEAD:profiles/line.toml", "profiles/line.toml", GATE)
+    done = run(*arguments, cwd=repository)
+    assert done.returncode == 1
+    assert "margin (paper)" in done.stderr
+    assert run(*arguments, "--timing", "standard", cwd=repository).returncode == 0
+    assert run(*arguments, "--tolerance", "5", cwd=repository).returncode == 0
+    assert run(*arguments, "--tolerance", "0.1", cwd=repository).returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--tolerance", "5"), "--tolerance: goes with --fail-on-regression"),
+        ((GATE, "--tolerance", "-1"), "--tolerance -1: must be 0 or more, in percent"),
+        ((GATE, "--tolerance", "nan"), "--tolerance nan: must be 0 or more, in percent"),
+        ((GATE, "--tolerance", "inf"), "--tolerance inf: must be 0 or more, in percent"),
+    ],
+)
+def test_a_tolerance_that_is_none_is_refused(refused: Refused, options: tuple[str, ...], said: str) -> None:
+    assert refused("diff", "paper-1ms", "paper-4ms", *options) == said
+
+
+# --- what A and B may be ----------------------------------------------------------------------------------
+
+
+def test_a_file_against_its_own_history(run: Run, repository: Path) -> None:
+    document = answer(run, "diff", "HEAD~1:profiles/line.toml", "profiles/line.toml", cwd=repository)
+    assert document["a"]["argument"] == "HEAD~1:profiles/line.toml"
+    assert document["changes"] == [
+        {"key": "cycle.period_us", "a": 4000.0, "a_source": "file", "b": 1000.0, "b_source": "file"}
+    ]
+    assert answer(run, "diff", "v1:./line.toml", "main:./line.toml", cwd=repository / "profiles")["changes"]
+    assert answer(run, "diff", "HEAD:profiles/line.toml", "profiles/line.toml", cwd=repository)["same"]
+
+
+def test_a_process_in_a_hook_reads_the_same_revision(run: Run, repository: Path) -> None:
+    # A relative GIT_DIR is what git gives to its hooks.
+    hook = {"GIT_DIR": ".git", "GIT_INDEX_FILE": ".git/index", "GIT_PREFIX": ""}
+    arguments = ("diff", "v1:./line.toml", "line.toml", "--no-circle")
+    done = run(*arguments, cwd=repository / "profiles", env=hook)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == run(*arguments, cwd=repository / "profiles").stdout
+
+
+def test_standard_input_is_one_side(run: Run, refused: Refused, repository: Path) -> None:
+    text = (repository / "profiles" / "line.toml").read_bytes()
+    there = answer(run, "diff", "v1:profiles/line.toml", "-", cwd=repository, stdin=text)
+    back = answer(run, "diff", "-", "v1:profiles/line.toml", cwd=repository, stdin=text)
+    assert [one["key"] for one in there["changes"] + back["changes"]] == ["cycle.period_us"] * 2
+    assert refused("diff", "-", "-", stdin=text) == (
+        "A and B are both standard input, which can be read once: give a file for one of them"
+    )
+
+
+def test_what_is_wrong_with_either_side_is_said_together(refused: Refused, repository: Path) -> None:
+    (repository / "bad.toml").write_text("x", encoding="utf-8")
+    said = refused("diff", "v1:broken.toml", "bad.toml", cwd=repository).splitlines()
+    assert [line.partition(": ")[0] for line in said] == ["v1:broken.toml:6:1", "bad.toml:1:2"]
+    said = refused("diff", "nope:bad.toml", "none.toml", cwd=repository).splitlines()
+    assert said[0].startswith("nope:bad.toml: revision nope is unknown in the git repository of ")
+    assert said[1].startswith("none.toml: no such file")
+    assert len(refused("diff", "none.toml", "none.toml", cwd=repository).splitlines()) == 1
+
+
+def test_usage(refused: Refused) -> None:
+    assert "Missing argument 'B'" in refused("diff", "paper-1ms")
+    assert "csv" in refused("diff", "paper-1ms", "paper-4ms", "--format", "csv")
+
+
+def test_without_a_circle_numpy_is_not_loaded(run: Run) -> None:
+    code = (
+        "import atexit, sys; atexit.register(lambda: print('numpy' in sys.modules, file=sys.stderr));"
+        "from busplan.cli import run; run()"
+    )
+    pair = ("diff", "paper-1ms", "paper-optimal-gap")
+    assert run(*pair, "--no-circle", python=("-c", code)).stderr == "False\n"
+    assert run(*pair, python=("-c", code)).stderr == "True\n"

@@ -1,0 +1,193 @@
+"""REV:path is the file that git has there, or one message that says why there is none."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from busplan.errors import BusplanError
+from busplan.profile import revision
+from busplan.profile.revision import load_revision
+
+Git = Callable[..., bytes]
+
+
+def refusal(argument: str) -> str:
+    with pytest.raises(BusplanError) as caught:
+        load_revision(argument)
+    assert len(caught.value.problems) == 1
+    return caught.value.problems[0]
+
+
+def period_us(argument: str) -> float:
+    return load_revision(argument).profile.cycle.period_us
+
+
+@pytest.mark.parametrize("name", ["v1", "HEAD~1", "main~1", "HEAD^{/one}", "HEAD", "main", "@"])
+@pytest.mark.parametrize("path", ["profiles/line.toml", "./profiles/line.toml"])
+def test_it_is_the_file_that_git_shows(
+    repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch, name: str, path: str
+) -> None:
+    monkeypatch.chdir(repository)
+    document = load_revision(f"{name}:{path}").document
+    assert document.text.encode() == git("show", f"{name}:{path}")
+    assert document.name == f"{name}:{path}"
+
+
+def test_the_path_begins_at_the_current_folder(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(repository / "profiles")
+    assert period_us("HEAD~1:line.toml") == 4000
+    assert period_us("HEAD~1:./line.toml") == 4000
+    assert period_us("HEAD~1:../profiles/line.toml") == 4000
+    assert refusal("HEAD~1:profiles/line.toml") == (
+        "HEAD~1:profiles/line.toml: no such file in revision HEAD~1; the path starts at the current folder, not at the "
+        "top of the repository"
+    )
+
+
+def test_the_repository_is_the_one_that_the_path_lies_in(
+    repository: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert period_us("v1:repository/profiles/line.toml") == 4000
+    assert period_us(f"v1:{repository}/profiles/line.toml") == 4000
+    (tmp_path / "way").symlink_to(repository / "profiles")
+    assert period_us("v1:way/line.toml") == 4000
+
+
+def test_a_folder_that_is_gone_is_still_in_the_revision(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(repository)
+    assert not (repository / "gone").exists()
+    assert period_us("v1:gone/old.toml") == 4000
+    assert "no such file in revision HEAD;" in refusal("HEAD:gone/old.toml")
+
+
+def test_links_are_followed_as_in_a_checkout(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(repository)
+    assert (period_us("v1:link.toml"), period_us("HEAD:link.toml")) == (4000, 1000)
+    for name in ("lost.toml", "out.toml"):
+        assert refusal(f"v1:{name}") == (
+            f"v1:{name}: is a link in revision v1 that leads to no file of it; name the file itself"
+        )
+
+
+def test_what_is_there_under_that_name_comes_first(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(repository)
+    text = (repository / "profiles" / "line.toml").read_text(encoding="utf-8")
+    (repository / "HEAD:profiles").mkdir()
+    (repository / "HEAD:profiles" / "line.toml").write_text(text.replace("1000", "777"), encoding="utf-8")
+    assert period_us("HEAD:profiles/line.toml") == 777
+    (repository / "paper-4ms").write_text(text, encoding="utf-8")
+    assert load_revision("paper-4ms").document.name == "paper-4ms.toml"
+    assert load_revision("profiles/line.toml").profile.name == "line"
+
+
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [
+        ("nope:profiles/line.toml", "revision nope is unknown in the git repository of "),
+        ("-x:profiles/line.toml", "revision -x is unknown in the git repository of "),
+        ("--output=x:profiles/line.toml", "revision --output=x is unknown in the git repository of "),
+        ("HEAD~9:profiles/line.toml", "revision HEAD~9 is unknown in the git repository of "),
+        ("nope@{10:00}:profiles/line.toml", "revision nope@{10:00} is unknown in the git repository of "),
+        ("a tree b:profiles/line.toml", "revision a tree b is unknown in the git repository of "),
+        ("HEAD:profiles/other.toml", "no such file in revision HEAD;"),
+        ("HEAD:profiles/a tree b", "no such file in revision HEAD;"),
+        ("HEAD:profiles/line.toml/x", "no such file in revision HEAD;"),
+        ("HEAD:profiles", "is a directory in revision HEAD; give a file"),
+        ("HEAD:.", "is a directory in revision HEAD; give a file"),
+        (":profiles/line.toml", "no such file, and no shipped profile of that name"),
+        ("HEAD:", "no such file, and no shipped profile of that name"),
+        ("HEAD\n:profiles/line.toml", "no such file, and no shipped profile of that name"),
+        ("HEAD:profiles/line.toml\0", "no such file, and no shipped profile of that name"),
+        (f"HEAD:{'y' * 300}/z.toml", "cannot be read: File name too long"),
+    ],
+)
+def test_what_cannot_be_read_is_said(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, argument: str, said: str
+) -> None:
+    monkeypatch.chdir(repository)
+    message = refusal(argument)
+    assert message.startswith(f"{argument}: {said}")
+    assert sorted(repository.glob("x")) == []
+
+
+def test_faults_of_a_file_are_named_as_it_was_typed(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(repository)
+    assert refusal("v1:./broken.toml").startswith("v1:./broken.toml:6:1: bus.nodes = 0: must be 1 or more")
+    assert refusal("v1:large.toml").startswith("v1:large.toml:1:1: the file is larger than 100,000 bytes")
+
+
+def test_without_a_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert refusal("HEAD:line.toml") == (
+        f"HEAD:line.toml: no such file, and no git repository to read REV:path from at {tmp_path}"
+    )
+
+
+def test_an_empty_repository_has_no_revision(git: Git, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert git("status", "--short") == b""
+    monkeypatch.chdir(tmp_path / "repository")
+    assert "revision HEAD is unknown" in refusal("HEAD:line.toml")
+
+
+@pytest.mark.parametrize(
+    "variables",
+    [
+        {"GIT_DIR": "/nowhere"},
+        {"GIT_INDEX_FILE": "/nowhere", "GIT_WORK_TREE": "/"},
+        {"GIT_OBJECT_DIRECTORY": "/nowhere"},
+        {"GIT_PREFIX": "gone/", "GIT_TRACE": "1", "GIT_PAGER": "false", "LC_ALL": "de_DE.UTF-8"},
+    ],
+)
+def test_what_git_sets_for_its_hooks_leads_nowhere_else(
+    repository: Path, monkeypatch: pytest.MonkeyPatch, variables: dict[str, str]
+) -> None:
+    monkeypatch.chdir(repository)
+    for name, value in variables.items():
+        monkeypatch.setenv(name, value)
+    assert period_us("v1:profiles/line.toml") == 4000
+    assert "revision nope is unknown" in refusal("nope:profiles/line.toml")
+
+
+def fake_git(folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
+    path = folder / "git"
+    path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
+    path.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
+
+
+def test_without_git(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert refusal("HEAD:line.toml") == (
+        "HEAD:line.toml: no such file; to read REV:path needs git, and there is no git on PATH"
+    )
+    assert load_revision("paper-4ms").profile.name == "paper-4ms"
+
+
+def test_a_git_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    fake_git(tmp_path, monkeypatch, "exec sleep 60")
+    monkeypatch.setattr(revision, "TIMEOUT_S", 0.2)
+    assert refusal("HEAD:line.toml") == "HEAD:line.toml: git gave no answer within 0.2 s"
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("echo 'fatal: detected dubious ownership' >&2; exit 128", "REV:path: detected dubious ownership"),
+        ("exit 1", "REV:path: no reason given"),
+        ("echo 'ab12^{tree} ambiguous'", "revision HEAD is ambiguous in the git repository of "),
+        ("exit 0", "revision HEAD is unknown in the git repository of "),
+        ("printf '\\377\\n'", "revision HEAD is unknown in the git repository of "),
+    ],
+)
+def test_a_git_that_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    fake_git(tmp_path, monkeypatch, script)
+    message = refusal("HEAD:line.toml")
+    assert message.startswith("HEAD:line.toml: ")
+    assert said in message
