@@ -13,6 +13,7 @@ COMMANDS: Final = (
     "latency",
     "capacity",
     "circle-test",
+    "report",
     "calibrate",
     "plan",
     "timeline",

@@ -8,7 +8,7 @@ from busplan.analysis.verdict import Verdict
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, percent, plural, us, yes
 from busplan.report.words import verdict_lines
 
-_CAPACITY_ROWS: Final = (
+CAPACITY_ROWS: Final = (
     GridRow("available alpha T_s", "(1)", "us", "available_us", us),
     GridRow("required N T_cs", "(2)", "us", "required_us", us),
     GridRow("  arbitration", "(4)", "us", "cycle_arbitration_us", us),
@@ -50,4 +50,4 @@ def _grid(figures: Sequence[CapacityFigures]) -> list[Line]:
     first = figures[0]
     nodes = f"{plural(first.nodes, 'node')}, {plural(first.axes, 'axis')}"
     heading = f"{nodes}\n{plural(first.hops, 'hop')}, gap count {first.gap_count}"
-    return grid(heading, [(one.timing_model, one) for one in figures], _CAPACITY_ROWS)
+    return grid(heading, [(one.timing_model, one) for one in figures], CAPACITY_ROWS)
