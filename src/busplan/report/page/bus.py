@@ -80,7 +80,12 @@ def models_part(answer: Overview, sources: Sources) -> Part:
         sources["latency"],
         [f"/transactions/{index}" for index in range(len(transactions))],
     )
-    return Part("models", "Both timing models", tables=(cycle, halves), commands=_ids(sources, "capacity", "latency"))
+    return Part(
+        "models",
+        "Both timing models, side by side",
+        tables=(cycle, halves),
+        commands=_ids(sources, "capacity", "latency"),
+    )
 
 
 def _grid(
@@ -115,12 +120,15 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
     if answer.schedule is None:
         return Part("timeline", title, lines=tuple(f"Not drawn: {why}." for why in answer.no_schedule))
     plan, source = answer.schedule, sources["timeline"]
-    caption = f"One communication cycle by the {plan.figures.timing_model} model: {subject(plan)}."
+    caption = (
+        f"One communication cycle by the {plan.figures.timing_model} model: {subject(plan)}, every node at the "
+        "hops of the farthest."
+    )
     chart = Chart("wide", caption, timeline_svg(plan, inline=True), timeline_mermaid(plan))
     totals = source.value("/totals")
     table = Table(
         "What takes the slice" if plan.figures.fits else "What takes the cycle",
-        (Column("kind", "words"), Column("eq", "words"), Column("events"), Column("us"), Column("share, %")),
+        (Column("kind", "words"), Column("eq", "words"), Column("events"), Column("us"), Column("%")),
         tuple(
             Row(
                 (

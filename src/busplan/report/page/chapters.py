@@ -88,7 +88,9 @@ def _assumptions_part(answer: Overview) -> Part:
         Column(word, "figures" if word == "value" else "words")
         for word in ("name", "value", "unit", "grade", "source", "meaning")
     )
-    return Part("assumptions", "What it rests on", tables=(Table("Assumptions with their grades", columns, rows),))
+    return Part(
+        "assumptions", "What it rests on", tables=(Table("Assumptions with their grades", columns, rows, stacks=True),)
+    )
 
 
 def _value(value: float | str) -> str:
@@ -99,7 +101,9 @@ def _commands_part(listed: Sequence[Source]) -> Part:
     rows = tuple(Row((one.purpose, one)) for one in listed)
     columns = (Column("what", "words"), Column("command", "words"))
     line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
-    return Part("commands", "How to get every figure again", (line,), tables=(Table("Commands", columns, rows),))
+    return Part(
+        "commands", "How to get every figure again", (line,), tables=(Table("Commands", columns, rows, stacks=True),)
+    )
 
 
 def _comparison(subjects: Sequence[Subject], chapters: Sequence[Chapter]) -> Table:
@@ -130,7 +134,7 @@ def _compared(subject: Subject, chapter: Chapter, *, models: int) -> tuple[Cell,
     circle = next((one for one in chapter.sources if one.document["command"] == "circle-test"), None)
     measures = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
     return (
-        Link(chapter.name, chapter.anchor),
+        Link(chapter.name, chapter.anchor, chapter.origin),
         capacity.figure("/verdicts/0/fits", fit_word),
         capacity.figure("/verdicts/0/models_agree", fit_word),
         capacity.figure(f"/results/{own}/period_us", plain, "us"),

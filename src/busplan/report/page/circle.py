@@ -141,8 +141,8 @@ def sources_part(answer: Overview, sources: Mapping[str, Source]) -> Part | None
         Column("source", "words"),
         Column("", "drawing"),
         Column("takes, um"),
-        Column("max without, um"),
-        Column("G without, um"),
+        Column("max", group="without it, um"),
+        Column("G", group="without it, um"),
     )
     caption = "Each error source removed in turn; what it takes from the largest contour error, largest first"
     line = "Sources act together: what they take one by one need not add up. A negative one hides another."

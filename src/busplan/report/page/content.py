@@ -80,6 +80,8 @@ class Link(NamedTuple):
 
     text: str
     anchor: str
+    origin: str
+    """Where the profile is from: names may be the same."""
 
 
 class Code(NamedTuple):
@@ -114,6 +116,8 @@ class Table(NamedTuple):
     caption: str
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
+    stacks: bool = False
+    """Whether a phone shows each row as lines: a table of words, which nobody compares down a column."""
 
     @property
     def groups(self) -> tuple[tuple[str, int], ...]:

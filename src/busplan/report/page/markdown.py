@@ -72,7 +72,8 @@ def _cell(cell: Cell) -> str:
         case Figure():
             return escaped(cell.text)
         case Link():
-            return f"[{code(cell.text)}](#{cell.anchor})"
+            origin = "" if cell.origin == cell.text else f" {code(cell.origin)}"
+            return f"[{code(cell.text)}](#{cell.anchor}){origin}"
         case Source():
             return code(cell.line)
         case Code() | Swatch():

@@ -45,7 +45,7 @@ def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
     plan
         The schedule, narrowed to its window.
     inline
-        For a page that has the style sheet once, and the verdict and the legend in its own words: without these.
+        For a page that has the style sheet once, and verdict, subject and legend in its own words: without these.
     """
     root = drawing(headline(plan), css="busplan-timeline")
     SubElement(root, "desc").text = subject(plan)
@@ -54,14 +54,19 @@ def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
         SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     window = drawn_window(plan)
-    height = 0 if inline else _words(body, headline(plan), y=8, css="head" if plan.figures.fits else "head bad")
-    height = _words(body, f"{subject(window)}, every node at the hops of the farthest", y=height, css="small")
-    height = _strip(body, plan, window, y=height + _GAP)
+    height = 0 if inline else _above(body, plan, window) + _GAP
+    height = _strip(body, plan, window, y=height)
     height = (_event_lanes if has_event_lanes(window) else _node_lanes)(body, window, y=height + _GAP)
     if not inline:
         height = _legend(body, plan, y=height + _GAP) + _GAP
     root.set("height", str(height))
     return markup(root)
+
+
+def _above(body: Element, plan: Schedule, window: Schedule) -> int:
+    """The verdict and what is shown, in words; the height below them."""
+    height = _words(body, headline(plan), y=8, css="head" if plan.figures.fits else "head bad")
+    return _words(body, f"{subject(window)}, every node at the hops of the farthest", y=height, css="small")
 
 
 def _words(parent: Element, text: str, *, y: int, css: str) -> int:

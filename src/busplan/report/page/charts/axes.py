@@ -13,7 +13,7 @@ from busplan.report.lines import plural
 from busplan.report.svg import drawing, markup, text_at
 from busplan.report.words import period
 
-_TOP: Final = 26
+_TOP: Final = 50
 _HEIGHT: Final = 230
 _BELOW: Final = 44
 _MOST_LABELS: Final = 6
@@ -60,9 +60,11 @@ def axes_chart(profile: Profile, steps: Sequence[NodeSteps]) -> str:
     area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})
     for one in steps:
         SubElement(area, "path", {"class": f"curve {one.timing_model}", "d": _path(one, plane)})
+    _figures(root, plane)
+    _legend(root, steps)
     _own(root, plane, own_us, own_axes)
     for one in steps:
-        _mark(root, one.timing_model, x=plane.x(own_us), y=plane.y(one.max_axes(own_us)))
+        _mark(root, one.timing_model, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
     return markup(root)
 
 
@@ -84,13 +86,10 @@ def _step(most: int) -> int:
 
 
 def _grid(root: Element, plane: _Plane) -> None:
-    """Lines for round numbers of axes, their figures on them, and round periods below."""
+    """Lines for round numbers of axes, and round periods below."""
     for axes in range(0, plane.top_axes + 1, plane.axis_step):
-        y = round(plane.y(axes))
-        SubElement(root, "line", {"x1": "0", "x2": "100%", "y1": str(y), "y2": str(y), "class": "rule"})
-        text_at(
-            root, f"{axes} axes" if axes + plane.axis_step > plane.top_axes else str(axes), x="0", y=y - 4, css="small"
-        )
+        y = str(round(plane.y(axes)))
+        SubElement(root, "line", {"x1": "0", "x2": "100%", "y1": y, "y2": y, "class": "rule"})
     bottom = _TOP + _HEIGHT
     for period_us in _round_periods(plane):
         at = plane.x(period_us)
@@ -99,6 +98,22 @@ def _grid(root: Element, plane: _Plane) -> None:
         anchor = "start" if at < 5 else "end" if at > 95 else "middle"  # noqa: PLR2004 - percent: the edges
         text_at(root, period(period_us), x=x, y=bottom + 19, css="small", anchor=anchor)
     text_at(root, "communication period, logarithmic", x="100%", y=bottom + 38, css="small", anchor="end")
+
+
+def _figures(root: Element, plane: _Plane) -> None:
+    """Round numbers of axes on their lines, the highest with its unit."""
+    for axes in range(0, plane.top_axes + 1, plane.axis_step):
+        text = plural(axes, "axis") if axes == plane.top_axes else str(axes)
+        text_at(root, text, x="0", y=round(plane.y(axes)) - 4, css="small halo")
+
+
+def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
+    """A piece of each curve with its name."""
+    for number, one in enumerate(steps):
+        place = SubElement(root, "svg", {"x": str(110 * number), "overflow": "visible"})
+        SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {one.timing_model}"})
+        _mark(place, one.timing_model, x="22", y=9)
+        text_at(place, one.timing_model, x="50", y=14)
 
 
 def _round_periods(plane: _Plane) -> list[float]:
@@ -134,15 +149,15 @@ def _own(root: Element, plane: _Plane, own_us: float, own_axes: int) -> None:
     line = {"x1": x, "x2": x, "y1": str(_TOP - 4), "y2": str(_TOP + _HEIGHT), "class": "own"}
     SubElement(root, "line", line)
     anchor = "start" if at < 30 else "end" if at > 70 else "middle"  # noqa: PLR2004 - percent
-    text_at(root, f"this profile, {period(own_us)}", x=x, y=14, css="head", anchor=anchor)
+    text_at(root, f"this profile, {period(own_us)}", x=x, y=38, css="head", anchor=anchor)
     SubElement(root, "circle", {"cx": x, "cy": str(y), "r": "5", "class": "point"})
     side, shift = ("end", "-9") if at > 70 else ("start", "9")  # noqa: PLR2004 - percent
     box = SubElement(root, "svg", {"x": x, "overflow": "visible"})
     text_at(box, plural(own_axes, "axis"), x=shift, y=y + 4, css="small halo", anchor=side)
 
 
-def _mark(root: Element, model: str, *, x: float, y: float) -> None:
-    """The most axes at the profile's period: a square on the paper's curve, a diamond on the standard's."""
-    place = SubElement(root, "svg", {"x": f"{x:.5g}%", "y": f"{y:.1f}", "overflow": "visible"})
+def _mark(root: Element, model: str, *, x: str, y: float) -> None:
+    """A point of a curve: a square on the paper's, a diamond on the standard's."""
+    place = SubElement(root, "svg", {"x": x, "y": f"{y:.1f}", "overflow": "visible"})
     turn = {} if model == "paper" else {"transform": "rotate(45)"}
     SubElement(place, "rect", {"x": "-4.5", "y": "-4.5", "width": "9", "height": "9", "class": f"mark {model}", **turn})

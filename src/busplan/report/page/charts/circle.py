@@ -9,8 +9,9 @@ from busplan.analysis.contour_profile import ContourProfile
 from busplan.report.plot import ERROR_SHARE, nice_step
 from busplan.report.svg import drawing, markup, text_at
 
-_HALF: Final = 200
-_NOMINAL: Final = 142
+_WIDTH: Final = 470
+_HEIGHT: Final = 400
+_NOMINAL: Final = 140
 """Drawn radius of the nominal circle."""
 _LEAST_MM: Final = 1e-9
 """Largest error that still counts as none."""
@@ -66,7 +67,7 @@ def circle_chart(profile: ContourProfile, scale: Magnified) -> str:
         How it is drawn.
     """
     root = drawing("Circle with its contour error magnified", css="chart circle")
-    root.set("viewBox", f"{-_HALF} {-_HALF} {2 * _HALF} {2 * _HALF}")
+    root.set("viewBox", f"{-_WIDTH // 2} {-_HEIGHT // 2} {_WIDTH} {_HEIGHT}")
     _cross(root)
     rings = ceil(scale.largest_mm * 1e3 / scale.ring_um)
     for ring in range(-rings, rings + 1):
@@ -80,14 +81,12 @@ def circle_chart(profile: ContourProfile, scale: Magnified) -> str:
 
 
 def _cross(root: Element) -> None:
-    """The two axes with their angles."""
-    for number, (x, y, anchor) in enumerate(((1, 0, "end"), (0, -1, "middle"), (-1, 0, "start"), (0, 1, "middle"))):
-        near, far = 40, _HALF - 4
-        line = {"x1": x * near, "y1": y * near, "x2": x * far, "y2": y * far}
-        SubElement(root, "line", {**{key: str(value) for key, value in line.items()}, "class": "rule"})
-        text_at(
-            root, f"{90 * number}°", x=str(x * _HALF + 8 * bool(y) * 2), y=y * (_HALF - 9) - 5 * bool(x), anchor=anchor
-        )
+    """The two axes, and their angles where they end."""
+    far = _NOMINAL * (1 + ERROR_SHARE) + 8
+    for number, (x, y, anchor) in enumerate(((1, 0, "start"), (0, -1, "middle"), (-1, 0, "end"), (0, 1, "middle"))):
+        line = {"x1": x * 40, "y1": y * 40, "x2": x * far, "y2": y * far}
+        SubElement(root, "line", {**{key: f"{value:g}" for key, value in line.items()}, "class": "rule"})
+        text_at(root, f"{90 * number}°", x=f"{x * (far + 4):g}", y=round(y * (far + 9)) + 5, anchor=anchor)
 
 
 def _ring(root: Element, radius: float, *, css: str) -> None:

@@ -77,7 +77,7 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     for one in results:
         text_at(root, one.timing_model, x="0", y=y + 14, css="small")
         y += LINE
-        for part in _segments(one):
+        for part in _segments(one, (*TERMS, LEFT) if end_us >= one.available_us else TERMS):
             _segment(root, part, scale, y=y, height=height)
         y += height
     if end_us > results[0].available_us:
@@ -86,10 +86,10 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     return scale.marks(area, top=top, bottom=y)
 
 
-def _segments(one: CapacityFigures) -> Iterator[_Segment]:
-    """The terms behind one another, and what they leave."""
+def _segments(one: CapacityFigures, terms: Sequence[Term]) -> Iterator[_Segment]:
+    """The terms that take time, behind one another."""
     start_us = 0.0
-    for term in (*TERMS, LEFT):
+    for term in terms:
         size_us = getattr(one, term.key)
         if size_us > 0:
             yield _Segment(term, start_us, start_us + size_us)
