@@ -5,7 +5,6 @@ from typing import Final, NamedTuple
 from busplan.analysis.capacity import Capacity, capacity
 from busplan.analysis.circle_test import CircleFigures, CircleTest, Progress, circle_test
 from busplan.analysis.contour_profile import ContourProfile, contour_profile
-from busplan.analysis.explain import Assumption, assumptions
 from busplan.analysis.latency import BOTH_MODELS, LatencyResult, latency
 from busplan.analysis.node_steps import NodeSteps, node_steps
 from busplan.analysis.schedule import Schedule, schedule
@@ -39,7 +38,6 @@ class Overview(NamedTuple):
     """Contour error around the circle; None where the table did not follow it."""
     no_circle: tuple[str, ...]
     """Why the circle test cannot be run; nothing where it was not asked for."""
-    assumptions: tuple[Assumption, ...]
 
     @property
     def circle_figures(self) -> CircleFigures | None:
@@ -78,7 +76,6 @@ def overview(profile: Profile, *, with_circle: bool = True, progress: Progress |
         circle=circle,
         contour=contour,
         no_circle=no_circle,
-        assumptions=assumptions(profile),
     )
 
 

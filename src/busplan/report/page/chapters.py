@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan import __version__
+from busplan.analysis.explain import assumptions
 from busplan.analysis.overview import Overview
 from busplan.report.circle_test import um
 from busplan.report.lines import count, percent, plural, us
@@ -82,7 +83,7 @@ def _chapter(subject: Subject, *, anchor: str) -> Chapter:
 def _assumptions_part(answer: Overview) -> Part:
     rows = tuple(
         Row((Code(one.name), _value(one.value), one.unit, one.grade, one.source, one.meaning))
-        for one in answer.assumptions
+        for one in assumptions(answer.profile)
     )
     columns = tuple(
         Column(word, "figures" if word == "value" else "words")

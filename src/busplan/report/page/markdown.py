@@ -18,7 +18,8 @@ def page_markdown(page: Page) -> str:
 
 
 def _page(page: Page) -> Iterator[str]:
-    yield f"# {escaped(page.title)}"
+    named = page.title in (chapter.name for chapter in page.chapters)
+    yield f"# {code(page.title) if named else escaped(page.title)}"
     if page.comparison is not None:
         yield from ("", "## Comparison", "")
         yield from _table(page.comparison)
@@ -63,22 +64,25 @@ def _table(one: Table) -> list[str]:
     columns = [one.columns[index] for index in shown]
     headings = [escaped(" ".join(filter(None, (column.group, column.heading)))) or " " for column in columns]
     rows = ([_cell(row.cells[index]) for index in shown] for row in one.rows)
-    left = next((place for place, column in enumerate(columns) if column.kind == "figures"), len(columns))
-    return table(headings, rows, left=left)
+    figures = (place for place, column in enumerate(columns) if column.kind == "figures" and not one.stacks)
+    return table(headings, rows, left=next(figures, len(columns)))
 
 
 def _cell(cell: Cell) -> str:
     match cell:
         case Figure():
-            return escaped(cell.text)
+            text = cell.text
         case Link():
             origin = "" if cell.origin == cell.text else f" {code(cell.origin)}"
-            return f"[{code(cell.text)}](#{cell.anchor}){origin}"
+            text = f"[{code(cell.text)}](#{cell.anchor}){origin}"
         case Source():
-            return code(cell.line)
-        case Code() | Swatch():
-            return code(cell.text) if isinstance(cell, Code) else escaped(cell.text)
+            text = code(cell.line)
+        case Code():
+            text = code(cell.text)
+        case Swatch():
+            text = escaped(cell.text)
         case Drawing():
-            return ""
+            text = ""
         case _:
-            return escaped(cell)
+            text = escaped(cell)
+    return text
