@@ -48,12 +48,17 @@ def test_any_period_carries_what_capacity_says(
 
 @pytest.mark.parametrize("model", ["paper", "standard"])
 def test_each_step_is_where_one_more_node_begins_to_fit(model: TimingModelName) -> None:
-    for nodes, from_us in enumerate(node_steps(BASE, model=model).from_us, start=1):
+    steps = node_steps(BASE, model=model)
+    for nodes, from_us in enumerate(steps.from_us, start=1):
         at, before = (
             figures(override(BASE, {"cycle.period_us": period_us}), model=model)
             for period_us in (from_us, from_us * (1 - 1e-9))
         )
         assert (at.max_nodes, before.max_nodes) == (nodes, nodes - 1)
+        # What fits but for the rounding of floats fits here too.
+        near_us = from_us * (1 - 5e-13)
+        near = figures(override(BASE, {"cycle.period_us": near_us}), model=model)
+        assert steps.max_axes(near_us) == near.max_axes == nodes * BASE.node.axes
         assert figures(override(BASE, {"bus.nodes": nodes}), model=model).min_period_us == pytest.approx(from_us)
 
 

