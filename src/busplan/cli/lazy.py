@@ -15,6 +15,7 @@ COMMANDS: Final = (
     "capacity",
     "circle-test",
     "explain",
+    "report",
     "calibrate",
     "plan",
     "timeline",

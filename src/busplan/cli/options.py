@@ -3,15 +3,18 @@
 import re
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeVar
 
 import typer
 
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from busplan.profile.model import Profile
 
+Form = TypeVar("Form", bound=str)
 Timing = Literal["paper", "standard", "both"]
 Format = Literal["table", "json", "csv"]
 
@@ -163,3 +166,17 @@ def plot_format(path: Path) -> str:
         raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
     require_matplotlib()
     return file_format
+
+
+def form_of_file(given: Form | None, output: Path | None, *, forms: "Mapping[str, Form]", default: Form) -> Form:
+    """The form of a document: what --format says, else what the name of --output says, else the default.
+
+    Raises
+    ------
+    BusplanError
+        The name says nothing.
+    """
+    chosen = given or (default if output is None else forms.get(output.suffix.lower()))
+    if chosen is None:
+        raise BusplanError(f"--output {output}: expected a name ending in {', '.join(forms)}, or --format")
+    return chosen

@@ -13,6 +13,7 @@ from busplan.cli.options import (
     NodesOption,
     ProfileArgument,
     bus_changes,
+    form_of_file,
     periods_us,
     time_us,
 )
@@ -139,11 +140,7 @@ def timeline_command(
 
 def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineFormat:
     """The form that is asked for, by name or by the file's ending; what cannot be drawn is said before any work."""
-    chosen = format_
-    if chosen is None:
-        chosen = "table" if output is None else _SUFFIXES.get(output.suffix.lower())
-    if chosen is None:
-        raise BusplanError(f"--output {output}: expected a name ending in {', '.join(_SUFFIXES)}, or --format")
+    chosen = form_of_file(format_, output, forms=_SUFFIXES, default="table")
     if chosen == "png":
         if output is None:
             raise BusplanError("--format png: a picture does not go to standard output; give -o FILE.png")

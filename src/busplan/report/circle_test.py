@@ -32,7 +32,7 @@ def circle_lines(
     """Verdict of each period, one row of figures a period, the ranked sources and a plot of the error."""
     lines: list[Line] = []
     for result in test.results:
-        lines.extend(_verdict(test.profile.name, result))
+        lines.extend(circle_verdict_lines(test.profile.name, result))
     if any(result.stable is not None for result in test.results):
         # Said wherever a contour figure is shown: what it rests on.
         lines.append(Line(f"The servo values behind these figures are {test.results[0].servo_grade}."))
@@ -46,7 +46,8 @@ def circle_lines(
     return lines
 
 
-def _verdict(name: str, result: CircleFigures) -> Iterator[Line]:
+def circle_verdict_lines(name: str, result: CircleFigures) -> Iterator[Line]:
+    """Say whether the circle holds, what it does not hold, and what to attack first."""
     subject = f"{name} at {period(result.period_us)} and {result.feed_mm_per_min:g} mm/min"
     if result.passed:
         yield Line(f"{subject}: the circle holds every tolerance.", "good")
@@ -58,13 +59,14 @@ def _verdict(name: str, result: CircleFigures) -> Iterator[Line]:
         source, removed_mm = attack
         yield Line(
             f"Attack {source.source} first: without it the {_MEASURES[measure]} is "
-            f"{_um(getattr(source, measure))} um, {_um(removed_mm)} um less."
+            f"{um(getattr(source, measure))} um, {um(removed_mm)} um less."
         )
     elif measure is not None and result.contributions is not None:
         yield Line(f"No single error source of the profile explains the {_MEASURES[measure]}.")
 
 
-def _um(value_mm: float | None) -> str:
+def um(value_mm: float | None) -> str:
+    """Write a length in micrometres; a dash for what does not exist."""
     return "-" if value_mm is None else us(_rounded_um(value_mm))
 
 
@@ -74,12 +76,14 @@ def _rounded_um(value_mm: float) -> float:
     return value_um if abs(value_um) >= _SHOWN_UM else 0.0
 
 
-def _signed_um(value_mm: float) -> str:
+def signed_um(value_mm: float) -> str:
+    """Write a length in micrometres with its sign."""
     text = f"{value_mm * 1e3:+.3f}"
     return "0.000" if float(text) == 0.0 else text
 
 
-def _two(value: float | None) -> str:
+def two_decimals(value: float | None) -> str:
+    """Write a margin; a dash for what does not exist."""
     return "-" if value is None else f"{value:.2f}"
 
 
@@ -88,13 +92,13 @@ _COLUMNS: Final[tuple[tuple[str, Callable[[CircleFigures], str]], ...]] = (
     ("feed\nmm/min", lambda one: f"{one.feed_mm_per_min:g}"),
     ("duration\ns", lambda one: f"{one.duration_s:.3f}"),
     ("set-\npoints", lambda one: str(one.setpoints)),
-    ("mean\num", lambda one: _um(one.mean_contour_error_mm)),
-    ("max\num", lambda one: _um(one.max_contour_error_mm)),
-    ("F_min\num", lambda one: _um(one.radial_deviation_min_mm)),
-    ("F_max\num", lambda one: _um(one.radial_deviation_max_mm)),
-    ("G\num", lambda one: _um(one.circular_deviation_mm)),
-    ("phase\ndeg", lambda one: _two(one.phase_margin_deg)),
-    ("gain\ndB", lambda one: _two(one.gain_margin_db)),
+    ("mean\num", lambda one: um(one.mean_contour_error_mm)),
+    ("max\num", lambda one: um(one.max_contour_error_mm)),
+    ("F_min\num", lambda one: um(one.radial_deviation_min_mm)),
+    ("F_max\num", lambda one: um(one.radial_deviation_max_mm)),
+    ("G\num", lambda one: um(one.circular_deviation_mm)),
+    ("phase\ndeg", lambda one: two_decimals(one.phase_margin_deg)),
+    ("gain\ndB", lambda one: two_decimals(one.gain_margin_db)),
     ("passed", lambda one: "yes" if one.passed else "no"),
 )
 
@@ -113,7 +117,7 @@ def _contributions(title: str, result: CircleFigures) -> list[Line]:
         *table(
             ["source", "max without it, um", "takes, um"],
             (
-                [one.source, _um(one.max_contour_error_mm), _signed_um(one.removed_mm)]
+                [one.source, um(one.max_contour_error_mm), signed_um(one.removed_mm)]
                 for one in result.contributions or ()
             ),
             left=1,

@@ -10,7 +10,7 @@ from busplan.profile.model import Profile
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
 from busplan.report.words import warnings
 
-_LATENCY_ROWS: Final = (
+LATENCY_ROWS: Final = (
     GridRow("request packet, bytes", "", "request_bytes", count),
     GridRow("response packet, bytes", "", "response_bytes", count),
     GridRow("arbitration, each", "", "arbitration_us", us),
@@ -58,4 +58,4 @@ def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
 
 def _grid(transactions: Sequence[Transaction]) -> list[Line]:
     columns = [(f"{one.transaction} {one.payload_bytes} B\n{one.timing_model}", one.phases) for one in transactions]
-    return grid("phase, us", columns, _LATENCY_ROWS, figures=FIGURES["latency"])
+    return grid("phase, us", columns, LATENCY_ROWS, figures=FIGURES["latency"])

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PLOT_FORMATS: Final = ("png", "svg", "pdf")
 _MAX_POINTS: Final = 8000
 """Points of one curve: more than a sheet can show, few enough for a small file."""
-_ERROR_SHARE: Final = 0.25
+ERROR_SHARE: Final = 0.25
 """Largest error in the polar plot as a share of the drawn radius."""
 
 
@@ -100,7 +100,7 @@ def _every(points: int) -> int:
     return max(1, ceil(points / _MAX_POINTS))
 
 
-def _nice_step(largest: float) -> float:
+def nice_step(largest: float) -> float:
     """The 1, 2 or 5 times a power of ten that divides up to `largest` into two to five parts."""
     magnitude: float = 10.0 ** floor(log10(largest / 2))
     return max(factor * magnitude for factor in (1, 2, 5) if factor * magnitude <= largest / 2)
@@ -111,8 +111,8 @@ def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
     trace = run.trace(every=_every(run.steps))
     error_um = trace.contour_error_mm * 1e3
     largest_um = max(float(np.abs(error_um).max()), 1e-6)
-    step_um = _nice_step(largest_um)
-    per_um = _ERROR_SHARE / largest_um
+    step_um = nice_step(largest_um)
+    per_um = ERROR_SHARE / largest_um
     turn = np.linspace(0.0, 2 * np.pi, 361)
     rings = range(-ceil(largest_um / step_um), ceil(largest_um / step_um) + 1)
     for ring in rings:

@@ -4,6 +4,8 @@ from typing import Final
 
 from busplan.report.timeline.kinds import KINDS, STRIP
 
+DARK: Final = "@media screen and (prefers-color-scheme:dark)"
+"""Where colours on black hold: paper is white."""
 _STYLE: Final = """
 .busplan-timeline{font:13px system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
 .busplan-timeline text{fill:#1c2430}
@@ -32,10 +34,15 @@ _DARK_STYLE: Final = """
 
 def stylesheet() -> str:
     """Colours on white, and those on black for who prefers them; nothing reaches beyond the drawing's own class."""
+    light, dark = fills(".busplan-timeline")
+    return f"{_STYLE}{light}{DARK}{{{_DARK_STYLE}{dark}}}\n"
+
+
+def fills(scope: str) -> tuple[str, str]:
+    """Rules that colour each kind of event inside a selector, on white and on black."""
     colours: dict[str, tuple[str, str]] = {kind: (style.light, style.dark) for kind, style in KINDS.items()}
     colours |= {kind: (style.light, style.dark) for kind, style in STRIP.items()}
     light, dark = (
-        "".join(f".busplan-timeline .{kind}{{fill:{pair[side]}}}\n" for kind, pair in colours.items())
-        for side in (0, 1)
+        "".join(f"{scope} .{kind}{{fill:{pair[side]}}}\n" for kind, pair in colours.items()) for side in (0, 1)
     )
-    return f"{_STYLE}{light}@media (prefers-color-scheme:dark){{{_DARK_STYLE}{dark}}}\n"
+    return light, dark

@@ -1,0 +1,99 @@
+"""Everything that is said of one profile on one page: each part by the function of its own command."""
+
+from typing import Final, NamedTuple
+
+from busplan.analysis.capacity import Capacity, capacity
+from busplan.analysis.circle_test import CircleFigures, CircleTest, Progress, circle_test
+from busplan.analysis.contour_profile import ContourProfile, contour_profile
+from busplan.analysis.latency import BOTH_MODELS, LatencyResult, latency
+from busplan.analysis.node_steps import NodeSteps, node_steps
+from busplan.analysis.schedule import Schedule, schedule
+from busplan.analysis.verdict import Verdict, verdicts
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US
+
+CONTOUR_SECTORS: Final = 720
+"""Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""
+_PERIOD_FACTORS: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+class Overview(NamedTuple):
+    """All answers of one profile; what cannot be computed is None, with the reason."""
+
+    profile: Profile
+    capacity: Capacity
+    verdict: Verdict
+    latency: LatencyResult
+    schedule: Schedule | None
+    no_schedule: tuple[str, ...]
+    """Why there is no schedule."""
+    steps: tuple[NodeSteps, ...]
+    """Nodes over the period, under each timing model."""
+    periods: Capacity
+    """Capacity at some periods about the profile's own, the own among them."""
+    circle: CircleTest | None
+    """With its contributions, and without its simulation: that is condensed in `contour`."""
+    contour: ContourProfile | None
+    """Contour error around the circle; None where the table did not follow it."""
+    no_circle: tuple[str, ...]
+    """Why the circle test cannot be run; nothing where it was not asked for."""
+
+    @property
+    def circle_figures(self) -> CircleFigures | None:
+        """Figures of the circle test at the profile's period."""
+        return None if self.circle is None else self.circle.results[0]
+
+
+def overview(profile: Profile, *, with_circle: bool = True, progress: Progress | None = None) -> Overview:
+    """Compute what is to be said of a profile.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    with_circle
+        Run the circle test, if the profile asks for one.
+    progress
+        As for `circle_test`.
+    """
+    bus = capacity(profile)
+    own_us = profile.cycle.period_us
+    periods_us = [own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US]
+    plan, no_schedule = _schedule(profile)
+    circle, contour, no_circle = (
+        _circle(profile, progress) if with_circle and profile.asks_for_circle else (None, None, ())
+    )
+    return Overview(
+        profile=profile,
+        capacity=bus,
+        verdict=verdicts(bus)[0],
+        latency=latency(profile),
+        schedule=plan,
+        no_schedule=no_schedule,
+        steps=tuple(node_steps(profile, model=model) for model in BOTH_MODELS),
+        periods=capacity(profile, periods_us=periods_us),
+        circle=circle,
+        contour=contour,
+        no_circle=no_circle,
+    )
+
+
+def _schedule(profile: Profile) -> tuple[Schedule | None, tuple[str, ...]]:
+    try:
+        return schedule(profile), ()
+    except BusplanError as error:
+        return None, error.problems
+
+
+def _circle(
+    profile: Profile, progress: Progress | None
+) -> tuple[CircleTest | None, ContourProfile | None, tuple[str, ...]]:
+    try:
+        test = circle_test(profile, with_contributions=True, progress=progress)
+    except BusplanError as error:
+        return None, None, error.problems
+    (run,) = test.runs
+    contour = None if run is None or run.diverged else contour_profile(run, sectors=CONTOUR_SECTORS)
+    # Half a million positions a profile are not kept: a page may have many.
+    return test._replace(runs=(None,)), contour, ()

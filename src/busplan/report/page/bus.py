@@ -1,0 +1,218 @@
+"""The parts of a chapter that the bus fills: verdict, timing models, timeline, terms, axes over the period."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from busplan.analysis.overview import Overview
+from busplan.analysis.quantities import FIGURES, Figure
+from busplan.report.capacity import CAPACITY_ROWS
+from busplan.report.latency import LATENCY_ROWS
+from busplan.report.lines import GridRow, count, percent, plural, us, yes
+from busplan.report.page.charts.axes import axes_chart
+from busplan.report.page.charts.terms import LEFT, TERMS, terms_chart
+from busplan.report.page.content import Chart, Column, Part, Row, Source, Swatch, Table, Verdict
+from busplan.report.timeline.kinds import KINDS
+from busplan.report.timeline.lanes import subject
+from busplan.report.timeline.mermaid import timeline_mermaid
+from busplan.report.timeline.svg import timeline_svg
+from busplan.report.words import verdict_lines
+
+Sources = Mapping[str, Source]
+
+_HEAD: Final = (Column("", "words"), Column("eq", "words"), Column("unit", "words"))
+
+
+def plain(value: float) -> str:
+    """Write a setting as it was given, without noise.
+
+    Examples
+    --------
+    >>> plain(4000.0), plain(0.25)
+    ('4000', '0.25')
+    """
+    return f"{value:.12g}"
+
+
+def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
+    """Does the cycle fit, and do the timing models agree?"""
+    verdict, source = answer.verdict, sources["capacity"]
+    word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
+    if not verdict.models_agree:
+        word = "MODELS DISAGREE"
+    elif verdict.deciding.fits and not verdict.deciding.gap_count_safe:
+        word = "UNSAFE GAP COUNT"
+    own = next(index for index, one in enumerate(answer.capacity.results) if one is verdict.deciding)
+    margins = (
+        (f"margin, {one.timing_model}", source.figure(f"/results/{index}/margin_us", us, "us"))
+        for index, one in enumerate(answer.capacity.results)
+    )
+    return Verdict(
+        "Does the cycle fit its period?",
+        word,
+        "good" if verdict.all_well else "bad",
+        tuple(line.text for line in verdict_lines(verdict, answer.capacity.profile)),
+        source.anchor,
+        "/verdicts/0/text",
+        (
+            *margins,
+            ("utilisation", source.figure(f"/results/{own}/utilisation", percent, "%")),
+            ("largest term", source.figure(f"/results/{own}/binding_term", str)),
+            ("most axes", source.figure(f"/results/{own}/max_axes", count)),
+        ),
+    )
+
+
+def models_part(answer: Overview, sources: Sources) -> Part:
+    """Both timing models side by side: the whole cycle, and one read and one write."""
+    results, transactions = answer.capacity.results, answer.latency.transactions
+    decides = answer.profile.bus.timing_model
+    cycle = _grid(
+        f"The cycle; the {decides} model decides",
+        (*_HEAD, *(Column(one.timing_model) for one in results)),
+        CAPACITY_ROWS,
+        sources["capacity"],
+        [f"/results/{index}" for index in range(len(results))],
+        figures=FIGURES["capacity"],
+    )
+    columns = (Column(one.timing_model, group=f"{one.transaction} {one.payload_bytes} B") for one in transactions)
+    halves = _grid(
+        "One transaction of the farthest node, us",
+        (*_HEAD[:2], *columns),
+        LATENCY_ROWS,
+        sources["latency"],
+        [f"/transactions/{index}" for index in range(len(transactions))],
+        figures=FIGURES["latency"],
+    )
+    return Part(
+        "models",
+        "Both timing models, side by side",
+        tables=(cycle, halves),
+        commands=_ids(sources, "capacity", "latency"),
+    )
+
+
+def _grid(
+    caption: str,
+    columns: Sequence[Column],
+    rows: Sequence[GridRow],
+    source: Source,
+    owners: Sequence[str],
+    *,
+    figures: Mapping[str, Figure],
+) -> Table:
+    """Figures of several owners side by side, rows as in the terminal."""
+    words = len(columns) - len(owners)
+    return Table(
+        caption,
+        tuple(columns),
+        tuple(
+            Row(
+                (
+                    *(row.label.strip(), figures[row.key].reference, row.unit)[:words],
+                    *(
+                        source.figure(f"{owner}/{row.key}", row.write, row.unit or figures[row.key].unit)
+                        for owner in owners
+                    ),
+                ),
+                level=int(row.label.startswith(" ")),
+            )
+            for row in rows
+        ),
+    )
+
+
+def timeline_part(answer: Overview, sources: Sources) -> Part:
+    """The cycle to scale."""
+    title = "The cycle to scale"
+    if answer.schedule is None:
+        return Part("timeline", title, lines=tuple(f"Not drawn: {why}." for why in answer.no_schedule))
+    plan, source = answer.schedule, sources["timeline"]
+    caption = (
+        f"One communication cycle by the {plan.figures.timing_model} model: {subject(plan)}, every node at the "
+        "hops of the farthest."
+    )
+    chart = Chart("wide", caption, timeline_svg(plan, inline=True), timeline_mermaid(plan))
+    totals = source.value("/totals")
+    table = Table(
+        "What takes the slice" if plan.figures.fits else "What takes the cycle",
+        (Column("kind", "words"), Column("eq", "words"), Column("events"), Column("us"), Column("%")),
+        tuple(
+            Row(
+                (
+                    Swatch(one["kind"], "", KINDS[one["kind"]].label),
+                    KINDS[one["kind"]].equation,
+                    source.figure(f"/totals/{index}/events", count),
+                    source.figure(f"/totals/{index}/total_us", us, "us"),
+                    source.figure(f"/totals/{index}/share", percent, "%"),
+                )
+            )
+            for index, one in enumerate(totals)
+        ),
+    )
+    return Part("timeline", title, charts=(chart,), tables=(table,), commands=_ids(sources, "timeline"))
+
+
+def terms_part(answer: Overview, sources: Sources) -> Part:
+    """Where the microseconds go."""
+    results, source = answer.capacity.results, sources["capacity"]
+    chart = Chart(
+        "wide", "The terms of the cycle, in the order of the table, and what they leave.", terms_chart(results)
+    )
+    table = Table(
+        "Terms of the cycle, us",
+        (Column("term", "words"), Column("eq", "words"), *(Column(one.timing_model) for one in results)),
+        tuple(
+            Row(
+                (
+                    Swatch(term.kind, term.letter, term.label),
+                    FIGURES["capacity"][term.key].reference,
+                    *(source.figure(f"/results/{index}/{term.key}", us, "us") for index in range(len(results))),
+                )
+            )
+            for term in (*TERMS, LEFT)
+        ),
+    )
+    return Part("terms", "Where the microseconds go", charts=(chart,), tables=(table,), commands=(source.anchor,))
+
+
+def axes_part(answer: Overview, sources: Sources) -> Part:
+    """Axes against period."""
+    source, models = sources["axes"], len(answer.steps)
+    nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
+    chart = Chart(
+        "wide",
+        "Most axes that a period carries: paper solid with a square, standard dashed with a diamond; the point is this "
+        f"profile's own {plural(axes, 'axis')}, on {plural(nodes, 'node')}.",
+        axes_chart(answer.profile, answer.steps),
+    )
+    columns = [
+        Column(word, "words" if word == "limited by" else "figures", one.timing_model)
+        for one in answer.steps
+        for word in ("nodes", "axes", "limited by")
+    ]
+    writers: dict[str, Any] = {"max_nodes": count, "max_axes": count, "limited_by": str}
+    rows = []
+    for number, figures in enumerate(answer.periods.periods):
+        places = [f"/results/{number * models + model}" for model in range(models)]
+        rows.append(
+            Row(
+                (
+                    source.figure(f"{places[0]}/period_us", plain, "us"),
+                    *(source.figure(f"{place}/{key}", write) for place in places for key, write in writers.items()),
+                ),
+                level=2 if figures[0].period_us == answer.profile.cycle.period_us else 0,
+            )
+        )
+    table = Table(
+        "Most nodes and axes; the profile's own period in bold", (Column("period, us"), *columns), tuple(rows)
+    )
+    return Part("axes", "Axes against period", charts=(chart,), tables=(table,), commands=(source.anchor,))
+
+
+def _ids(sources: Sources, *names: str) -> tuple[str, ...]:
+    return tuple(sources[name].anchor for name in names)
+
+
+def fit_word(fits: object) -> str:
+    """Write whether something fits, with a sign that needs no colour."""
+    return f"{'✓' if fits else '✗'} {yes(fits)}"

@@ -1,0 +1,148 @@
+"""From answers to the content of a page: a chapter for each profile and, for several, a comparison in front."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from busplan import __version__
+from busplan.analysis.explain import assumptions
+from busplan.analysis.overview import Overview
+from busplan.report.circle_test import um
+from busplan.report.lines import count, percent, plural, us
+from busplan.report.page.bus import axes_part, bus_verdict, fit_word, models_part, plain, terms_part, timeline_part
+from busplan.report.page.circle import circle_part, circle_verdict, sources_part
+from busplan.report.page.commands import shell_word, sources
+from busplan.report.page.content import Cell, Chapter, Code, Column, Link, Page, Part, Row, Source, Table
+
+
+class Subject(NamedTuple):
+    """One profile of a page."""
+
+    argument: str
+    """The PROFILE argument."""
+    answer: Overview
+    other_period: bool
+    """Whether its period is not that of its file."""
+
+
+def page(subjects: Sequence[Subject], *, title: str | None) -> Page:
+    """Put the content of a page together.
+
+    Parameters
+    ----------
+    subjects
+        One or more profiles.
+    title
+        Heading of the page; without it the profile's name, or how many there are.
+    """
+    chapters = tuple(_chapter(subject, anchor=f"p{number}") for number, subject in enumerate(subjects, start=1))
+    several = len(chapters) > 1
+    own = plural(len(chapters), "profile") if several else chapters[0].name
+    table = _comparison(subjects, chapters) if several else None
+    return Page(own if title is None else title, f"busplan {__version__}", table, chapters)
+
+
+def _chapter(subject: Subject, *, anchor: str) -> Chapter:
+    answer = subject.answer
+    listed = sources(answer, argument=subject.argument, anchor=anchor, other_period=subject.other_period)
+    named = {one.anchor.removeprefix(f"{anchor}-"): one for one in listed}
+    verdicts = (bus_verdict(answer, named), circle_verdict(answer, named))
+    parts = (
+        Part("verdict", "Verdict", verdicts=verdicts, commands=tuple(v.source for v in verdicts if v.source)),
+        models_part(answer, named),
+        timeline_part(answer, named),
+        terms_part(answer, named),
+        axes_part(answer, named),
+        circle_part(answer, named),
+        sources_part(answer, named),
+        _assumptions_part(answer),
+        _commands_part(listed),
+    )
+    capacity = named["capacity"]
+    facts = tuple(
+        (word, capacity.figure(f"/results/0/{key}", plain, unit))
+        for word, key, unit in (
+            ("nodes", "nodes", ""),
+            ("axes", "axes", ""),
+            ("hops", "hops", ""),
+            ("gap count", "gap_count", ""),
+            ("period", "period_us", "us"),
+            ("slice", "available_us", "us"),
+        )
+    )
+    return Chapter(
+        anchor,
+        answer.profile.name,
+        shell_word(subject.argument),
+        answer.profile.description.strip(),
+        (*facts, ("decides", capacity.figure("/verdicts/0/timing_model", str))),
+        tuple(part for part in parts if part is not None),
+        listed,
+    )
+
+
+def _assumptions_part(answer: Overview) -> Part:
+    rows = tuple(
+        Row((Code(one.name), _value(one.value), one.unit, one.grade, one.source, one.meaning))
+        for one in assumptions(answer.profile)
+    )
+    columns = tuple(
+        Column(word, "figures" if word == "value" else "words")
+        for word in ("name", "value", "unit", "grade", "source", "meaning")
+    )
+    return Part(
+        "assumptions", "What it rests on", tables=(Table("Assumptions with their grades", columns, rows, stacks=True),)
+    )
+
+
+def _value(value: float | str) -> str:
+    return value if isinstance(value, str) else plain(value)
+
+
+def _commands_part(listed: Sequence[Source]) -> Part:
+    rows = tuple(Row((one.purpose, one)) for one in listed)
+    columns = (Column("what", "words"), Column("command", "words"))
+    line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
+    return Part(
+        "commands", "How to get every figure again", (line,), tables=(Table("Commands", columns, rows, stacks=True),)
+    )
+
+
+def _comparison(subjects: Sequence[Subject], chapters: Sequence[Chapter]) -> Table:
+    models = [one.timing_model for one in subjects[0].answer.capacity.results]
+    columns = (
+        Column("profile", "words"),
+        Column("fits", "words"),
+        Column("models agree", "words"),
+        Column("period, us"),
+        Column("nodes"),
+        Column("axes"),
+        Column("used, %"),
+        *(Column(f"{model}", group="margin, us") for model in models),
+        Column("most axes"),
+        *(Column(word, group="contour error, um") for word in ("mean", "max", "G")),
+        Column("circle passed", "words"),
+    )
+    rows = tuple(
+        Row(_compared(subject, chapter, models=len(models)))
+        for subject, chapter in zip(subjects, chapters, strict=True)
+    )
+    return Table("All profiles, each under the timing model that decides", columns, rows)
+
+
+def _compared(subject: Subject, chapter: Chapter, *, models: int) -> tuple[Cell, ...]:
+    answer, (capacity, *_) = subject.answer, chapter.sources
+    own = next(index for index, one in enumerate(answer.capacity.results) if one is answer.verdict.deciding)
+    circle = next((one for one in chapter.sources if one.document["command"] == "circle-test"), None)
+    measures = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
+    return (
+        Link(chapter.name, chapter.anchor, chapter.origin),
+        capacity.figure("/verdicts/0/fits", fit_word),
+        capacity.figure("/verdicts/0/models_agree", fit_word),
+        capacity.figure(f"/results/{own}/period_us", plain, "us"),
+        *(capacity.figure(f"/results/{own}/{key}", count) for key in ("nodes", "axes")),
+        capacity.figure(f"/results/{own}/utilisation", percent, "%"),
+        *(capacity.figure(f"/results/{index}/margin_us", us, "us") for index in range(models)),
+        capacity.figure(f"/results/{own}/max_axes", count),
+        *(("-",) * 3 if circle is None else (circle.figure(f"/results/0/{key}", um, "um") for key in measures)),
+        "not run" if circle is None else circle.figure("/results/0/passed", fit_word),
+    )

@@ -1,0 +1,78 @@
+"""The commands that give a page's figures again, as a shell takes them."""
+
+import os
+import shlex
+
+from busplan.analysis.overview import Overview
+from busplan.analysis.verdict import verdicts
+from busplan.report import documents
+from busplan.report.page.content import Source
+from busplan.report.timeline.documents import timeline_document
+
+
+def shell_word(text: str) -> str:
+    """Quote an argument for a shell.
+
+    Examples
+    --------
+    >>> shell_word("line 1.toml"), shell_word("-x.toml"), shell_word("-")
+    ("'line 1.toml'", './-x.toml', '-')
+    """
+    if text.startswith("-") and text != "-":
+        # No shell quoting keeps a program from taking it for an option.
+        text = f"./{text}"
+    if text.isprintable():
+        return shlex.quote(text)
+    # Bytes that no page can show; bash, zsh and POSIX of 2024 read them in this form.
+    return f"$'{''.join(map(_escaped, os.fsencode(text)))}'"
+
+
+def _escaped(byte: int) -> str:
+    character = chr(byte)
+    return character if character.isascii() and (character.isalnum() or character in "/._-+ ") else f"\\x{byte:02x}"
+
+
+def period_option(period_us: float) -> tuple[str, str]:
+    """The option that gives exactly this period.
+
+    Examples
+    --------
+    >>> period_option(500.0), period_option(0.1)
+    (('--period', '500us'), ('--period', '0.1us'))
+    """
+    return "--period", f"{repr(period_us).removesuffix('.0')}us"
+
+
+def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool) -> tuple[Source, ...]:
+    """List the commands behind one profile's figures, each with the document that it writes.
+
+    Parameters
+    ----------
+    answer
+        Everything that is said of the profile.
+    argument
+        The PROFILE argument.
+    anchor
+        Prefix of the ids.
+    other_period
+        Whether its period is not that of its file.
+    """
+    own = period_option(answer.profile.cycle.period_us) if other_period else ()
+    each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
+
+    def source(name: str, purpose: str, document: documents.Document, *options: str) -> Source:
+        words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
+        return Source(f"{anchor}-{name}", " ".join(words), purpose, document)
+
+    bus, periods = answer.capacity, answer.periods
+    found = [
+        source("capacity", "verdict, timing models, terms", documents.capacity_document(bus, verdicts(bus)), *own),
+        source("latency", "one read and one write", documents.latency_document(answer.latency)),
+    ]
+    if answer.schedule is not None:
+        found.append(source("timeline", "the cycle event by event", timeline_document(answer.schedule), *own))
+    found.append(source("axes", "axes against period", documents.capacity_document(periods, verdicts(periods)), *each))
+    if answer.circle is not None:
+        document = documents.circle_document(answer.circle, with_contributions=True)
+        found.append(source("circle", "the circle and its error sources", document, "--contributions", *own))
+    return tuple(found)

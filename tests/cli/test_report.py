@@ -1,0 +1,281 @@
+"""`busplan report` as a process: every figure is the JSON's, files, refusals, several profiles, hostile paths."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from decimal import Decimal
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+QUICK = """
+schema_version = 1
+name = "quick"
+bus = { kind = "ieee1394", speed = "S400", nodes = 2 }
+cycle.period_us = 2000
+payload = { read_bytes = 12, write_bytes = 12 }
+node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 } }
+"""
+CIRCLE = """
+[servo]
+position_gain_per_s = 50
+velocity_feedforward = 0
+drive_lag_us = 500
+[circle]
+radius_mm = 25
+feed_mm_per_min = 3000
+ramp_periods = 20
+"""
+
+
+class Shown(NamedTuple):
+    """One marked figure."""
+
+    text: str
+    value: str
+    unit: str
+    source: str
+    pointer: str
+
+
+class Page(HTMLParser):
+    """The marked figures of a page, its commands, and the numbers that stand in a table's figures unmarked."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.figures: list[Shown] = []
+        self.lines: dict[str, str] = {}
+        self.stories: dict[tuple[str, str], list[str]] = {}
+        self.unmarked: list[str] = []
+        self._data: dict[str, str] | None = None
+        self._text = self._code = self._part = ""
+        self._story: tuple[str, str] | None = None
+        self._counts = False
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = {key: value or "" for key, value in attrs}
+        self._part = found["class"] if tag == "section" else self._part
+        if tag == "data":
+            self._data, self._text = found, ""
+        elif tag == "code":
+            self._code = found.get("id", "a name")
+        elif tag == "div" and "data-at" in found:
+            self._story = (found["data-from"], found["data-at"])
+            self.stories[self._story] = []
+        elif tag == "p" and self._story:
+            self.stories[self._story].append("")
+        if tag in ("td", "dd"):
+            self._counts = tag == "dd" or found.get("class") == "figures"
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == "data" and self._data is not None:
+            one = self._data
+            shown = Shown(self._text, one["value"], one.get("data-unit", ""), one["data-from"], one["data-at"])
+            self.figures.append(shown)
+            self._data = None
+        elif tag == "code":
+            self.lines.pop("a name", None)
+            self._code = ""
+        elif tag == "div":
+            self._story = None
+        elif tag in ("td", "dd"):
+            self._counts = False
+
+    def handle_data(self, data: str) -> None:
+        if self._data is not None:
+            self._text += data
+        elif self._code:
+            self.lines[self._code] = self.lines.get(self._code, "") + data
+        elif self._story and self.stories[self._story]:
+            self.stories[self._story][-1] += data
+        elif self._counts and "assumptions" not in self._part and re.search(r"\d", data):
+            self.unmarked.append(data)
+
+
+def at(document: Any, pointer: str) -> Any:
+    for step in pointer.split("/")[1:]:
+        document = document[int(step) if isinstance(document, list) else step]
+    return document
+
+
+def documents(page: Page, *, cwd: Path) -> dict[str, Any]:
+    """What each command of the page writes, run by a shell as it stands."""
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    found = {}
+    for anchor, line in page.lines.items():
+        done = subprocess.run(["bash", "-c", line], cwd=cwd, env=environment, capture_output=True, check=False)
+        assert done.returncode in (0, 1), (line, done.stderr)
+        found[anchor] = json.loads(done.stdout)
+    return found
+
+
+def require_rounding(shown: Shown, value: Any) -> None:
+    """What is shown is the exact value, rounded to its own last digit."""
+    if value is None:
+        assert shown.text == "-"
+    elif isinstance(value, bool):
+        assert shown.text.split()[-1] == ("yes" if value else "no")
+    elif isinstance(value, str):
+        assert shown.text == value
+    else:
+        factor = {"um": Decimal(1000), "%": Decimal(100)}.get(shown.unit, Decimal(1))
+        exact, text = Decimal(value) * factor, Decimal(shown.text)
+        assert abs(text - exact) <= Decimal((0, (5,), int(text.as_tuple().exponent) - 1)) * Decimal("1.000001"), shown
+
+
+def require_the_commands_own(html: str, *, cwd: Path) -> Page:
+    """Compare every marked figure with the document of its command."""
+    page = Page(html)
+    found = documents(page, cwd=cwd)
+    assert page.unmarked == []
+    for shown in page.figures:
+        value = at(found[shown.source], shown.pointer)
+        assert json.loads(shown.value) == value, shown
+        require_rounding(shown, value)
+    for (source, pointer), lines in page.stories.items():
+        assert " ".join(map(str.strip, lines)) == at(found[source], pointer)
+    return page
+
+
+def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, tmp_path: Path) -> None:
+    done = run("report", "paper-4ms", "-o", "report.html", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "wrote report.html\n")
+    html = (tmp_path / "report.html").read_bytes()
+    assert len(html) < 300_000
+    page = require_the_commands_own(html.decode(), cwd=tmp_path)
+    assert len(page.figures) > 200
+    assert list(page.lines) == ["p1-capacity", "p1-latency", "p1-timeline", "p1-axes", "p1-circle"]
+    assert page.lines["p1-capacity"] == "busplan capacity paper-4ms --format json"
+    # Nothing of these commands' main figures is left out.
+    for key in ("required_us", "margin_us", "utilisation", "max_axes"):
+        assert {f"/results/{model}/{key}" for model in (0, 1)} <= {
+            shown.pointer for shown in page.figures if shown.source == "p1-capacity"
+        }
+    assert ("18.967", "um") in {(shown.text, shown.unit) for shown in page.figures}
+
+
+def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    names = ('it\'s $(a)  `b` "c".toml', "sub/x;y&z.toml", "-o.toml", "tab\there \u202e.toml")
+    for name in names:
+        (tmp_path / name).write_text(QUICK + CIRCLE, encoding="utf-8")
+    arguments = ("--period", "0.4ms", "--", *names, names[0])
+    html = run("report", *arguments, cwd=tmp_path).stdout
+    page = require_the_commands_own(html, cwd=tmp_path)
+    assert page.lines["p2-capacity"] == "busplan capacity ./-o.toml --period 400us --format json"
+    assert page.lines["p2-latency"] == "busplan latency ./-o.toml --format json"
+    assert [html.count(f'id="p{number}"') for number in range(1, 6)] == [1, 1, 1, 1, 0]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ("period_us = 2000", "period_us = 100"),
+        ("position_gain_per_s = 50", "position_gain_per_s = 900000"),
+        ("nodes = 2", "nodes = 1000000"),
+        ("period_us = 2000", "period_us = 0.001"),
+        ("ramp_periods = 20", "ramp_periods = 1000000"),
+    ],
+    ids=["overrun", "unstable", "a million nodes", "a nanosecond", "impossible circle"],
+)
+def test_a_profile_that_fails_is_reported_with_exit_0(run: Run, tmp_path: Path, changes: tuple[str, str]) -> None:
+    text = QUICK + CIRCLE
+    assert changes[0] in text
+    (tmp_path / "x.toml").write_text(text.replace(*changes), encoding="utf-8")
+    done = run("report", "x.toml", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    require_the_commands_own(done.stdout, cwd=tmp_path)
+    assert run("report", "x.toml", "--format", "markdown", cwd=tmp_path).returncode == 0
+
+
+def test_a_profile_without_a_circle_has_none_and_says_so(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text(QUICK, encoding="utf-8")
+    html = run("report", "x.toml", cwd=tmp_path).stdout
+    assert "The profile has no section for a circle test, so none was run." in html
+    assert "circle-test" not in html.partition("</style>")[2]
+    (tmp_path / "y.toml").write_text(QUICK + CIRCLE, encoding="utf-8")
+    left_out = run("report", "y.toml", "--no-circle", cwd=tmp_path).stdout
+    assert "The circle test was left out (--no-circle)." in left_out
+    assert "p1-circle" not in Page(left_out).lines
+    assert "p1-circle" in Page(run("report", "y.toml", cwd=tmp_path).stdout).lines
+
+
+def test_the_same_profile_gives_the_same_bytes_to_a_file_and_to_standard_output(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "x.toml").write_text(QUICK + CIRCLE, encoding="utf-8")
+    for name, form in (("a.HTML", "html"), ("a.md", "markdown")):
+        assert run("report", "x.toml", "-o", name, cwd=tmp_path).returncode == 0
+        shown = run("report", "x.toml", "--format", form, cwd=tmp_path, env={"PYTHONHASHSEED": "7"}).stdout
+        assert (tmp_path / name).read_text(encoding="utf-8") == shown
+    assert run("report", "x.toml", "-o", "page", "--format", "markdown", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "page").read_bytes() == (tmp_path / "a.md").read_bytes()
+
+
+def test_standard_input_and_a_title(run: Run, tmp_path: Path) -> None:
+    done = run("report", "-", "--title", "Cell 7 <north>", stdin=QUICK, cwd=tmp_path)
+    assert "<title>Cell 7 &lt;north&gt; - busplan report</title>" in done.stdout
+    assert "<h1><bdi>Cell 7 &lt;north&gt;</bdi></h1>" in done.stdout
+    assert Page(done.stdout).lines["p1-capacity"] == "busplan capacity - --format json"
+
+
+def test_a_comparison_stands_in_front_and_leads_to_each_profile(run: Run) -> None:
+    done = run("report", "paper-1ms", "paper-optimal-gap", "--no-circle")
+    assert done.returncode == 0
+    assert done.stdout.index('id="comparison"') < done.stdout.index('id="p1"') < done.stdout.index('id="p2"')
+    assert [done.stdout.count(f'href="#p{number}"') for number in (1, 2, 3)] == [1, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nope"], "nope: no such file, and no shipped profile of that name"),
+        (["paper-4ms", "-o", "x.pdf"], "--output x.pdf: expected a name ending in .html, .md, or --format"),
+        (["paper-4ms", "-o", "no/such/x.html"], "there is no folder"),
+        (["-", "-"], "PROFILE -: standard input can be read once"),
+        (["paper-4ms", "--period", "4"], "--period 4: expected a time with its unit, as 4ms, 250us or 0.001s"),
+        (["paper-4ms", "paper-1ms", "--period", "0s"], "--period 0s"),
+        (["paper-4ms", "--title", "a\nb"], "--title 'a\\nb': expected words in one line"),
+        (["paper-4ms", "--title", " "], "--title ' ': expected words in one line"),
+        (["paper-4ms", "--format", "pdf"], "Invalid value for '--format'"),
+        ([], "Missing argument 'PROFILE...'"),
+    ],
+)
+def test_what_cannot_be_done_is_said_and_leaves_nothing(
+    refused: Callable[..., str], tmp_path: Path, arguments: list[str], message: str
+) -> None:
+    assert message in refused("report", *arguments, cwd=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_problems_of_all_profiles_are_said_and_nothing_is_written(
+    refused: Callable[..., str], tmp_path: Path
+) -> None:
+    (tmp_path / "a.toml").write_text(QUICK.replace("nodes = 2", "nodes = 0"), encoding="utf-8")
+    (tmp_path / "b.toml").write_text("no profile", encoding="utf-8")
+    (tmp_path / "x.html").write_text("old", encoding="utf-8")
+    said = refused("report", "paper-4ms", "a.toml", "b.toml", "c.toml", "-o", "x.html", cwd=tmp_path)
+    assert all(f"{name}.toml:" in said for name in "abc")
+    assert (tmp_path / "x.html").read_text(encoding="utf-8") == "old"
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_markdown_loads_no_templates_and_neither_do_other_commands(tmp_path: Path) -> None:
+    program = (
+        "import sys; from busplan.__main__ import main\n"
+        "try: main()\n"
+        "except SystemExit as leaving: assert not leaving.code\n"
+        "print({'jinja2', 'matplotlib'} & set(sys.modules), file=sys.stderr)"
+    )
+    for arguments in (["report", "paper-4ms", "--no-circle", "--format", "markdown"], ["capacity", "paper-4ms"]):
+        done = subprocess.run(
+            [sys.executable, "-c", program, *arguments], capture_output=True, text=True, cwd=tmp_path, check=True
+        )
+        assert done.stderr == "set()\n"
