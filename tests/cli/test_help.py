@@ -5,7 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,8 @@ from busplan.cli import app
 from busplan.cli.help import FAILURES
 from busplan.cli.lazy import COMMANDS
 from busplan.profile.shipped import shipped_folder
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 ROOT: Any = get_command(app)
 TOP: Any = ROOT.context_class(ROOT, info_name="busplan", **ROOT.context_settings)
@@ -163,3 +165,22 @@ def test_what_stands_for_a_value_says_what_may_stand_there(param: Any, said: str
     del said
     if param.param_type_name == "option" and not param.is_flag:
         assert param.metavar or param.type_descriptor.is_choice
+
+
+@pytest.mark.parametrize("shell", ["fish", "zsh"])
+@EVERY_COMMAND
+def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str, shell: str) -> None:
+    typed = f"busplan {name} --".replace("  ", " ")
+    offers = run(
+        env={
+            "_BUSPLAN_COMPLETE": f"complete_{shell}",
+            "_TYPER_COMPLETE_ARGS": typed,
+            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        }
+    ).stdout.splitlines()
+    here = context(name)
+    params = [param for param in here.command.get_params(here) if param.param_type_name == "option"]
+    flags = [one for param in params for one in param.opts + param.secondary_opts if one.startswith("--")]
+    assert len(offers) == len(flags)
+    if shell == "fish":
+        assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)

@@ -6,6 +6,8 @@ from typer.core import TyperCommand, TyperGroup
 
 FAILURES: Final = "Exits 2 when it could not do its job and says why on standard error, 130 when interrupted."
 """What holds for every command, and stands at the end of its help."""
+_OFFER: Final = 60
+"""Characters of help beside an offer of the shell's completion."""
 _COMPLETION: Final = {
     "install_completion": "Add completion by the Tab key to the start-up file of your shell, and exit.",
     "show_completion": "Print the script that does it, to look at or to place by hand, and exit.",
@@ -20,13 +22,13 @@ class PlainCommand(TyperCommand):
         for param in _of_kind(self.params, "argument"):
             param.metavar = param.metavar or param.name.upper()
 
-    def get_short_help_str(self, limit: int = 0) -> str:  # noqa: ARG002 - the signature is typer's
-        """First paragraph of the help, whole: typer would cut it at the end of a line."""
-        return " ".join((self.help or "").partition("\n\n")[0].split())
-
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Pieces of the usage line, without the braces that typer puts around what is required."""
         return [piece.replace("{", "").replace("}", "") for piece in super().collect_usage_pieces(ctx)]
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Options that begin as typed."""
+        return _on_one_line(super().shell_complete(ctx, incomplete))
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write arguments and options."""
@@ -43,6 +45,16 @@ class PlainGroup(TyperGroup):
             param.help = _COMPLETION.get(param.name, param.help)
         return params
 
+    def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
+        """Commands and options that begin as typed."""
+        return _on_one_line(super().shell_complete(ctx, incomplete))
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write each command with its first sentence, whole: typer would cut it at the end of a line."""
+        commands: list[Any] = [self.get_command(ctx, name) for name in self.list_commands(ctx)]
+        with formatter.section("Commands"):
+            formatter.write_dl([(one.name, one.help.partition("\n\n")[0]) for one in commands if not one.hidden])
+
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write commands and options."""
         self.format_commands(ctx, formatter)
@@ -57,6 +69,15 @@ def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: A
         if rows:
             with formatter.section(f"{kind.capitalize()}s"):
                 formatter.write_dl(rows)
+
+
+def _on_one_line(items: list[Any]) -> list[Any]:
+    """Shorten the help beside a shell's offers: typer breaks what is long, and to fish each line is another offer."""
+    from textwrap import shorten
+
+    for item in items:
+        item.help = item.help and shorten(item.help, _OFFER, placeholder="...")
+    return items
 
 
 def _of_kind(params: list[Any], kind: str) -> list[Any]:
