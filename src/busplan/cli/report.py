@@ -27,7 +27,7 @@ def report_command(
     profiles: Annotated[
         list[str],
         typer.Argument(
-            metavar="PROFILE...",
+            metavar="PROFILE",
             help="Profile files, shipped names (see `busplan profiles`), or once - for standard input.",
             autocompletion=complete_profile,
             show_default=False,
