@@ -245,7 +245,7 @@ def test_a_comparison_stands_in_front_and_leads_to_each_profile(run: Run) -> Non
         (["paper-4ms", "--title", "a\nb"], "--title 'a\\nb': expected words in one line"),
         (["paper-4ms", "--title", " "], "--title ' ': expected words in one line"),
         (["paper-4ms", "--format", "pdf"], "Invalid value for '--format'"),
-        ([], "Missing argument 'PROFILE...'"),
+        ([], "Missing argument 'PROFILE'"),
     ],
 )
 def test_what_cannot_be_done_is_said_and_leaves_nothing(

@@ -49,7 +49,7 @@ def diff_command(
         typer.Option(
             "--tolerance",
             metavar="PERCENT",
-            help="With --fail-on-regression, how much worse a number may be, in % of A's.  [default: 0]",
+            help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
         ),
     ] = None,
     format_: Annotated[

@@ -37,7 +37,7 @@ def explain_command(
         str | None,
         typer.Argument(
             help="A key of the JSON of latency, capacity or circle-test, as required_us; circle-test.required_us where "
-            "several have it and the first is not meant. Without it, all of them are listed.",
+            "several have it and the first is not meant.  [default: a list of all of them]",
             autocompletion=complete_figure,
             show_default=False,
         ),

@@ -27,7 +27,7 @@ def report_command(
     profiles: Annotated[
         list[str],
         typer.Argument(
-            metavar="PROFILE...",
+            metavar="PROFILE",
             help="Profile files, shipped names (see `busplan profiles`), or once - for standard input.",
             autocompletion=complete_profile,
             show_default=False,
@@ -39,7 +39,7 @@ def report_command(
             "--output",
             "-o",
             metavar="FILE",
-            help="Write the page to FILE instead of standard output: .html or .md (Markdown).",
+            help="Write the page to FILE: .html or .md (Markdown).  [default: standard output]",
             show_default=False,
         ),
     ] = None,
@@ -65,7 +65,8 @@ def report_command(
         typer.Option(
             "--period",
             metavar="TIME",
-            help="Communication period of all profiles with its unit, instead of their own, as 4ms, 250us or 0.001s.",
+            help="Communication period of all profiles with its unit, as 4ms, 250us or 0.001s.  "
+            "[default: the profile's cycle.period_us]",
             show_default=False,
         ),
     ] = None,
