@@ -163,7 +163,7 @@ def explain(
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:
-    """Everything that the figures of a profile start from, each with its grade, the least well known first.
+    """What the figures of a profile rest on, each with its grade, the least well known first.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
     Returns
     -------
     tuple
-        Inputs of the cycle under both timing models, and of the circle.
+        Inputs of the cycle under both timing models, and of the circle; without those that are the planner's to choose.
     """
     found: dict[str, Input] = {}
     for model in BOTH_MODELS:
@@ -184,7 +184,8 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
 
         for one in simulated_inputs(profile):
             found.setdefault(one.name, one)
-    return tuple(sorted(found.values(), key=lambda one: _GRADES.index(one.grade)))
+    known = (one for one in found.values() if one.grade != "given")
+    return tuple(sorted(known, key=lambda one: _GRADES.index(one.grade)))
 
 
 def _traced(

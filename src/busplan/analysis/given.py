@@ -66,8 +66,8 @@ def given(profile: Profile, key: str) -> Input:
     Returns
     -------
     Input
-        Its grade is that of its section where the section has one, "given" for what the profile sets, and for a
-        default that of its source.
+        Its grade is that of its section where the section has one, that of a sourced figure where it is that figure, and
+        "given" for all else that the profile sets.
     """
     *sections, name = key.split(".")
     section: Section = profile
@@ -79,10 +79,10 @@ def given(profile: Profile, key: str) -> Input:
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
-    grade, source = own_grade or "given", f"profile {profile.name}"
-    if not is_set:
-        default = _DEFAULTS.get(key)
-        grade, source = (default.grade, f"default: {default.source}") if default is not None else (grade, "default")
+    grade, source = own_grade or "given", f"profile {profile.name}" if is_set else "default"
+    default = _DEFAULTS.get(key)
+    if default is not None and value == default:
+        grade, source = default.grade, f"{source}, as {default.source}"
     symbol = _SYMBOLS.get(key) or SYMBOLS.get(name) or name
     return Input(symbol, key, value, unit, grade, source, description)
 
