@@ -148,7 +148,8 @@ def test_the_weakest_grade_is_that_of_the_least_known_input(make: Make) -> None:
     assert explain(make(), "required_us").derivations[0].weakest_grade == "recalled"
     assumed = make(node__execution__grade="assumed")
     assert explain(assumed, "required_us").derivations[0].weakest_grade == "assumed"
-    assert explain(assumed, "available_us").derivations[0].weakest_grade == "given"
+    assert explain(assumed, "available_us").derivations[0].weakest_grade == "published"
+    assert explain(assumed, "period_us").derivations[0].weakest_grade == "given"
 
 
 def test_a_default_is_as_well_known_as_its_source(make: Make) -> None:

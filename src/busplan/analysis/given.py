@@ -66,8 +66,8 @@ def given(profile: Profile, key: str) -> Input:
     Returns
     -------
     Input
-        Its grade is that of its section where the section has one, that of a sourced figure where it is that figure, and
-        "given" for all else that the profile sets.
+        Its grade is that of its section where the section has one, that of a sourced figure where it is that figure,
+        and "given" for all else that the profile sets.
     """
     *sections, name = key.split(".")
     section: Section = profile
