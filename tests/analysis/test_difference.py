@@ -157,9 +157,10 @@ def test_the_last_digit_of_a_margin_is_rounding(make: Make) -> None:
     full = override(a, {"cycle.slice_ratio": required / 1000})
     less = override(full, {"cycle.slice_ratio": nextafter(nextafter(full.cycle.slice_ratio, 0), 0)})
     more = override(full, {"cycle.slice_ratio": full.cycle.slice_ratio * (1 + 1e-12)})
-    for b in (less, more):
-        margin = figure(difference(full, b), "paper", "margin_us")
+    for a, b in ((full, less), (full, more), (more, full)):
+        margin = figure(difference(a, b), "paper", "margin_us")
         assert (margin.judgement, margin.relative_difference) == ("same", None)
+    assert figure(difference(more, full), "paper", "margin_us").a > 0
 
 
 def test_a_difference_is_signed_and_a_share_is_of_the_size_of_a(make: Make) -> None:

@@ -180,6 +180,7 @@ def test_a_git_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     [
         ("echo 'fatal: detected dubious ownership' >&2; exit 128", "REV:path: detected dubious ownership"),
         ("exit 1", "REV:path: no reason given"),
+        ('[ "$LC_ALL" = C ] || exit 1; echo "fatal: in C" >&2; exit 1', "REV:path: in C"),
         ("echo 'ab12^{tree} ambiguous'", "revision HEAD is ambiguous in the git repository of "),
         ("exit 0", "revision HEAD is unknown in the git repository of "),
         ("printf '\\377\\n'", "revision HEAD is unknown in the git repository of "),
@@ -191,3 +192,11 @@ def test_a_git_that_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scr
     message = refusal("HEAD:line.toml")
     assert message.startswith("HEAD:line.toml: ")
     assert said in message
+
+
+def test_a_large_file_is_not_even_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    some = "0" * 40
+    fake_git(tmp_path, monkeypatch, f'[ "$4" = blob ] && touch read; echo {some} tree 9; echo {some} blob 9000000000')
+    assert refusal("HEAD:line.toml").startswith("HEAD:line.toml:1:1: the file is larger than 100,000 bytes")
+    assert not (tmp_path / "read").exists()

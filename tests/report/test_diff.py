@@ -10,6 +10,7 @@ from markdown_it import MarkdownIt
 
 from busplan.analysis.circle_test import CircleFigures, circle_test
 from busplan.analysis.difference import CYCLE, PLAN, Difference, difference
+from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
@@ -293,6 +294,16 @@ def test_rows_of_a_circle_that_is_not_there_are_left_to_the_note() -> None:
     page = Page(diff_markdown(found, arguments=AB))
     assert [row[0] for row in page.rows if row[1] == "circle"] == ["passed"]
     assert "The circle of B is not simulated: the cycle does not fit the bus: 205.917 us needed" in page.text
+
+
+def test_why_a_circle_cannot_be_run_is_no_markup(paper: Profile) -> None:
+    def circle(_: Profile) -> CircleFigures:
+        raise BusplanError("<b> *bold* [x](y)")
+
+    asks = override(paper, {"servo.grade": "measured"})
+    page = Page(diff_markdown(difference(asks, override(asks, {"bus.nodes": 3}), circle=circle), arguments=AB))
+    assert set(page.tags) <= ALLOWED
+    assert "The circle of A is not simulated: <b> *bold* [x](y).\n" in page.text
 
 
 # --- JSON -------------------------------------------------------------------------------------------------
