@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import CapacityFigures, capacity, cycle, figures, fits_in, largest_nodes
+from busplan.analysis.capacity import CapacityFigures, capacity, figures
+from busplan.analysis.cycle import cycle, fits_in
+from busplan.analysis.node_limit import largest_nodes
 from busplan.profile.model import Profile
 from busplan.timing import TIMING_MODELS, TimingModelName
 

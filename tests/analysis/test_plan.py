@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.advice import MAX_ADVISED_RATIO
-from busplan.analysis.capacity import broken_limits, figures
+from busplan.analysis.capacity import figures
+from busplan.analysis.cycle import broken_limits
 from busplan.analysis.plan import plan
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import CapacityFigures, cycle, figures
+from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.cycle import cycle
 from busplan.analysis.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
 from busplan.analysis.sweep import sweep
 from busplan.errors import BusplanError

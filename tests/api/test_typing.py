@@ -5,7 +5,8 @@ from typing import Any, assert_type
 from numpy.typing import NDArray
 
 import busplan
-from busplan.analysis.capacity import CapacityFigures, Term
+from busplan.analysis.capacity import CapacityFigures
+from busplan.analysis.cycle import Term
 from busplan.analysis.plan import Option
 from busplan.rules.report import Located
 

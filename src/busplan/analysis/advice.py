@@ -9,7 +9,9 @@ from collections.abc import Iterator, Sequence
 from math import ceil
 from typing import Final, NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, broken_limits, cycle, figures, largest_nodes
+from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.cycle import broken_limits, cycle
+from busplan.analysis.node_limit import largest_nodes
 from busplan.errors import BusplanError
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, safe_gap_count
 from busplan.profile.model import Profile

@@ -6,19 +6,10 @@ Only what is no operator is put into words here: the table of gap counts, the si
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple, get_args
 
-from busplan.analysis.capacity import (
-    CapacityFigures,
-    Cycle,
-    RequiredByNodes,
-    Term,
-    available_us,
-    cycle,
-    figures,
-    most_nodes,
-    numeric_figures,
-    required_by_nodes,
-)
+from busplan.analysis.capacity import CapacityFigures, figures, numeric_figures
+from busplan.analysis.cycle import Cycle, Term, available_us, cycle
 from busplan.analysis.given import given, traced
+from busplan.analysis.node_limit import RequiredByNodes, most_nodes, required_by_nodes
 from busplan.analysis.quantities import FIGURES
 from busplan.analysis.trace import Input, Traced, constant, short, written
 from busplan.ieee1394 import (

@@ -8,7 +8,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.circle_test import CONTOUR_MEASURES, LEAST_ARC_DEG, CircleFigures, circle_test
+from busplan.analysis.circle_failures import CONTOUR_MEASURES, LEAST_ARC_DEG
+from busplan.analysis.circle_test import CircleFigures, circle_test
 from busplan.analysis.derive_bus import capacity_figures
 from busplan.analysis.given import traced
 from busplan.analysis.quantities import FIGURES

@@ -3,7 +3,8 @@
 from bisect import bisect_right
 from typing import NamedTuple
 
-from busplan.analysis.capacity import FIT_ROUNDING, Limit, cycle, largest_nodes
+from busplan.analysis.cycle import FIT_ROUNDING, Limit, cycle
+from busplan.analysis.node_limit import largest_nodes
 from busplan.profile.model import Profile
 from busplan.profile.sections import MAX_TIME_US
 from busplan.profile.toml import override

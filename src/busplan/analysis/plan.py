@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from busplan.analysis.advice import Value, changes_to_fit
-from busplan.analysis.capacity import CapacityFigures, broken_limits, figures
+from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.cycle import broken_limits
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.analysis.settings import (
     MAX_CIRCLES,

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator
 from math import fsum
 from typing import Final, Literal, NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, Cycle, cycle, figures, fits_in
+from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.cycle import Cycle, cycle, fits_in
 from busplan.errors import BusplanError
 from busplan.ieee1394 import MAX_NODES
 from busplan.profile.model import Profile

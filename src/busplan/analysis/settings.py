@@ -10,7 +10,8 @@ from math import ceil
 from typing import Final, Literal, NamedTuple
 
 from busplan.analysis.advice import RATIO_STEPS
-from busplan.analysis.capacity import cycle, fits_in, largest_nodes
+from busplan.analysis.cycle import cycle, fits_in
+from busplan.analysis.node_limit import largest_nodes
 from busplan.ieee1394 import QUADLET_BYTES, padded_bytes, safe_gap_count
 from busplan.profile.bus import TableExecution
 from busplan.profile.model import Profile

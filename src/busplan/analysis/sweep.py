@@ -10,19 +10,10 @@ from typing import Any, Final, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
-from busplan.analysis.capacity import (
-    CapacityFigures,
-    Limit,
-    Term,
-    available_us,
-    cycle,
-    fits_in,
-    limits_broken,
-    most_nodes,
-    numeric_figures,
-    required_by_nodes,
-)
+from busplan.analysis.capacity import CapacityFigures, numeric_figures
+from busplan.analysis.cycle import Limit, Term, available_us, cycle, fits_in, limits_broken
 from busplan.analysis.grid import Array, Chunk, Grid
+from busplan.analysis.node_limit import most_nodes, required_by_nodes
 from busplan.ieee1394 import MAX_HOPS
 from busplan.profile.bus import TableExecution
 from busplan.profile.model import Profile

@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.analysis.capacity import CapacityFigures, Limit
+from busplan.analysis.capacity import CapacityFigures
+from busplan.analysis.cycle import Limit
 from busplan.analysis.verdict import Verdict
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
 from busplan.profile.model import Profile

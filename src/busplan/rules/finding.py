@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Literal, NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, cycle, figures, fits_in
+from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.cycle import cycle, fits_in
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.profile.toml import LoadedProfile
 from busplan.timing import TimingModelName
