@@ -79,7 +79,7 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
         Its figures under the timing model that decides.
     """
     payload, bus_section = profile.payload, profile.bus
-    broken: dict["Limit", Failure] = {
+    broken: dict[Limit, Failure] = {
         "time": Failure("required_us", capacity.required_us, capacity.available_us),
         "hops": Failure("hops", capacity.hops, MAX_HOPS),
         "nodes": Failure("nodes", capacity.nodes, MAX_NODES),
