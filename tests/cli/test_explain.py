@@ -70,7 +70,7 @@ def test_without_a_figure_all_are_listed(run: Run) -> None:
     assert done.returncode == 0
     assert "circle-test  circular_deviation_mm" in done.stdout
     registry = json.loads(run("explain", "paper-4ms", "--format", "json").stdout)
-    assert {"figures", "equations", "constants"} <= set(registry)
+    assert {"assumptions", "figures", "equations", "constants"} <= set(registry)
     grades = {"published", "derived", "recalled", "measured", "calibrated", "assumed"}
     assert {row["grade"] for row in registry["constants"]} <= grades
     assert run("explain", "paper-4ms", "--format", "markdown").stdout.startswith("| command | figure |")
@@ -99,6 +99,7 @@ def test_a_circle_that_is_not_simulated_says_why(run: Run) -> None:
         (("paper-4ms", "requird_us"), "did you mean required_us"),
         (("paper-4ms", "required_us", "--period", "4"), "with its unit"),
         (("no-such", "required_us"), "no such file"),
+        (("paper-4ms", "--period", "1ms", "--timing", "both"), "--period and --timing: goes with a FIGURE"),
         (("paper-4ms", "max_contour_error_mm", "--period", "1050us"), "multiple"),
     ],
 )

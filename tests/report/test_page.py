@@ -220,6 +220,20 @@ def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
     assert words.partition(":")[0] in page_markdown(content).replace("\\", "")
 
 
+@pytest.mark.parametrize(
+    ("nodes", "bars", "said"),
+    [(16, 2 * 9 * 16, ""), (62, 2 * 62, " A bar is a whole transaction."), (1000, 0, "1000 nodes are over the 62")],
+)
+def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
+    profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)
+    html = page_html(page([Subject("x", overview(profile), other_period=False)], title=None))
+    assert len(html.encode()) < 300_000
+    assert said in Tags(html).text
+    lanes = re.findall(r"by node</text>.*?</svg>", html, re.DOTALL)
+    # The bus has a lane of its own, with the synchronous packet.
+    assert [lane.count("<title>") for lane in lanes] == ([bars + 1] if bars else [])
+
+
 def test_a_circle_that_was_left_out_is_said() -> None:
     assert "The circle test was left out (--no-circle)." in Tags(page_html(made(BASE))).text
 

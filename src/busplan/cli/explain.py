@@ -15,6 +15,7 @@ from busplan.cli.options import (
     timing_models,
 )
 from busplan.cli.output import emit, emit_text
+from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.explain import Explanation
@@ -55,9 +56,9 @@ def explain_command(
         ),
     ] = None,
     transaction: Annotated[
-        Literal["read", "write", "both"],
-        typer.Option("--transaction", help="Which transaction, for a figure of latency."),
-    ] = "both",
+        Literal["read", "write", "both"] | None,
+        typer.Option("--transaction", help="Which transaction, for a figure of latency.  [default: both]"),
+    ] = None,
     format_: Annotated[
         ExplainFormat, typer.Option("--format", help="Form of the document on standard output.")
     ] = "text",
@@ -75,6 +76,7 @@ def explain_command(
 
     plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
     if figure is None:
+        _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
         _list(plan, format_)
         return
     from busplan.analysis.explain import explain
@@ -87,10 +89,17 @@ def explain_command(
             figure,
             periods_us=periods_us(period, plan),
             timing_models=None if timing is None else timing_models(timing),
-            transactions=TRANSACTION_KINDS if transaction == "both" else (transaction,),
+            transactions=(transaction,) if transaction in TRANSACTION_KINDS else TRANSACTION_KINDS,
             progress=progress,
         )
     _write(found, format_)
+
+
+def _refuse_without_figure(options: "dict[str, object]") -> None:
+    """Refuse options that say which derivation of a figure, where there is none."""
+    given = [name for name, value in options.items() if value]
+    if given:
+        raise BusplanError(f"{' and '.join(given)}: goes with a FIGURE, as in busplan explain PROFILE required_us")
 
 
 def _list(plan: "Profile", format_: ExplainFormat) -> None:
@@ -100,7 +109,7 @@ def _list(plan: "Profile", format_: ExplainFormat) -> None:
     if format_ == "text":
         emit(report.figure_lines())
     elif format_ == "json":
-        emit_text(text.to_json(report.figure_document(plan.name)))
+        emit_text(text.to_json(report.figure_document(plan)))
     else:
         emit_text(report.figure_markdown())
 

@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from busplan.analysis.explain import Derivation, Explanation, Step
+from busplan.analysis.explain import Derivation, Explanation, Step, assumptions
 from busplan.analysis.quantities import FIGURES, Command, Figure
 from busplan.analysis.trace import Input, formula_of, short
 from busplan.ieee1394 import CONSTANTS
+from busplan.profile.model import Profile
 from busplan.report import markdown
 from busplan.report.documents import Document, Row, document
 from busplan.report.lines import BLANK, Line, table
@@ -47,10 +48,15 @@ def constant_rows() -> list[Row]:
     ]
 
 
-def figure_document(profile: str) -> Document:
-    """Answer of `busplan explain PROFILE` as JSON: the whole registry."""
+def figure_document(profile: Profile) -> Document:
+    """Answer of `busplan explain PROFILE` as JSON: the whole registry, and what this profile's figures rest on."""
     return document(
-        "explain", profile=profile, figures=figure_rows(), equations=equation_rows(), constants=constant_rows()
+        "explain",
+        profile=profile.name,
+        assumptions=[one._asdict() for one in assumptions(profile)],
+        figures=figure_rows(),
+        equations=equation_rows(),
+        constants=constant_rows(),
     )
 
 

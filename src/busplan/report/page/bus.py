@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from busplan.analysis.overview import Overview
 from busplan.analysis.quantities import FIGURES, Figure
+from busplan.ieee1394 import MAX_NODES
 from busplan.report.capacity import CAPACITY_ROWS
 from busplan.report.latency import LATENCY_ROWS
 from busplan.report.lines import GridRow, count, percent, plural, us, yes
@@ -12,9 +13,9 @@ from busplan.report.page.charts.axes import axes_chart
 from busplan.report.page.charts.terms import LEFT, TERMS, terms_chart
 from busplan.report.page.content import Chart, Column, Part, Row, Source, Swatch, Table, Verdict
 from busplan.report.timeline.kinds import KINDS
-from busplan.report.timeline.lanes import subject
+from busplan.report.timeline.lanes import drawn_window, subject
 from busplan.report.timeline.mermaid import timeline_mermaid
-from busplan.report.timeline.svg import timeline_svg
+from busplan.report.timeline.svg import is_coarse, timeline_svg
 from busplan.report.words import verdict_lines
 
 Sources = Mapping[str, Source]
@@ -131,7 +132,12 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
         f"One communication cycle by the {plan.figures.timing_model} model: {subject(plan)}, every node at the "
         "hops of the farthest."
     )
-    chart = Chart("wide", caption, timeline_svg(plan, inline=True), timeline_mermaid(plan))
+    if is_coarse(drawn_window(plan)):
+        caption += " A bar is a whole transaction."
+    # The table below says what more nodes take than a bus may have; drawn, they would be a page of their own.
+    drawn = answer.profile.bus.nodes <= MAX_NODES
+    charts = (Chart("wide", caption, timeline_svg(plan, inline=True), timeline_mermaid(plan)),) if drawn else ()
+    lines = () if drawn else (f"Not drawn: {answer.profile.bus.nodes} nodes are over the {MAX_NODES:g} of one bus.",)
     totals = source.value("/totals")
     table = Table(
         "What takes the slice" if plan.figures.fits else "What takes the cycle",
@@ -149,7 +155,7 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
             for index, one in enumerate(totals)
         ),
     )
-    return Part("timeline", title, charts=(chart,), tables=(table,), commands=_ids(sources, "timeline"))
+    return Part("timeline", title, lines, (), charts, (table,), _ids(sources, "timeline"))
 
 
 def terms_part(answer: Overview, sources: Sources) -> Part:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan import __version__
-from busplan.analysis.explain import assumptions
 from busplan.analysis.overview import Overview
 from busplan.report.circle_test import um
 from busplan.report.lines import count, percent, plural, us
@@ -54,7 +53,7 @@ def _chapter(subject: Subject, *, anchor: str) -> Chapter:
         axes_part(answer, named),
         circle_part(answer, named),
         sources_part(answer, named),
-        _assumptions_part(answer),
+        _assumptions_part(named["explain"]),
         _commands_part(listed),
     )
     capacity = named["capacity"]
@@ -80,18 +79,23 @@ def _chapter(subject: Subject, *, anchor: str) -> Chapter:
     )
 
 
-def _assumptions_part(answer: Overview) -> Part:
+def _assumptions_part(source: Source) -> Part:
     rows = tuple(
-        Row((Code(one.name), _value(one.value), one.unit, one.grade, one.source, one.meaning))
-        for one in assumptions(answer.profile)
+        Row(
+            (
+                Code(one["name"]),
+                source.figure(f"/assumptions/{number}/value", _value, one["unit"]),
+                *(one[key] for key in ("unit", "grade", "source", "meaning")),
+            )
+        )
+        for number, one in enumerate(source.value("/assumptions"))
     )
     columns = tuple(
         Column(word, "figures" if word == "value" else "words")
         for word in ("name", "value", "unit", "grade", "source", "meaning")
     )
-    return Part(
-        "assumptions", "What it rests on", tables=(Table("Assumptions with their grades", columns, rows, stacks=True),)
-    )
+    table = Table("Assumptions with their grades, the least well known first", columns, rows, stacks=True)
+    return Part("assumptions", "What it rests on", tables=(table,), commands=(source.anchor,))
 
 
 def _value(value: float | str) -> str:

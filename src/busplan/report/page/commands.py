@@ -6,6 +6,7 @@ import shlex
 from busplan.analysis.overview import Overview
 from busplan.analysis.verdict import verdicts
 from busplan.report import documents
+from busplan.report.explain import figure_document
 from busplan.report.page.content import Source
 from busplan.report.timeline.documents import timeline_document
 
@@ -75,4 +76,5 @@ def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool)
     if answer.circle is not None:
         document = documents.circle_document(answer.circle, with_contributions=True)
         found.append(source("circle", "the circle and its error sources", document, "--contributions", *own))
+    found.append(source("explain", "what the figures rest on", figure_document(answer.profile)))
     return tuple(found)

@@ -1,6 +1,6 @@
 """A timeline as one SVG, for a page or alone: bars stretch with the width, words keep their size, light and dark."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from textwrap import wrap
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
@@ -33,6 +33,8 @@ _PHONE: Final = 335
 """Width that a phone shows, margins left away."""
 _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
+_MOST_BARS: Final = 400
+"""Bars in the lanes of a page: beyond them a transaction is one, for a page is read and not measured."""
 
 
 def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
@@ -56,11 +58,19 @@ def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
     window = drawn_window(plan)
     height = 0 if inline else _above(body, plan, window) + _GAP
     height = _strip(body, plan, window, y=height)
-    height = (_event_lanes if has_event_lanes(window) else _node_lanes)(body, window, y=height + _GAP)
+    if has_event_lanes(window):
+        height = _event_lanes(body, window, y=height + _GAP)
+    else:
+        height = _node_lanes(body, window, y=height + _GAP, coarse=inline and is_coarse(window))
     if not inline:
         height = _legend(body, plan, y=height + _GAP) + _GAP
     root.set("height", str(height))
     return markup(root)
+
+
+def is_coarse(window: Schedule) -> bool:
+    """Whether a page draws a transaction as one bar, and not its phases."""
+    return len(window.events) > _MOST_BARS
 
 
 def _above(body: Element, plan: Schedule, window: Schedule) -> int:
@@ -85,9 +95,7 @@ def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
     scale = Scale(0.0, plan.end_us)
     if overruns(plan):
         _over(body, plan, scale, y=y - 3, height=_BAR + 6)
-    for one in parts:
-        owner = STRIP[one.kind].label if one.event.node is None else f"{one.kind} of node {one.event.node}"
-        scale.rect(body, one.event, y=y, height=_BAR, css=one.kind, title=_tip(owner, one.event))
+    _bars(body, plan.cycle_events, scale, y=y, height=_BAR, coarse=True)
     if overruns(plan):
         _edge(body, plan, scale, y=y - 3, height=_BAR + 6)
     if window.from_us > 0 or window.to_us < plan.end_us:
@@ -126,12 +134,17 @@ def _tip(label: str, event: Event) -> str:
     return f"{label}, {us(event.duration_us)} us: {us(event.start_us)} to {us(event.end_us)} us"
 
 
-def _bars(parent: Element, events: Iterable[Event], scale: Scale, *, y: int, height: int) -> None:
+def _bars(parent: Element, events: Sequence[Event], scale: Scale, *, y: int, height: int, coarse: bool = False) -> None:
+    if coarse:
+        for one in stretches(events):
+            owner = STRIP[one.kind].label if one.event.node is None else f"{one.kind} of node {one.event.node}"
+            scale.rect(parent, one.event, y=y, height=height, css=one.kind, title=_tip(owner, one.event))
+        return
     for event in events:
         scale.rect(parent, event, y=y, height=height, css=event.kind, title=_tip(event_title(event), event))
 
 
-def _node_lanes(body: Element, window: Schedule, *, y: int) -> int:
+def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
     """A lane for the bus and one for each node."""
     lanes = node_lanes(window)
     y = _words(body, f"{us(window.from_us)} to {us(window.to_us)} us, by node", y=y, css="head") + 4
@@ -148,7 +161,7 @@ def _node_lanes(body: Element, window: Schedule, *, y: int) -> int:
     if over:
         _over(area, window, scale, y=y - 2, height=bottom - y + 2)
     for number, lane in enumerate(lanes):
-        _bars(area, lane.events, scale, y=y + pitch * number, height=pitch - 3)
+        _bars(area, lane.events, scale, y=y + pitch * number, height=pitch - 3, coarse=coarse)
     if over:
         _edge(area, window, scale, y=y - 2, height=bottom - y + 2)
     return below
