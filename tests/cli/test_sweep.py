@@ -15,13 +15,15 @@ import pytest
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "FORCE_COLOR"}
 
 
-def command(*arguments: str) -> list[str]:
-    return [sys.executable, "-m", "busplan", *arguments]
-
-
 def busplan(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        command(*arguments), capture_output=True, text=True, cwd=cwd, check=False, timeout=120, env=ENVIRONMENT
+        [sys.executable, "-m", "busplan", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+        timeout=120,
+        env=ENVIRONMENT,
     )
 
 
@@ -79,8 +81,11 @@ def test_the_table_shows_the_top_rows_and_how_many_fit(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["rows.csv", "rows.json", "rows.jsonl", "rows.npz"])
 def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("old", encoding="utf-8")
+    # Whoever runs the tests in the background may ignore interrupts, and children inherit that.
+    program = "import signal; signal.signal(2, signal.default_int_handler); from busplan.__main__ import main; main()"
+    arguments = ("sweep", "paper-4ms", "--vary", "cycle.period_us=100:900000000", "-o", name)
     with subprocess.Popen(
-        command("sweep", "paper-4ms", "--vary", "cycle.period_us=100:900000000", "-o", name),
+        [sys.executable, "-c", program, *arguments],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         text=True,
