@@ -1,6 +1,7 @@
 """What IEEE 1394 fixes: rates, limits, packet sizes, gap counts and the constants of the equations.
 
-Every number is a `Sourced` float: it names its unit, its source and how well it is known. "Paper" is
+Every figure that somebody published or measured is a `Sourced` float: it names its unit, its source and how well it
+is known. What is so by definition (the bits of a byte, a field of six bits) is a plain number. "Paper" is
 G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Control System Using the
 IEEE-1394 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
@@ -220,8 +221,14 @@ PACKET_OVERHEAD_BYTES: Final = Sourced(
 GAP_COUNT_BY_HOPS: Final = (
     5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62,
 )  # fmt: skip
-"""Smallest safe gap count for 1, 2, ... 23 hops of 4.5 m (P1394a table C-2, 1394a table E-1, as Apple, JHU
-and, to 15 hops, Linux carry it)."""
+"""Smallest safe gap count for 1, 2, ... hops; see `GAP_COUNT_TABLE_HOPS`."""
+GAP_COUNT_TABLE_HOPS: Final = Sourced(
+    len(GAP_COUNT_BY_HOPS),
+    unit="hops",
+    grade="published",
+    source="P1394a table C-2, 1394a table E-1, as Apple, JHU and, to 15 hops, Linux carry it",
+    meaning="hops that the table of smallest safe gap counts knows, for cables of 4.5 m",
+)
 
 
 _GAP_COUNT_STEPS: Final = tuple(
@@ -249,7 +256,7 @@ def safe_gap_count(hops: int) -> int:
 
     References
     ----------
-    IEEE 1394a table E-1; see `GAP_COUNT_BY_HOPS`.
+    The source of `GAP_COUNT_TABLE_HOPS`.
 
     Examples
     --------
@@ -276,7 +283,7 @@ def gap_count_by_hops(hops: int) -> int:
 
     References
     ----------
-    IEEE 1394a table E-1; see `GAP_COUNT_BY_HOPS`.
+    The source of `GAP_COUNT_TABLE_HOPS`.
 
     Examples
     --------

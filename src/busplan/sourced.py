@@ -1,5 +1,6 @@
 """Numbers and equations that carry where they come from, and numbers how well they are known."""
 
+import re
 from collections.abc import Callable
 from typing import Any, Final, Literal, NamedTuple, Self, TypeVar
 
@@ -116,8 +117,9 @@ def published(*numbers: int, symbol: str, section: str, part: str = "") -> Calla
         equation = Equation(numbers, symbol, section, part, function)
         EQUATIONS[function.__name__] = equation
         if function.__doc__:  # python -OO takes docstrings away
-            references = f"References\n    ----------\n    {equation.source}.\n\n    Examples\n"
-            function.__doc__ = function.__doc__.replace("Examples\n", references, 1)
+            before, indent, examples = re.split(r"(?m)^( *)(?=Examples\n)", function.__doc__, maxsplit=1)
+            references = "".join(f"{indent}{line}\n" for line in ("References", "----------", f"{equation.source}."))
+            function.__doc__ = f"{before}{references}\n{indent}{examples}"
         return function
 
     return enter

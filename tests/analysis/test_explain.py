@@ -16,7 +16,7 @@ from busplan.analysis.derive_circle import circle_figures
 from busplan.analysis.explain import assumptions, explain, figure_named
 from busplan.analysis.latency import latency
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Traced
+from busplan.analysis.trace import Traced, written
 from busplan.analysis.verdict import verdicts
 from busplan.errors import BusplanError
 from busplan.ieee1394 import CONSTANTS
@@ -112,6 +112,81 @@ def test_every_figure_of_the_circle_test_is_derived_as_it_is_computed(changes: d
             assert derived[key].value == (list(value) if isinstance(value, tuple) else value), key
 
 
+def test_a_circle_on_the_host_rests_on_the_bus_too() -> None:
+    changes = {"servo.loop": "host", "circle.radius_mm": 20.0, "node.execution.grade": "assumed"}
+    for key in ("mean_contour_error_mm", "circular_deviation_mm", "phase_margin_deg"):
+        (one,) = explain(override(load("paper-1ms").profile, changes), key).derivations
+        assert "T_d" in [step.symbol for step in one.steps]
+        assert one.weakest_grade == "assumed"
+
+
+def test_formulas_of_the_path_in_symbols_give_its_figures() -> None:
+    profile = override(load("paper-1ms").profile, {"circle.radius_mm": 20.0, "circle.ramp_periods": 33})
+    found = circle_figures(profile)
+    symbols = {"r": 20.0, "F": 10_000.0, "T_s": 1000.0, "ramp": 33, "h": 100.0, "pi": math.pi}
+    setpoints, words = found["setpoints"].formula.split(",")
+    assert words == " rounded up"
+    assert math.ceil(eval(setpoints.replace("2 pi r", "2 * pi * r"), symbols)) == found["setpoints"].value
+    steps = eval(found["steps"].formula.replace("n T_s", "n * T_s"), symbols | {"n": found["setpoints"].value})
+    assert steps == found["steps"].value
+    assert written(found["duration_s"], in_numbers=False) == "n T_s / 1000000"
+
+
+def test_grades_rank_from_the_weakest() -> None:
+    order = ["assumed", "recalled", "calibrated", "derived", "measured", "published", "given"]
+    ranked = [one.grade for one in assumptions(load("paper-4ms").profile)]
+    assert ranked == sorted(ranked, key=order.index)
+    assert {"recalled", "calibrated", "derived", "measured", "published"} <= set(ranked)
+
+
+def test_limits_and_tables_are_among_what_a_plan_starts_from(make: Make) -> None:
+    names = {one.name for one in explain(make(bus__gap_count="optimal"), "fits").derivations[0].inputs}
+    assert {"MAX_NODES", "MAX_HOPS", "MAX_PAYLOAD_BYTES[S400]", "GAP_COUNT_TABLE_HOPS", "payload.read_bytes"} <= names
+
+
+@pytest.mark.parametrize(
+    ("size", "kind", "sources"),
+    [
+        (4, "read", {"QUADLET_READ_REQUEST_BYTES", "QUADLET_READ_RESPONSE_BYTES"}),
+        (4, "write", {"QUADLET_WRITE_REQUEST_BYTES", "WRITE_RESPONSE_BYTES"}),
+        (12, "read", {"BLOCK_READ_REQUEST_BYTES", "BLOCK_READ_RESPONSE_OVERHEAD_BYTES"}),
+        (12, "write", {"BLOCK_WRITE_REQUEST_OVERHEAD_BYTES", "WRITE_RESPONSE_BYTES"}),
+    ],
+)
+def test_each_packet_of_the_standard_names_its_own_source(make: Make, size: int, kind: Any, sources: set[str]) -> None:
+    profile = make(payload__read_bytes=size, payload__write_bytes=size)
+    (one,) = explain(profile, "latency_us", timing_models=["standard"], transactions=[kind]).derivations
+    assert {given.name for given in one.inputs if "REQUEST" in given.name or "RESPONSE" in given.name} == sources
+
+
+def test_the_papers_two_packets_have_names_of_their_own() -> None:
+    (one,) = explain(load("paper-4ms").profile, "response_data_us", transactions=["read"]).derivations
+    assert one.steps[-1].formula.endswith("8 B_resp / R")
+
+
+def test_the_change_is_told_under_one_model() -> None:
+    profile = override(load("paper-1ms").profile, {"cycle.period_us": 600.0})
+    (one,) = explain(profile, "cheapest_change").derivations
+    assert one.steps[-1].numbers == (
+        "with bus.gap_count = 7 the bus carries 3 nodes instead of 1, and these 2 leave 107.2051 us instead of "
+        "-20.39908 us (standard model)"
+    )
+
+
+def test_the_binding_term_is_the_largest_of_what_is_listed(make: Make) -> None:
+    step = explain(make(), "binding_term").derivations[0].steps[-1]
+    assert step.formula == "the largest of arbitration, data, acknowledge, execution, gaps, sync, nonperiodic"
+    sizes = [float(size) for size in step.numbers.removeprefix("the largest of ").split(", ")]
+    assert sizes[3] == max(sizes)
+    assert step.value == "gaps" if sizes[4] > sizes[3] else "execution"
+
+
+def test_the_own_keys_of_both_axes_are_among_what_a_circle_starts_from() -> None:
+    own = {"servo.x": {"position_gain_per_s": 120.0}, "servo.y": {"drive_lag_us": 7000.0}}
+    names = {one.name for one in assumptions(override(load("paper-1ms").profile, own))}
+    assert {"servo.x.position_gain_per_s", "servo.y.drive_lag_us"} <= names
+
+
 def test_the_lines_of_a_circle_read_back_as_its_measures() -> None:
     profile = override(load("paper-1ms").profile, {"circle.radius_mm": 20.0, "circle.feed_mm_per_min": 5000.0})
     found = circle_figures(profile)
@@ -122,9 +197,8 @@ def test_the_lines_of_a_circle_read_back_as_its_measures() -> None:
     assert float(total) / int(steps) == pytest.approx(found["mean_contour_error_mm"].value, rel=1e-6)
     outer, inner = re.findall(r"r \+ (\S+)\)", found["circular_deviation_mm"].numbers)
     assert float(outer) - float(inner) == pytest.approx(found["circular_deviation_mm"].value, rel=1e-5)
-    assert eval(
-        found["setpoints"].numbers.split(",")[0].replace("2 pi", "2 * math.pi"), {"math": math}
-    ) == pytest.approx(found["setpoints"].value, abs=1)
+    way = found["setpoints"].numbers.split(",")[0].replace("2 pi", "2 * math.pi")
+    assert math.ceil(eval(way, {"math": math})) == found["setpoints"].value
 
 
 def test_a_verdict_is_explained_by_both_models() -> None:
@@ -140,8 +214,21 @@ def test_periods_models_and_transactions_multiply() -> None:
     profile = load("paper-4ms").profile
     found = explain(profile, "latency_us", periods_us=[1000.0, 2000.0], timing_models=["paper", "standard"])
     assert len({(one.period_us, one.timing_model, one.transaction) for one in found.derivations}) == 8
-    circle = explain(profile, "circle-test.required_us", timing_models=["paper", "standard"])
+    circle = explain(profile, "circle-test.required_us", timing_models=["paper"])
     assert [one.timing_model for one in circle.derivations] == ["paper"]
+
+
+@pytest.mark.parametrize(
+    ("name", "asked"),
+    [
+        ("circle-test.required_us", {"timing_models": ["paper", "standard"]}),
+        ("circular_deviation_mm", {"timing_models": ["standard"]}),
+        ("required_us", {"transactions": ["read"]}),
+    ],
+)
+def test_what_a_figure_has_no_choice_of_is_refused(name: str, asked: Any) -> None:
+    with pytest.raises(BusplanError, match=r"no other, paper|no figure of latency"):
+        explain(load("paper-4ms").profile, name, **asked)
 
 
 def test_the_weakest_grade_is_that_of_the_least_known_input(make: Make) -> None:

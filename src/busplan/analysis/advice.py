@@ -80,7 +80,8 @@ def changes_to_fit(profile: Profile, *, models: Sequence[TimingModelName]) -> It
         return
     for cure in ({}, *_time_cures(cured, nodes, models)):
         after = _after(profile, {**cures, **cure}, models=models)
-        if after and all(one.fits for one in after):
+        # A cable that the gap-count table does not hold for has no safe gap count to advise.
+        if after and all(one.fits and one.gap_count_safe for one in after):
             yield Change({**cures, **cure}, nodes, min(after, key=lambda one: one.margin_us))
 
 

@@ -2,6 +2,7 @@
 
 from typing import Final, Literal, NamedTuple
 
+from busplan import equations
 from busplan.analysis.latency import phases
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES
 from busplan.profile.model import Profile
@@ -38,7 +39,9 @@ class Cycle(NamedTuple):
     @property
     def required_us(self) -> float:
         """What the whole cycle needs: N times (2)."""
-        return self.reads_us + self.writes_us + self.nonperiodic_us + self.sync_us
+        return equations.required_time_slice_us(
+            self.reads_us, writes_us=self.writes_us, nonperiodic_us=self.nonperiodic_us, sync_us=self.sync_us, nodes=1
+        )
 
     def terms_us(self) -> dict[Term, float]:
         """Take the required time apart; the parts add up to it."""
@@ -84,7 +87,7 @@ def cycle(profile: Profile, *, model: TimingModelName, nodes: int, payload_bytes
 
 def available_us(profile: Profile) -> float:
     """Share of the period that is for communication, alpha T_s of (1) [us]."""
-    return profile.cycle.slice_ratio * profile.cycle.period_us
+    return equations.time_slice_us(profile.cycle.period_us, slice_ratio=profile.cycle.slice_ratio, nodes=1)
 
 
 def fits_in(required_us: float, *, available_us: float) -> bool:

@@ -17,6 +17,11 @@ from busplan.ieee1394 import (
     BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
     BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
     DATA_RATE_MBIT_S,
+    GAP_COUNT_TABLE_HOPS,
+    MAX_GAP_COUNT,
+    MAX_HOPS,
+    MAX_NODES,
+    MAX_PAYLOAD_BYTES,
     QUADLET_BYTES,
     QUADLET_READ_REQUEST_BYTES,
     QUADLET_READ_RESPONSE_BYTES,
@@ -124,7 +129,7 @@ def capacity_figures(profile: Profile, *, model: TimingModelName) -> dict[str, T
     found["max_nodes"] = _max_nodes(profile, found, plain)
     _name(found)
     found["max_axes"] = where.node.axes * found["max_nodes"]
-    found |= _words(found, plain)
+    found |= _words(found, plain, limits=_limits(profile))
     _name(found)
     return found
 
@@ -154,9 +159,9 @@ def _bus(profile: Profile, model: TimingModelName) -> _Bus:
         hops = traced(profile, "bus.max_hops")
     safe = Traced(
         gap_count_by_hops(hops.value),
-        formula="the gap-count table at H hops (IEEE 1394a, table E-1)",
-        numbers=f"the table at {short(hops.value)}",
-        parts=(hops,),
+        formula=f"the table of smallest safe gap counts at H hops; {MAX_GAP_COUNT} beyond it",
+        numbers=f"the table at {short(hops.value)} of its {short(float(GAP_COUNT_TABLE_HOPS))} hops",
+        parts=(hops, GAP_COUNT_TABLE_HOPS),
     ).named("safe_gap_count", "g_safe")
     gap_count = traced(profile, "bus.gap_count")
     if isinstance(bus.gap_count, str):
@@ -179,7 +184,10 @@ def _model(name: TimingModelName) -> TimingModel:
 
     def packets(kind: TransactionKind, payload_bytes: Any, overhead_bytes: Any) -> Any:
         if name == "paper":
-            return plain.packets(kind, payload_bytes, overhead_bytes)
+            request, response = plain.packets(kind, payload_bytes, overhead_bytes)
+            # One expression gives both sizes; a packet has a name of its own.
+            other: Any = Traced(_plain(response), operation="add", parts=(payload_bytes, overhead_bytes))
+            return PacketSizes(request, other)
         sizes = plain.packets(kind, payload_bytes.value, overhead_bytes.value)
         return PacketSizes(*(_packet(kind, packet, size, payload_bytes) for packet, size in sizes._asdict().items()))  # type: ignore[arg-type]
 
@@ -278,7 +286,7 @@ def _max_nodes(profile: Profile, found: Mapping[str, Any], plain: CapacityFigure
         last,
         formula=f"the largest whole N with T_need(N) <= alpha T_s, at most {ceiling}",
         numbers=", ".join((*within, *beyond)),
-        parts=(found["available_us"], found["required_us"], *root),
+        parts=(found["available_us"], found["required_us"], *root, MAX_NODES, MAX_HOPS),
     )
 
 
@@ -289,7 +297,13 @@ _COEFFICIENTS: Final = (
 )
 
 
-def _words(found: Mapping[str, Any], plain: CapacityFigures) -> dict[str, Traced]:
+def _limits(profile: Profile) -> tuple[Any, ...]:
+    """The standard's own limits, and the payloads that one of them is for."""
+    payloads = (traced(profile, "payload.read_bytes"), traced(profile, "payload.write_bytes"))
+    return (*payloads, MAX_PAYLOAD_BYTES[profile.bus.speed], MAX_NODES, MAX_HOPS)
+
+
+def _words(found: Mapping[str, Any], plain: CapacityFigures, *, limits: tuple[Any, ...]) -> dict[str, Traced]:
     """Figures that are words or truths."""
     required, available = found["required_us"], found["available_us"]
     gaps = (found["gap_count"], found["safe_gap_count"])
@@ -298,7 +312,7 @@ def _words(found: Mapping[str, Any], plain: CapacityFigures) -> dict[str, Traced
         list(plain.exceeded),
         formula="which of payload, nodes, hops and time is over its limit",
         numbers=", ".join(plain.exceeded) or "none",
-        parts=(required, available, found["hops"], found["nodes"]),
+        parts=(required, available, found["hops"], found["nodes"], *limits),
     ).named("exceeded", FIGURES["capacity"]["exceeded"].symbol)
     return {
         "gap_count_safe": Traced(

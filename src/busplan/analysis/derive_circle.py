@@ -75,12 +75,22 @@ def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
     return tuple(one.given for one in _simulation_inputs(profile) if one.given is not None)
 
 
+def _idle(profile: Profile) -> Iterator[str]:
+    """Keys of [delivery] that nothing asks: what a node does on a loss that never comes, the seed of no chance."""
+    loses = profile.delivery.loss_probability > 0
+    if not loses:
+        yield "on_loss"
+    if not loses and not profile.delivery.jitter_us:
+        yield "seed"
+
+
 def _simulation_inputs(profile: Profile) -> Iterator[Traced]:
     """Everything that is not zero: zero in a resolution, a lag or a disturbance means that there is none."""
     yield traced(profile, "cycle.period_us")
     for name in ("circle", "servo", "delivery", "mechanics"):
         section = getattr(profile, name)
-        keys = [key for key in type(section).model_fields if key not in ("x", "y", "grade") and getattr(section, key)]
+        unused = {"x", "y", "grade", *_idle(profile)}
+        keys = [key for key in type(section).model_fields if key not in unused and getattr(section, key)]
         yield from (traced(profile, f"{name}.{key}") for key in keys)
     for axis in ("x", "y"):
         own = getattr(profile.servo, axis).model_fields_set
@@ -142,7 +152,15 @@ def _loop(one: _Test, found: Figures) -> Figures:
     result, loop = one.result, ("loop", "step_us", "period_us")
     keys = {f"servo.{key}" for key in _LOOP_KEYS} | {f"servo.{axis}.{key}" for axis in ("x", "y") for key in _LOOP_KEYS}
     gains = (part for part in one.simulation if part.given and part.given.name in keys)
-    parts = (*(found[key] for key in loop), *gains, found["delay_us"])
+    starts = (*(found[key] for key in loop), *gains, found["delay_us"])
+    control = "T_s" if one.profile.servo.loop == "host" else "h"
+    gain = Traced(
+        "as below",
+        formula=f"(kp + ki {control} z / (z - 1) + kd (z - 1) / ({control} z)) G(z)",
+        numbers=f"G(z) is exp(-s T_d) / (s (tau s + 1)) behind a hold, sampled each {control}",
+        parts=starts,
+    ).named("loop_gain", "L(z)")
+    parts = (gain,)
     axes = {} if one.run is None else {"x": one.run.margins_x, "y": one.run.margins_y}
 
     def each(name: str) -> str:
@@ -151,7 +169,7 @@ def _loop(one: _Test, found: Figures) -> Figures:
     return {
         key: _measured(one, getattr(result, key), words, each(name), parts)
         for key, name, words in (
-            ("stable", "stable", "all poles of 1 + L(z) inside the unit circle, on both axes; L(z) = C(z) G(z)"),
+            ("stable", "stable", "all poles of 1 / (1 + L(z)) inside the unit circle, on both axes"),
             ("phase_margin_deg", "phase_margin_deg", "180 deg + arg L where |L| = 1, the smaller of both axes"),
             ("gain_margin_db", "gain_margin_db", "-20 log10 |L| where arg L = 180 deg, the smaller of both axes"),
             ("crossover_hz", "crossover_hz", "where |L| = 1, of the axis with the smaller phase margin"),
@@ -168,7 +186,12 @@ def _measured(one: _Test, value: Any, formula: str, numbers: str, parts: tuple[T
     return Traced(value, formula=formula, numbers=numbers if value is not None else "does not exist", parts=parts)
 
 
-def _contour(one: _Test, _found: Figures) -> Figures:
+def _simulated(one: _Test, found: Figures) -> tuple[Traced, ...]:
+    """What the simulation starts from: the bus too, where its delay lies inside the loop."""
+    return (*one.simulation, found["delay_us"]) if one.profile.servo.loop == "host" else one.simulation
+
+
+def _contour(one: _Test, found: Figures) -> Figures:
     result, words = one.result, _Words(one)
     round_ = "" if words.is_round else f"; needs {LEAST_ARC_DEG:g} deg at constant speed"
     error, steady = "sqrt(x^2 + y^2) - r", "at constant speed"
@@ -187,13 +210,13 @@ def _contour(one: _Test, _found: Figures) -> Figures:
         ("centre_offset_mm", f"centre of the least-squares circle {steady}{round_}", words.centre()),
         ("constant_speed_deg", f"arc that the table covers {steady}, the loops settled", words.constant_speed()),
     )
-    found = {}
+    parts = _simulated(one, found)
+    measured = {}
     for key, formula, numbers in rows:
         value = getattr(result, key)
-        found[key] = _measured(
-            one, list(value) if isinstance(value, tuple) else value, formula, numbers, one.simulation
-        )
-    return found
+        plain = list(value) if isinstance(value, tuple) else value
+        measured[key] = _measured(one, plain, formula, numbers, parts)
+    return measured
 
 
 class _Words:
@@ -292,6 +315,6 @@ def _verdict(one: _Test, found: Figures) -> Figures:
                 for source in ranked or ()
             )
             or "not run",
-            parts=one.simulation,
+            parts=_simulated(one, found),
         ),
     }

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, Final, NamedTuple
 
-from busplan.analysis.capacity import Capacity, capacity
+from busplan.analysis.capacity import capacity
 from busplan.analysis.derive_bus import capacity_figures, latency_figures
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.analysis.quantities import FIGURES, Command, Figure
@@ -118,7 +118,7 @@ def explain(
     *,
     periods_us: Sequence[float] | None = None,
     timing_models: Sequence[TimingModelName] | None = None,
-    transactions: Sequence[TransactionKind] = TRANSACTION_KINDS,
+    transactions: Sequence[TransactionKind] | None = None,
     progress: Progress | None = None,
 ) -> Explanation:
     """Derive a figure of `latency`, `capacity` or `circle-test`.
@@ -134,7 +134,7 @@ def explain(
     timing_models
         Which timing models; without them the one that decides. A circle test has no other.
     transactions
-        Which transactions, for a figure of `latency`.
+        Which transactions, for a figure of `latency`; without them both.
     progress
         As for `circle_test`.
 
@@ -146,15 +146,19 @@ def explain(
     Raises
     ------
     BusplanError
-        There is no such figure, or the command itself refuses.
+        There is no such figure, what is asked for does not go with it, or the command itself refuses.
     """
     command, one = figure_named(figure)
     deciding = profile.bus.timing_model
-    models = [deciding] if timing_models is None or command == "circle-test" else timing_models
+    models = [deciding] if timing_models is None else timing_models
+    kinds: Sequence[TransactionKind | None] = (transactions or TRANSACTION_KINDS) if command == "latency" else [None]
+    if command == "circle-test" and list(models) != [deciding]:
+        raise BusplanError(f"{one.key}: a circle test has the timing model that decides and no other, {deciding}")
+    if command != "latency" and transactions is not None:
+        raise BusplanError(f"{one.key}: no figure of latency, so it belongs to no one transaction")
     found = []
     for period_us in [profile.cycle.period_us] if periods_us is None else periods_us:
         where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": "period"})
-        kinds: Sequence[TransactionKind | None] = transactions if command == "latency" else [None]
         for kind in kinds:
             for model in models:
                 traced = _traced(where, command, one.key, model=model, kind=kind, progress=progress)
@@ -264,21 +268,27 @@ def _verdict(profile: Profile, key: str, *, model: TimingModelName) -> Traced:
             verdict.models_agree, formula="fits is the same under every timing model", numbers=stories, parts=fits
         )
     if key == "cheapest_change":
-        return _change(verdict, result, fits)
+        return _change(verdict, fits)
     parts = {
         "warnings": ("gap_count_safe",),
         "text": ("fits", "margin_us", "binding_term", "max_nodes", "gap_count_safe"),
     }[key]
     chosen = tuple(figures[part] for figures in derived.values() for part in parts)
-    return Traced("in words", formula="the figures below in words", numbers=stories, parts=chosen)
+    # The sentences are a reporter's; it puts them in the place of this.
+    return Traced(None, formula="what is derived above, in words", parts=chosen)
 
 
-def _change(verdict: Verdict, result: Capacity, fits: tuple[Traced, ...]) -> Traced:
+def _change(verdict: Verdict, fits: tuple[Traced, ...]) -> Traced:
     change = verdict.change
     purpose = "carries more nodes" if verdict.all_well else "makes every model fit with a safe gap count"
     words = f"the first of gap count, slice ratio, period, speed and wiring that {purpose}"
     if change is None:
         return Traced(None, formula=words, numbers="none does", parts=fits)
     settings = ", ".join(f"{key} = {value}" for key, value in change.changes.items())
-    numbers = f"{settings} leaves {short(change.figures.margin_us)} us of {short(result.results[0].margin_us)} us now"
+    after = change.figures
+    (now,) = (one for one in verdict.all_figures if one.timing_model == after.timing_model)
+    numbers = (
+        f"with {settings} the bus carries {after.max_nodes} nodes instead of {now.max_nodes}, and these {after.nodes} "
+        f"leave {short(after.margin_us)} us instead of {short(now.margin_us)} us ({after.timing_model} model)"
+    )
     return Traced(settings, formula=words, numbers=numbers, parts=fits)

@@ -1,7 +1,7 @@
 """What a profile gives a derivation: its keys as inputs, each with its grade and where it stands."""
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final
 
 from busplan.analysis.trace import Input, Traced
 from busplan.equations import SYMBOLS
@@ -13,9 +13,6 @@ from busplan.ieee1394 import (
     SLICE_RATIO,
 )
 from busplan.profile.model import Profile
-
-if TYPE_CHECKING:
-    from busplan.profile.sections import Section
 
 _DEFAULTS: Final = MappingProxyType(
     {
@@ -70,19 +67,23 @@ def given(profile: Profile, key: str) -> Input:
         and "given" for all else that the profile sets.
     """
     *sections, name = key.split(".")
-    section: Section = profile
-    is_set, own_grade = True, None
-    for part in sections:
+    section: Any = profile
+    is_set, own_grade, graded_by = True, None, ""
+    for number, part in enumerate(sections, start=1):
         is_set = is_set and part in section.model_fields_set
         section = getattr(section, part)
-        own_grade = getattr(section, "grade", own_grade)
+        if getattr(section, "grade", None):
+            own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
-    grade, source = own_grade or "given", f"profile {profile.name}" if is_set else "default"
+    grade = own_grade or "given"
+    source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     default = _DEFAULTS.get(key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
+    # A plain number has no unit to show.
+    unit = "" if unit == "1" else unit
     symbol = _SYMBOLS.get(key) or SYMBOLS.get(name) or name
     return Input(symbol, key, value, unit, grade, source, description)
 

@@ -163,13 +163,13 @@ def value_of(operand: Operand) -> Any:
 
 
 def _computed(name: str, left: Operand, right: Operand) -> Any:
-    """The result of an operation; what a comparison's 0 or 1 switches on or off leaves no trace."""
+    """The result of an operation; a plain 0 or 1 that changes nothing, as a comparison gives it, leaves no trace."""
     for one, other in ((left, right), (right, left)):
         if _is_switch(one, 0) and name == "mul":
             return 0.0
         if (_is_switch(one, 0) and name == "add") or (_is_switch(one, 1) and name == "mul"):
             return other
-    if _is_switch(right, 0) and name == "sub":
+    if _is_switch(right, 0 if name == "sub" else 1) and name in ("sub", "truediv"):
         return left
     compute = _OPERATIONS[name].compute
     return Traced(compute(value_of(left), value_of(right)), operation=name, parts=(left, right))

@@ -18,8 +18,11 @@ from busplan.cli.output import emit, emit_text
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from busplan.analysis.explain import Explanation
     from busplan.profile.model import Profile
+    from busplan.timing import TransactionKind
 
 ExplainFormat = Literal["text", "json", "markdown"]
 
@@ -81,7 +84,6 @@ def explain_command(
         return
     from busplan.analysis.explain import explain
     from busplan.cli.progress import progress_bar
-    from busplan.timing import TRANSACTION_KINDS
 
     with progress_bar("circle test") as progress:
         found = explain(
@@ -89,10 +91,16 @@ def explain_command(
             figure,
             periods_us=periods_us(period, plan),
             timing_models=None if timing is None else timing_models(timing),
-            transactions=(transaction,) if transaction in TRANSACTION_KINDS else TRANSACTION_KINDS,
+            transactions=_transactions(transaction),
             progress=progress,
         )
     _write(found, format_)
+
+
+def _transactions(asked: "Literal['read', 'write', 'both'] | None") -> "Sequence[TransactionKind] | None":
+    if asked is None:
+        return None
+    return ("read", "write") if asked == "both" else (asked,)
 
 
 def _refuse_without_figure(options: "dict[str, object]") -> None:
@@ -118,6 +126,7 @@ def _write(found: "Explanation", format_: ExplainFormat) -> None:
     from busplan.report import explain as report
     from busplan.report import text
 
+    found = report.in_words(found)
     if format_ == "text":
         emit(report.explain_lines(found))
     elif format_ == "json":

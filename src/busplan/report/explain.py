@@ -3,13 +3,15 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from busplan.analysis.capacity import capacity
 from busplan.analysis.explain import Derivation, Explanation, Step, assumptions
 from busplan.analysis.quantities import FIGURES, Command, Figure
 from busplan.analysis.trace import Input, formula_of, short
+from busplan.analysis.verdict import verdicts
 from busplan.ieee1394 import CONSTANTS
 from busplan.profile.model import Profile
 from busplan.report import markdown
-from busplan.report.documents import Document, Row, document
+from busplan.report.documents import Document, Row, capacity_document, document
 from busplan.report.lines import BLANK, Line, table
 from busplan.report.words import period
 from busplan.sourced import EQUATIONS
@@ -75,6 +77,20 @@ def figure_markdown() -> str:
     return _text(markdown.table(["command", "figure", "eq", "unit", "what it is"], rows, left=5))
 
 
+def in_words(explanation: Explanation) -> Explanation:
+    """Put the verdict's sentences, and its change as the document has it, where the figures behind them are derived."""
+    return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
+
+
+def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
+    if one.figure.key not in ("text", "warnings", "cheapest_change"):
+        return one
+    result = capacity(explanation.profile, periods_us=[one.period_us])
+    value = capacity_document(result, verdicts(result))["verdicts"][0][one.figure.key]
+    *before, last = one.steps
+    return one._replace(value=value, steps=(*before, last._replace(value=value)))
+
+
 def explain_document(explanation: Explanation) -> Document:
     """Answer of `busplan explain PROFILE FIGURE` as JSON."""
     return document(
@@ -118,7 +134,7 @@ def explain_markdown(explanation: Explanation) -> str:
         )
         lines += [*markdown.table(["step", "eq", "formula", "numbers", "result"], steps, left=4), ""]
         cells = ([markdown.code(cell) for cell in row[:2]] + list(map(markdown.escaped, row[2:])) for row in _rows(one))
-        lines += [*markdown.table(_INPUT_HEADINGS, cells, left=6), ""]
+        lines += [_weakest(one), "", *markdown.table(_INPUT_HEADINGS, cells, left=6), ""]
     return _text(lines[:-1])
 
 
@@ -156,6 +172,8 @@ def _about(figure: Figure) -> str:
 def _result(value: Any, unit: str) -> str:
     if isinstance(value, list):
         return ", ".join(map(_item, value)) or "none"
+    if isinstance(value, dict):
+        return ", ".join(f"{key} = {new}" for key, new in value["changes"].items())
     return f"{short(value)} {unit}".rstrip() if value is not None else "none"
 
 
@@ -185,8 +203,11 @@ def _row(given: Input) -> Sequence[str]:
 
 
 def _inputs(one: Derivation) -> list[Line]:
-    title = Line(f"It starts from; the least well known is {one.weakest_grade}", "heading")
-    return [title, *table(_INPUT_HEADINGS, _rows(one), left=6)]
+    return [Line(_weakest(one), "heading"), *table(_INPUT_HEADINGS, _rows(one), left=6)]
+
+
+def _weakest(one: Derivation) -> str:
+    return f"It starts from these; the least well known is {one.weakest_grade}."
 
 
 def _text(lines: Sequence[str]) -> str:

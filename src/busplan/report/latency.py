@@ -8,7 +8,7 @@ from busplan.analysis.quantities import FIGURES
 from busplan.ieee1394 import MAX_HOPS
 from busplan.profile.model import Profile
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
-from busplan.report.words import warnings
+from busplan.report.words import execution_line, warnings
 
 LATENCY_ROWS: Final = (
     GridRow("request packet, bytes", "", "request_bytes", count),
@@ -52,6 +52,7 @@ def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
         lines.append(Line(f"Warning: over the {limit}: {', '.join(map(str, over))}.", "warning"))
     if first.hops > MAX_HOPS:
         lines.append(Line(f"Warning: {first.hops} hops are over the {MAX_HOPS:g} of one bus.", "warning"))
+    lines.extend(execution_line(profile))
     lines.extend(Line(warning, "warning") for warning in warnings(profile, nodes=first.nodes, most=0))
     return lines
 

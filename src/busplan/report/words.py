@@ -7,6 +7,7 @@ from busplan.analysis.capacity import CapacityFigures
 from busplan.analysis.cycle import Limit
 from busplan.analysis.verdict import Verdict
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
+from busplan.profile.bus import Ieee1394Bus
 from busplan.profile.model import Profile
 from busplan.report.lines import Line, plural, us
 
@@ -41,6 +42,7 @@ def verdict_lines(verdict: Verdict, profile: Profile) -> Iterator[Line]:
     yield Line(f"Largest term: {figures.binding_term}, {us(binding_us(figures))} us of {us(figures.required_us)} us.")
     yield Line(_carries(verdict))
     yield _advice(verdict, profile)
+    yield from execution_line(profile)
     for warning in warnings(profile, nodes=figures.nodes, most=figures.max_nodes):
         yield Line(warning, "warning")
 
@@ -71,7 +73,7 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
         if number and bus.gap_count_for(number) < safe_gap_count(hops):
             found.append(
                 f"Warning: gap count {bus.gap_count_for(number)} is unsafe for {plural(hops, 'hop')} "
-                f"({plural(number, 'node')}); the smallest safe one is {safe_gap_count(hops)}."
+                f"({plural(number, 'node')}); the smallest safe one is {safe_gap_count(hops)}{_table_limit(bus)}."
             )
             break
     if not bus.cable_is_standard:
@@ -80,6 +82,19 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
             "gap-count table holds for."
         )
     return found
+
+
+def _table_limit(bus: Ieee1394Bus) -> str:
+    """What a safe gap count is safe for, where the cables are longer."""
+    return "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
+
+
+def execution_line(profile: Profile) -> Iterator[Line]:
+    """Say how the execution time is known, wherever a figure is shown that rests on it; nothing where nobody says."""
+    grade = profile.node.execution.grade
+    if grade is not None:
+        text = f"The execution time behind these figures is {grade}."
+        yield Line(text, "warning" if grade == "assumed" else "plain")
 
 
 def _headline(verdict: Verdict, profile: Profile) -> Line:
@@ -143,6 +158,8 @@ def _advice(verdict: Verdict, profile: Profile) -> Line:
     change, figures = verdict.change, verdict.deciding
     if change is None:
         if not verdict.all_well:
+            if all(one.fits for one in verdict.all_figures):
+                return Line("No gap count is known to be safe for cables of this length.", "bad")
             return Line("No change of gap count, slice ratio, period, speed or wiring alone makes it fit.", "bad")
         if figures.limited_by == "time":
             return Line("No change of gap count, slice ratio or period alone carries more nodes.")

@@ -6,7 +6,7 @@ from typing import Final
 
 from busplan.analysis.advice import Change, change_for_room, change_to_fit
 from busplan.analysis.capacity import CapacityFigures, figures
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, QUADLET_BYTES, padded_bytes
+from busplan.ieee1394 import MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, QUADLET_BYTES, REFERENCE_CABLE_M, padded_bytes
 from busplan.profile.toml import override
 from busplan.rules.finding import Problem, Rule, Subject
 
@@ -145,11 +145,12 @@ def payload_not_quadlets(subject: Subject) -> Iterator[Problem]:
 
 def gap_count_unsafe(subject: Subject) -> Iterator[Problem]:
     """A gap count below the table."""
-    one = subject.deciding
+    one, bus = subject.deciding, subject.profile.bus
     if not one.gap_count_safe:
         yield Problem(
             "bus.gap_count",
-            f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}",
+            f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}"
+            f"{'' if bus.cable_is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
         )
 
 
