@@ -1,5 +1,6 @@
 """The one exception that stops a run, and its form for what stands at a place of a file."""
 
+from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 
@@ -51,5 +52,14 @@ class PlacedError(BusplanError):
     def __init__(self, name: str, problems: tuple[PlacedProblem, ...], *, hidden: int = 0) -> None:
         more = [f"{name}: and {hidden} more problems"] if hidden else []
         super().__init__(*(f"{name}:{one.line}:{one.column}: {one.message}" for one in problems), *more)
+        self.name = name
         self.placed = problems
         self.hidden = hidden
+
+    def __reduce__(self) -> tuple[Callable[..., "PlacedError"], tuple[object, ...]]:
+        """Travel between processes as what it was made of: an exception by itself travels as its message."""
+        return _remade, (self.name, self.placed, self.hidden)
+
+
+def _remade(name: str, problems: tuple[PlacedProblem, ...], hidden: int) -> PlacedError:
+    return PlacedError(name, problems, hidden=hidden)

@@ -182,7 +182,7 @@ def test_the_binding_term_is_the_largest_of_what_is_listed(make: Make) -> None:
 
 
 def test_the_own_keys_of_both_axes_are_among_what_a_circle_starts_from() -> None:
-    own = {"servo.x": {"position_gain_per_s": 120.0}, "servo.y": {"drive_lag_us": 7000.0}}
+    own: dict[str, object] = {"servo.x": {"position_gain_per_s": 120.0}, "servo.y": {"drive_lag_us": 7000.0}}
     names = {one.name for one in assumptions(override(load("paper-1ms").profile, own))}
     assert {"servo.x.position_gain_per_s", "servo.y.drive_lag_us"} <= names
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,29 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.timeline("paper-4ms", transaction=("read", 9)),
         "read:9: no such transaction in this cycle",
     ),
-    "no paths": (lambda: busplan.check([]), "paths: none; give files, folders or shipped names"),
+    "no paths": (lambda: busplan.check([]), "paths: no values; give at least one"),
+    "paths that are none": (lambda: busplan.check(5), "paths 5: expected several values, as a list"),  # type: ignore[arg-type]
+    "a path that is none": (lambda: busplan.load_profile(5), "5: expected a path, the name of a shipped"),  # type: ignore[arg-type]
+    "a key that is none": (
+        lambda: busplan.load_profile("paper-4ms", changes={1: 2}),  # type: ignore[dict-item]
+        "changes 1: expected a dotted key of the profile",
+    ),
+    "keys that are none": (lambda: busplan.sweep("paper-4ms", vary={1: [2]}), "vary {1: [2]}: expected keys"),  # type: ignore[dict-item]
+    "a window from nowhere": (lambda: busplan.timeline("paper-4ms", from_us=float("nan")), "from_us nan: expected"),
+    "a window to no float": (lambda: busplan.timeline("paper-4ms", to_us=10**400), "to_us 1"),
+    "a window of words": (lambda: busplan.timeline("paper-4ms", from_us="4ms"), "from_us '4ms': expected a finite"),  # type: ignore[arg-type]
+    "half a transaction": (
+        lambda: busplan.timeline("paper-4ms", transaction=("read",)),  # type: ignore[arg-type]
+        "transaction ('read',): expected one of one node",
+    ),
+    "a period of another kind": (
+        lambda: busplan.plan("paper-4ms", period_us=Decimal(500)),  # type: ignore[arg-type]
+        "period_us Decimal('500'): expected a finite number",
+    ),
+    "periods in no dimension": (
+        lambda: busplan.capacity("paper-4ms", periods_us=np.array(5.0)),
+        "periods_us array(5.): expected several values",
+    ),
 }
 
 

@@ -107,7 +107,7 @@ def test_the_text_is_the_table_of_the_command() -> None:
 @pytest.mark.parametrize(
     ("vary", "options", "message"),
     [
-        ({}, {}, "vary: nothing to vary; give a key and its values"),
+        ({}, {}, "vary {}: expected keys of the profile and their values"),
         ({"bus.nods": [1]}, {}, "vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
         ({"bus.nodes": []}, {}, "vary bus.nodes: no values; give at least one"),
         ({"bus.nodes": range(0)}, {}, "vary bus.nodes: no values; give at least one"),

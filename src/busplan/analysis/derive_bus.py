@@ -11,7 +11,7 @@ from busplan.analysis.cycle import Cycle, Term, available_us, cycle
 from busplan.analysis.given import given, traced
 from busplan.analysis.node_limit import RequiredByNodes, most_nodes, required_by_nodes
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Input, Traced, constant, short, written
+from busplan.analysis.trace import Input, Traced, against, constant, short, written
 from busplan.ieee1394 import (
     BLOCK_READ_REQUEST_BYTES,
     BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
@@ -264,14 +264,12 @@ def _max_nodes(profile: Profile, found: Mapping[str, Any], plain: CapacityFigure
     most, limit = most_nodes(profile.bus)
     given_us, model = available_us(profile), plain.timing_model
 
-    def needs(nodes: int) -> str:
-        return f"T_need({nodes}) = {short(cycle(profile, model=model, nodes=nodes).required_us)}"
+    def needs(nodes: int, sign: str) -> str:
+        return f"T_need({nodes}) = {against(cycle(profile, model=model, nodes=nodes).required_us, sign, given_us)}"
 
     last, ceiling = plain.max_nodes, f"{most} nodes by {limit}"
-    within = [f"{needs(last)} <= {short(given_us)}"] if last else []
-    beyond = (
-        [f"{needs(last + 1)} > {short(given_us)}"] if plain.limited_by == "time" else [f"limit: {plain.limited_by}"]
-    )
+    within = [needs(last, "<=")] if last else []
+    beyond = [needs(last + 1, ">")] if plain.limited_by == "time" else [f"limit: {plain.limited_by}"]
     root: tuple[Any, ...] = ()
     if not (profile.bus.max_hops is None and isinstance(profile.bus.gap_count, str)):
         three = required_by_nodes(profile, model=model)
@@ -337,7 +335,7 @@ def _words(found: Mapping[str, Any], plain: CapacityFigures, *, limits: tuple[An
         "fits": Traced(
             plain.fits,
             formula="T_need <= alpha T_s, and no limit is broken",
-            numbers=f"{short(required.value)} <= {short(available.value)}, broken: {broken.numbers}",
+            numbers=f"{against(required.value, '<=', available.value)}, broken: {broken.numbers}",
             parts=(required, available, broken),
         ),
     }

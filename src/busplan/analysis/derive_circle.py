@@ -13,7 +13,7 @@ from busplan.analysis.circle_test import CircleFigures, circle_test
 from busplan.analysis.derive_bus import capacity_figures
 from busplan.analysis.given import traced
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Input, Traced, short
+from busplan.analysis.trace import Input, Traced, less, short
 from busplan.profile.machine import AxisKeys
 from busplan.profile.model import Profile
 from busplan.servo.circle import CircleRun
@@ -268,7 +268,7 @@ class _Words:
         run, deviation = self._run, self._result.radius_deviation_mm
         if run is None or deviation is None:
             return ""
-        return f"{run.path.radius_mm + deviation:.12g} - {run.path.radius_mm:.12g}"
+        return less(run.path.radius_mm + deviation, run.path.radius_mm)
 
     def centre(self) -> str:
         """Over how many points it was fitted."""

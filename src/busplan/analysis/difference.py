@@ -4,7 +4,7 @@ Each figure is that of `capacity`, `latency` or `circle_test`; nothing is comput
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import inf, isclose, isfinite
+from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeGuard
 
 from busplan.analysis.capacity import figures
@@ -110,7 +110,9 @@ class Figure(NamedTuple):
         """Tell whether B is worse by more than a share of A's size; what is no number has no share."""
         if self.judgement != "worse" or self.difference is None:
             return self.judgement == "worse"
-        allowed: float = tolerance * abs(self.a) * (1 + ROUNDING)
+        # A share of a ratio in decibels is a number of decibels, whatever the ratio is.
+        share = 20 * log10(1 + tolerance) if self.measure.key.endswith("_db") else tolerance * abs(self.a)
+        allowed: float = share * (1 + ROUNDING)
         return abs(self.difference) > allowed
 
 

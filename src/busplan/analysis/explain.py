@@ -109,7 +109,7 @@ def figure_named(name: str) -> tuple[Command, Figure]:
     known = [key for figures in FIGURES.values() for key in figures]
     close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
     hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
-    raise BusplanError(f"{name}: no such figure{hint}? Without a figure, explain lists them all")
+    raise BusplanError(f"{name or repr(name)}: no such figure{hint}? Without a figure, explain lists them all")
 
 
 def explain(

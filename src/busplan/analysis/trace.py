@@ -179,6 +179,44 @@ def _is_switch(operand: Operand, value: int) -> bool:
     return not isinstance(operand, (Traced, Sourced)) and operand == value
 
 
+_DIGITS: Final = 7
+_MOST_DIGITS: Final = 17
+"""As many as tell every float from every other."""
+_SUPPORTS: Final = 1e-4
+"""Largest share of a result by which its line may miss it, for the digits that the line does not show."""
+
+
+def against(left: float, sign: str, right: float) -> str:
+    """Write a comparison with so many digits that it can be seen to hold.
+
+    Examples
+    --------
+    >>> against(205.917, "<=", 2000.0), against(205.91746955, ">", 205.91746954)
+    ('205.917 <= 2000', '205.91746955 > 205.91746954')
+    """
+    digits = _DIGITS
+    while left != right and f"{left:.{digits}g}" == f"{right:.{digits}g}" and digits < _MOST_DIGITS:
+        digits += 1
+    return f"{left:.{digits}g} {sign} {right:.{digits}g}"
+
+
+def less(left: float, right: float) -> str:
+    """Write a difference with so many digits that the line gives its result.
+
+    Examples
+    --------
+    >>> less(2000.0, 205.91747), less(320.00001432686, 320.0)
+    ('2000 - 205.9175', '320.000014327 - 320')
+    """
+    digits = _DIGITS
+    while digits < _MOST_DIGITS:
+        seen = float(f"{left:.{digits}g}") - float(f"{right:.{digits}g}")
+        if abs(seen - (left - right)) <= _SUPPORTS * abs(left - right):
+            break
+        digits += 1
+    return f"{left:.{digits}g} - {right:.{digits}g}"
+
+
 def short(value: object) -> str:
     """Write a number with as many digits as a reader puts into a pocket calculator.
 
@@ -191,7 +229,7 @@ def short(value: object) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.7g}" if isinstance(value, (int, float)) else str(value)
+    return f"{value:.{_DIGITS}g}" if isinstance(value, (int, float)) else str(value)
 
 
 def written(operand: Operand, *, in_numbers: bool) -> str:
@@ -213,6 +251,8 @@ def written(operand: Operand, *, in_numbers: bool) -> str:
     """
     if isinstance(operand, Traced) and not operand.operation:
         return operand.numbers if in_numbers else operand.formula
+    if in_numbers and operand.operation == "sub" and all(_is_atom(part) for part in operand.parts):
+        return less(*(float(value_of(part)) for part in operand.parts))
     return _written(operand, in_numbers=in_numbers, top=True)[0]
 
 
@@ -231,6 +271,10 @@ def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[
     if operation.sign == "*" and not in_numbers and not right[0].isdigit():
         return f"{left} {right}", operation.rank
     return f"{left} {operation.sign} {right}", operation.rank
+
+
+def _is_atom(operand: Operand) -> bool:
+    return not isinstance(operand, Traced) or bool(operand.symbol) or not operand.operation
 
 
 def _atom(text: str) -> tuple[str, int]:

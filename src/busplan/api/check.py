@@ -5,8 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.api.answer import Answer
-from busplan.api.inputs import Path, argument
-from busplan.errors import BusplanError
+from busplan.api.inputs import Path, argument, items
 from busplan.profile.collect import collect
 from busplan.report.gate import render
 from busplan.report.gate.plain import summary_line
@@ -87,8 +86,6 @@ def check(paths: Path | Iterable[Path], *, with_circle: bool = True) -> CheckAns
     >>> answer.passed, answer.summary
     (True, Summary(files=2, errors=0, warnings=0))
     """
-    several = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    if not several:
-        raise BusplanError("paths: none; give files, folders or shipped names")
+    several = [paths] if isinstance(paths, str | os.PathLike) else items(paths, name="paths")
     sources = collect([argument(path) for path in several]).sources
     return CheckAnswer(tuple(check_source(source, with_circle=with_circle) for source in sources))

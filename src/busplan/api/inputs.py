@@ -1,8 +1,9 @@
 """What callers give: a profile in any of its forms, and values as lists, ranges or NumPy arrays."""
 
 import os
+import sys
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Final
 
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.errors import BusplanError
@@ -15,6 +16,7 @@ from busplan.timing import TimingModelName
 Path = str | os.PathLike[str]
 """A text may also be the name of a shipped profile; a path object is always a path."""
 ProfileLike = Profile | Path
+MOST_FLOAT: Final = sys.float_info.max
 
 
 def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None = None) -> Profile:
@@ -49,7 +51,13 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     3
     """
     found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
-    return override(found, {key: plain(value) for key, value in (changes or {}).items()})
+    return override(found, {_key(key): plain(value) for key, value in (changes or {}).items()})
+
+
+def _key(key: object) -> str:
+    if not isinstance(key, str):
+        raise BusplanError(f"changes {key!r}: expected a dotted key of the profile, as bus.nodes")
+    return key
 
 
 def argument(path: Path) -> str:
@@ -58,8 +66,10 @@ def argument(path: Path) -> str:
     Raises
     ------
     BusplanError
-        Standard input, which is the command line's.
+        Standard input, which is the command line's; or no path at all.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise BusplanError(f"{path!r}: expected a path, the name of a shipped profile, or a Profile")
     if path == "-":
         raise BusplanError("-: standard input is read by the command line alone; give a file or a shipped profile")
     return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib has none that keeps links
@@ -78,9 +88,10 @@ def items(values: Iterable[Any], *, name: str) -> list[Any]:
     BusplanError
         A single value, or none.
     """
-    if isinstance(values, str) or not isinstance(values, Iterable):
+    plain_values = plain(values)
+    if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
         raise BusplanError(f"{name} {values!r}: expected several values, as a list")
-    found = [plain(value) for value in values]
+    found = [plain(value) for value in plain_values]
     if not found:
         raise BusplanError(f"{name}: no values; give at least one")
     return found
@@ -98,6 +109,21 @@ def checked_models(timing_models: Iterable[TimingModelName]) -> tuple[TimingMode
     if sorted(map(str, found)) not in (["paper"], ["standard"], sorted(BOTH_MODELS)):
         raise BusplanError(f"timing_models {found!r}: expected 'paper', 'standard' or both, in a list")
     return tuple(found)
+
+
+def finite(value: object, *, name: str) -> float:
+    """A number that is one.
+
+    Raises
+    ------
+    BusplanError
+        NaN, infinite, a truth, or no number.
+    """
+    found = plain(value)
+    # A whole number beyond a float is none either, and says so by an error of its own.
+    if type(found) not in (int, float) or not -MOST_FLOAT <= found <= MOST_FLOAT:
+        raise BusplanError(f"{name} {found!r}: expected a finite number")
+    return float(found)
 
 
 def whole(value: object, *, name: str) -> int:

@@ -8,7 +8,7 @@ from busplan.analysis.advice import Value
 from busplan.analysis.plan import Impossible, Option, Plan
 from busplan.analysis.settings import MAX_CIRCLES
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, load_profile, plain, whole
+from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.report.lines import Line
@@ -124,7 +124,8 @@ def plan(
         raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
     if axes is not None:
         nodes = analysis.nodes_for_axes(network, whole(axes, name="axes"))
-    asked = {"bus.nodes": nodes, "cycle.period_us": period_us, "bus.gap_count": gap_count}
+    period = None if period_us is None else finite(period_us, name="period_us")
+    asked = {"bus.nodes": nodes, "cycle.period_us": period, "bus.gap_count": gap_count}
     with_circle = with_circle and network.asks_for_circle
     tries = whole(max_circles, name="max_circles")
     check = None

@@ -158,8 +158,10 @@ def sweep(
     (['time', 'time', 'time'], 3)
     """
     network, models = load_profile(profile), checked_models(timing_models)
-    if not vary:
-        raise BusplanError('vary: nothing to vary; give a key and its values, as {"bus.nodes": range(1, 17)}')
+    if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
+        raise BusplanError(
+            f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
+        )
     grid = checked_grid(
         network,
         {key: _values(key, given) for key, given in vary.items()},

@@ -6,7 +6,8 @@ from typing import Final
 from busplan.analysis.capacity import CapacityFigures
 from busplan.analysis.schedule import Event, Schedule, Total, schedule, totals, zoom
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, checked_models, load_profile
+from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
+from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.report.lines import Line
 from busplan.report.text import to_json
@@ -105,5 +106,18 @@ def timeline(
     [('arbitration', 2.388), ('request_data', 0.768), ('acknowledge', 0.367)]
     """
     model = None if timing_model is None else checked_models([timing_model])[0]
-    whole = schedule(load_profile(profile), model=model)
-    return TimelineAnswer(*zoom(whole, from_us=from_us, to_us=to_us, transaction=transaction))
+    plan = schedule(load_profile(profile), model=model)
+    window = zoom(
+        plan,
+        from_us=None if from_us is None else finite(from_us, name="from_us"),
+        to_us=None if to_us is None else finite(to_us, name="to_us"),
+        transaction=None if transaction is None else _one(transaction),
+    )
+    return TimelineAnswer(*window)
+
+
+def _one(transaction: object) -> tuple[TransactionKind, int]:
+    match transaction:
+        case ("read" | "write" as kind, node):
+            return kind, whole(node, name="transaction")
+    raise BusplanError(f'transaction {transaction!r}: expected one of one node, as ("read", 1)')

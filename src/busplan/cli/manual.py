@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from busplan.cli.options import form_of_file
 from busplan.cli.output import emit_text, say, write_file
 
 
@@ -15,7 +16,7 @@ def manual_command(
         typer.Option(
             "--format",
             help="Form of the manual: GitHub's Markdown, or a man page in roff.  "
-            "[default: man where -o ends in .1, else markdown]",
+            "[default: what the name of --output says, else markdown]",
         ),
     ] = None,
     output: Annotated[
@@ -24,7 +25,7 @@ def manual_command(
             "--output",
             "-o",
             metavar="FILE",
-            help="Write it to FILE, as busplan.1 or reference.md; an old file is replaced.  [default: standard output]",
+            help="Write it to FILE: .1 (man) or .md (Markdown); an old file is replaced.  [default: standard output]",
         ),
     ] = None,
 ) -> None:
@@ -37,8 +38,9 @@ def manual_command(
     """
     from busplan.cli.tree import manual_of
 
+    chosen = form_of_file(format_, output, forms={".1": "man", ".md": "markdown"}, default="markdown")
     manual = manual_of(context.find_root().command)
-    if (format_ or ("man" if output and output.suffix == ".1" else "markdown")) == "man":
+    if chosen == "man":
         from busplan.report.manual.man import man_page
 
         text = man_page(manual)

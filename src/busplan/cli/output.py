@@ -23,6 +23,7 @@ CANNOT: int = 2
 """Exit code of a run that could not do its job."""
 
 _NARROWEST = 40
+_LONG_NAME = 200
 _STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "heading": "bold", "plain": "", "table": ""}
 
 
@@ -120,7 +121,9 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
         It exists and `overwrite` is false, or it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
+    # What a file is called may be as long as a name can be.
+    stem = target.name if len(os.fsencode(target.name)) <= _LONG_NAME else "busplan"
+    temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
     stopped: StoppedError | None = None
     with ExitStack() as last:
         with _named(path, target):

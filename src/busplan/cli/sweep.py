@@ -47,8 +47,8 @@ def sweep_command(
             "-o",
             "--output",
             metavar="FILE",
-            help="Write the document to FILE.csv, .jsonl or .npz, or as a table to any other name; an old file is "
-            "replaced.  [default: standard output]",
+            help="Write the document to FILE.csv, .json, .jsonl or .npz, or as a table to any other name; an old "
+            "file is replaced.  [default: standard output]",
         ),
     ] = None,
     columns: Annotated[

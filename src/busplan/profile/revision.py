@@ -20,8 +20,10 @@ _OBJECT: Final = re.compile(r"(?P<id>[0-9a-f]{40,64}) (?P<kind>\w+) (?P<size>[0-
 """How git answers for what is there."""
 _NEVER: Final = ("\0", "\n", "\r")
 """What git takes for the end of a name."""
-_KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_SSH")
+_KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_NO_REPLACE")
 """Of git's variables, those that say how to work. The others, which git sets for its hooks, name a repository."""
+_AT_HOME: Final = ("-c", "protocol.allow=never", "-c", "core.fsmonitor=false")
+"""Reading a page of text from a disk asks no other machine, and runs no program that a repository names."""
 
 
 class _Place(NamedTuple):
@@ -90,11 +92,23 @@ def _content(place: _Place) -> bytes:
         )
     said = rest.partition("\n")[0]
     file = _OBJECT.fullmatch(said)
+    if file is None and said.endswith(" missing"):
+        _require_readable(place)
     if file is None or file["kind"] != "blob":
         raise BusplanError(f"{place.argument}: {_no_file(place, said, is_object=file is not None)}")
     if int(file["size"]) > MAX_FILE_BYTES:
         raise too_large(place.argument)
     return _git(place, "cat-file", "blob", file["id"])
+
+
+def _require_readable(place: _Place) -> None:
+    """Tell a file that the revision does not have from one that it has and git cannot read."""
+    listed = _git(place, "ls-tree", "-z", "--end-of-options", f"{place.revision}^{{tree}}", "--", f"./{place.rest}")
+    if listed:
+        raise BusplanError(
+            f"{place.argument}: is in revision {place.revision}, and git cannot read it here: the object is damaged or "
+            "was not fetched; git fsck tells"
+        )
 
 
 def _no_file(place: _Place, said: str, *, is_object: bool) -> str:
@@ -119,10 +133,10 @@ def _git(place: _Place, *arguments: str, names: bytes = b"") -> bytes:
     }
     try:
         done = subprocess.run(  # noqa: S603 - no shell; -C takes a folder of any name
-            [git, "-C", str(place.folder), *arguments],
+            [git, *_AT_HOME, "-C", str(place.folder), *arguments],
             check=False,
             capture_output=True,
-            env={**kept, "LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0"},
+            env={**kept, "LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1"},
             input=names,
             timeout=TIMEOUT_S,
         )
@@ -132,6 +146,11 @@ def _git(place: _Place, *arguments: str, names: bytes = b"") -> bytes:
         raise BusplanError(f"{place.argument}: git cannot be run: {error.strerror}") from None
     if done.returncode:
         raise BusplanError(f"{place.argument}: no such file, and {_refusal(place, done.stderr)}")
+    # What git warns of is another revision than the one that was meant: a name of two things, a log that is too short.
+    doubt = re.search(rb"^warning: (.*)$", done.stderr, re.MULTILINE)
+    if doubt:
+        warning = doubt[1].decode(errors="backslashreplace")
+        raise BusplanError(f"{place.argument}: git is not sure what is meant: {warning}; name the commit by its id")
     return done.stdout
 
 

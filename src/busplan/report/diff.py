@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from busplan.analysis.difference import CircleSide, Difference, Figure, Judgement
+from busplan.analysis.latency import BOTH_MODELS
 from busplan.profile.model import Profile
 from busplan.report import markdown
 from busplan.report.capacity import CAPACITY_ROWS
@@ -97,7 +98,7 @@ def diff_markdown(found: Difference, *, arguments: Arguments) -> str:
         told = [one for one in found.figures if one.judgement != "neutral" or None not in (one.a, one.b)]
         changed = [one for one in told if one.judgement != "same"]
         lines += [*markdown.table(_HEADINGS, map(_markdown_cells, changed), left=_WORDS), ""] if changed else []
-        same = len(told) - len(changed)
+        same = len(_named([one for one in told if one.judgement == "same"]))
         lines += [f"{plural(same, 'figure')} {'is' if same == 1 else 'are'} the same."] if same else []
         lines += [part for note in _notes(found) for part in ("", markdown.escaped(note.text))]
     return "\n".join((*lines, ""))
@@ -166,10 +167,7 @@ def _named(figures: Sequence[Figure]) -> list[str]:
     parts: dict[str, list[str]] = {}
     for one in figures:
         parts.setdefault(_ROWS[one.measure.key].label, []).append(one.part)
-    return [
-        f"{label} ({of[0]})" if len(of) == 1 and of[0] in ("paper", "standard") else label
-        for label, of in parts.items()
-    ]
+    return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in BOTH_MODELS else label for label, of in parts.items()]
 
 
 def _sides(found: Difference, arguments: Arguments) -> Iterator[str]:
@@ -181,6 +179,8 @@ def _sides(found: Difference, arguments: Arguments) -> Iterator[str]:
 
 def _notes(found: Difference) -> Iterator[Line]:
     """Say why a circle fails or has no figures, and what the figures rest on."""
+    executions = (found.a.node.execution.grade, found.b.node.execution.grade)
+    yield from _graded("execution time behind these figures is", *executions)
     if found.circles is None:
         return
     for side, circle in zip("AB", found.circles, strict=True):
@@ -188,8 +188,15 @@ def _notes(found: Difference) -> Iterator[Line]:
             state = "FAILED" if circle.simulated else "is not simulated"
             yield Line(f"The circle of {side} {state}: {', and '.join(circle.problems)}.", "warning")
     if any(circle.simulated for circle in found.circles):
-        a, b = found.a.servo.grade, found.b.servo.grade
-        yield Line(f"The servo values behind the circle's figures are {a if a == b else f'{a} in A and {b} in B'}.")
+        yield from _graded("servo values behind the circle's figures are", found.a.servo.grade, found.b.servo.grade)
+
+
+def _graded(words: str, a: str | None, b: str | None) -> Iterator[Line]:
+    """Say how well something is known on either side; nothing where nobody says."""
+    if a or b:
+        of_a, of_b = a or "not graded", b or "not graded"
+        text = of_a if of_a == of_b else f"{of_a} in A and {of_b} in B"
+        yield Line(f"The {words} {text}.", "warning" if "assumed" in (a, b) else "plain")
 
 
 def _cells(figure: Figure) -> tuple[str, ...]:

@@ -139,7 +139,7 @@ def circle_document(test: "CircleTest", *, with_contributions: bool) -> Document
         row["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
         ranked = row.pop("contributions")
         if with_contributions:
-            row["contributions"] = [one._asdict() for one in ranked or ()]
+            row["contributions"] = None if ranked is None else [one._asdict() for one in ranked]
         results.append(row)
     return document("circle-test", profile=test.profile.name, results=results)
 

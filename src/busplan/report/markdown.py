@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-_INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:]|(?<=www)\.")
-"""Markup inside a line, and what makes a link or a mention of bare words."""
-_AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=])")
+_INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:$]|(?<=www)\.")
+"""Markup inside a line, and what makes a link, a mention or a formula of bare words."""
+_AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=#])")
 """What makes a list, a heading or a rule of the line that it begins."""
 
 BAR: Final = r"\|"

@@ -73,7 +73,7 @@ def _chapter(subject: Subject, *, anchor: str) -> Chapter:
         answer.profile.name,
         shell_word(subject.argument),
         answer.profile.description.strip(),
-        (*facts, ("decides", capacity.figure("/verdicts/0/timing_model", str))),
+        (*facts, ("deciding model", capacity.figure("/verdicts/0/timing_model", str))),
         tuple(part for part in parts if part is not None),
         listed,
     )

@@ -107,7 +107,7 @@ class Row(NamedTuple):
 
     cells: tuple[Cell, ...]
     level: int = 0
-    """1 for a part of the row above it."""
+    """1 for a part of the row above it, 2 for the one that a reader looks for: it is set in bold."""
 
 
 class Table(NamedTuple):

@@ -1,9 +1,13 @@
 """A page as Markdown for a repository: the same content, with a Mermaid chart of the timeline, and else tables."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from busplan.report.markdown import code, escaped, table
 from busplan.report.page.content import Cell, Chapter, Code, Drawing, Figure, Link, Page, Part, Source, Swatch, Table
+
+_OWN: Final = 2
+"""Level of a row in bold."""
 
 
 def page_markdown(page: Page) -> str:
@@ -63,9 +67,13 @@ def _table(one: Table) -> list[str]:
     shown = [index for index, column in enumerate(one.columns) if column.kind != "drawing"]
     columns = [one.columns[index] for index in shown]
     headings = [escaped(" ".join(filter(None, (column.group, column.heading)))) or " " for column in columns]
-    rows = ([_cell(row.cells[index]) for index in shown] for row in one.rows)
+    rows = ([_in_row(_cell(row.cells[index]), level=row.level) for index in shown] for row in one.rows)
     figures = (place for place, column in enumerate(columns) if column.kind == "figures" and not one.stacks)
     return table(headings, rows, left=next(figures, len(columns)))
+
+
+def _in_row(text: str, *, level: int) -> str:
+    return f"**{text}**" if level == _OWN and text else text
 
 
 def _cell(cell: Cell) -> str:

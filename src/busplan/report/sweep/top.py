@@ -55,7 +55,8 @@ class Tally:
     def lines(self, name: str, *, expected: int) -> list[Line]:
         """Summary of all that was counted."""
         cut = "" if self.points == expected else f" of {expected:,} (interrupted)"
-        found = [Line(f"{name}: {self.points:,} points{cut}; {self._by_model(self._fits)} fit.")]
+        noun = "point" if self.points == 1 else "points"
+        found = [Line(f"{name}: {self.points:,} {noun}{cut}; {self._by_model(self._fits)} fit.")]
         if self._passed is not None:
             found.append(Line(f"The circle holds every tolerance at {self._by_model(self._passed)}."))
         if self._unsafe:
