@@ -288,3 +288,14 @@ def test_the_verdicts_keys_are_all_known() -> None:
     result = capacity(profile)
     verdict = capacity_document(result, verdicts(result))["verdicts"][0]
     assert set(verdict) <= set(FIGURES["capacity"])
+
+
+def test_a_line_has_the_digits_that_it_takes_to_see_its_answer(make: Make) -> None:
+    needed_us = figures(make(), model="paper").required_us
+    for factor, fits in ((1 - 1e-9, False), (1 + 1e-9, True)):
+        profile = make(cycle__period_us=needed_us * 2 * factor)
+        (one,) = explain(profile, "fits", timing_models=["paper"]).derivations
+        left, right = re.findall(r"[\d.]+", one.steps[-1].numbers.partition(",")[0])
+        assert (float(left) <= float(right)) == fits == one.value
+        (one,) = explain(profile, "margin_us", timing_models=["paper"]).derivations
+        assert eval(one.steps[-1].numbers) == pytest.approx(one.value, rel=1e-3)

@@ -200,3 +200,45 @@ def test_a_large_file_is_not_even_read(tmp_path: Path, monkeypatch: pytest.Monke
     fake_git(tmp_path, monkeypatch, f'[ "$4" = blob ] && touch read; echo {some} tree 9; echo {some} blob 9000000000')
     assert refusal("HEAD:line.toml").startswith("HEAD:line.toml:1:1: the file is larger than 100,000 bytes")
     assert not (tmp_path / "read").exists()
+
+
+def damaged(repository: Path, git: Git, name: str) -> Path:
+    """Take the object of a file out of the repository."""
+    identity = git("rev-parse", f"HEAD:{name}").decode().strip()
+    path = repository / ".git" / "objects" / identity[:2] / identity[2:]
+    path.chmod(0o644)
+    path.unlink()
+    return path
+
+
+def test_a_file_that_git_cannot_read_is_not_called_absent(
+    repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damaged(repository, git, "profiles/line.toml")
+    monkeypatch.chdir(repository)
+    with pytest.raises(BusplanError, match="is in revision HEAD, and git cannot read it here"):
+        load_revision("HEAD:profiles/line.toml")
+
+
+def test_no_program_of_a_repository_is_run_to_fetch_what_is_missing(
+    repository: Path, git: Git, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damaged(repository, git, "profiles/line.toml")
+    mark = tmp_path / "run"
+    git("config", "core.repositoryformatversion", "1")
+    git("config", "extensions.partialClone", "origin")
+    git("config", "remote.origin.promisor", "true")
+    git("config", "remote.origin.url", "ssh://nowhere.invalid/x")
+    git("config", "core.sshCommand", f"touch {mark};")
+    monkeypatch.chdir(repository)
+    with pytest.raises(BusplanError):
+        load_revision("HEAD:profiles/line.toml")
+    assert not mark.exists()
+
+
+def test_a_name_of_two_things_is_refused(repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch) -> None:
+    git("branch", "two", "v1")
+    git("tag", "two", "HEAD")
+    monkeypatch.chdir(repository)
+    with pytest.raises(BusplanError, match="git is not sure what is meant: refname 'two' is ambiguous"):
+        load_revision("two:profiles/line.toml")

@@ -1,5 +1,6 @@
 """From bytes to a profile: every fault gives one clear message with its place, and nothing else ever happens."""
 
+import pickle
 import re
 import sys
 from pathlib import Path
@@ -680,3 +681,10 @@ def test_any_bytes_load_or_are_refused_with_places_inside_them(content: bytes) -
 @given(pieces=st.lists(st.one_of(PIECES, st.sampled_from(TEXT.encode().splitlines(keepends=True))), max_size=30))
 def test_any_pieces_of_toml_load_or_are_refused_with_places_inside_them(pieces: list[bytes]) -> None:
     check_outcome(b"".join(pieces))
+
+
+def test_an_error_travels_between_processes_as_what_it_is() -> None:
+    problem = PlacedProblem(3, 1, "syntax", "no TOML")
+    error = pickle.loads(pickle.dumps(PlacedError("x.toml", (problem,), hidden=2)))
+    assert (type(error), error.placed, error.hidden) == (PlacedError, (problem,), 2)
+    assert error.problems == ("x.toml:3:1: no TOML", "x.toml: and 2 more problems")

@@ -12,7 +12,7 @@ from busplan.report.markdown import code, escaped, table
 
 HOSTILE = (
     "<script>alert(1)</script>", "a|b", "`x`", "```", "`", "\\", "a\\|b", "[x](http://y)", "*a* _b_", "@team #1",
-    "# head", "&lt;", "![i](j)", "\\`", "a\\",
+    "# head", "## head", "###### h", "$x$", "&lt;", "![i](j)", "\\`", "a\\",
 )  # fmt: skip
 
 
