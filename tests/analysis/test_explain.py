@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from busplan.analysis.capacity import CapacityFigures, capacity, figures
 from busplan.analysis.circle_test import CircleFigures, circle_test
-from busplan.analysis.derive_bus import capacity_figures, latency_figures
+from busplan.analysis.derive_capacity import capacity_figures
 from busplan.analysis.derive_circle import circle_figures
+from busplan.analysis.derive_latency import latency_figures
 from busplan.analysis.explain import assumptions, explain, figure_named
 from busplan.analysis.latency import latency
 from busplan.analysis.quantities import FIGURES

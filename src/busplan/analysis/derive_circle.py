@@ -6,22 +6,19 @@ A simulation has no formula. Its lines say what was measured of it, at which ste
 from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
 from busplan.analysis.circle_failures import CONTOUR_MEASURES, LEAST_ARC_DEG
 from busplan.analysis.circle_test import CircleFigures, circle_test
-from busplan.analysis.derive_bus import capacity_figures
+from busplan.analysis.derive_capacity import capacity_figures
 from busplan.analysis.given import traced
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Input, Traced, less, short
+from busplan.analysis.simulation_numbers import SimulationNumbers
+from busplan.analysis.trace import Input, Traced, short
 from busplan.profile.machine import AxisKeys
 from busplan.profile.model import Profile
 from busplan.servo.circle import CircleRun
-from busplan.servo.contour import contour_error
 
 Progress = Callable[[int, int], None]
 Figures = dict[str, Traced]
-
 _LOOP_KEYS: Final = ("position_gain_per_s", "integral_gain_per_s2", "derivative_gain", "drive_lag_us")
 """What of the servo the linear loop holds."""
 
@@ -192,7 +189,7 @@ def _simulated(one: _Test, found: Figures) -> tuple[Traced, ...]:
 
 
 def _contour(one: _Test, found: Figures) -> Figures:
-    result, words = one.result, _Words(one)
+    result, words = one.result, SimulationNumbers(one.result, one.run)
     round_ = "" if words.is_round else f"; needs {LEAST_ARC_DEG:g} deg at constant speed"
     error, steady = "sqrt(x^2 + y^2) - r", "at constant speed"
     lowest, highest = "radial_deviation_min_mm", "radial_deviation_max_mm"
@@ -217,68 +214,6 @@ def _contour(one: _Test, found: Figures) -> Figures:
         plain = list(value) if isinstance(value, tuple) else value
         measured[key] = _measured(one, plain, formula, numbers, parts)
     return measured
-
-
-class _Words:
-    """The numbers of a simulation that its measures are made of."""
-
-    def __init__(self, one: _Test) -> None:
-        self._result, self._run = one.result, one.run
-
-    @property
-    def is_round(self) -> bool:
-        """Whether the arc is long enough for a centre."""
-        return self._result.circular_deviation_mm is not None
-
-    def mean(self) -> str:
-        """Sum and number of the errors."""
-        run, mean = self._run, self._result.mean_contour_error_mm
-        return "" if run is None or mean is None else f"{short(mean * run.steps)} / {run.steps}"
-
-    def at(self, key: str) -> str:
-        """When and where an extreme is reached."""
-        run = self._run
-        if run is None:
-            return ""
-        errors = contour_error(run.x_mm, y_mm=run.y_mm, radius_mm=run.path.radius_mm)
-        first = 0
-        if key == "max_contour_error_mm":
-            index = int(np.abs(errors).argmax())
-        else:
-            first = run.constant_speed.start
-            part = errors[run.constant_speed]
-            index = first + int(part.argmin() if key == "radial_deviation_min_mm" else part.argmax())
-        x, y = float(run.x_mm[index]), float(run.y_mm[index])
-        angle = float(np.degrees(np.arctan2(y, x)) % 360)
-        time_s = (index + 1) * run.timing.step_us / 1e6
-        root = f"sqrt(({short(x)})^2 + ({short(y)})^2) - {short(run.path.radius_mm)}"
-        return f"{root}, {short(time_s)} s from the start, at {angle:.2f} deg"
-
-    def range(self) -> str:
-        """The two distances that the circular deviation lies between, from the radius."""
-        run, centre = self._run, self._result.centre_offset_mm
-        if run is None or centre is None:
-            return ""
-        part, radius = run.constant_speed, run.path.radius_mm
-        errors = contour_error(run.x_mm[part] - centre[0], y_mm=run.y_mm[part] - centre[1], radius_mm=radius)
-        return f"(r + {short(float(errors.max()))}) - (r + {short(float(errors.min()))})"
-
-    def radius(self) -> str:
-        """Both radii."""
-        run, deviation = self._run, self._result.radius_deviation_mm
-        if run is None or deviation is None:
-            return ""
-        return less(run.path.radius_mm + deviation, run.path.radius_mm)
-
-    def centre(self) -> str:
-        """Over how many points it was fitted."""
-        part = None if self._run is None else self._run.constant_speed
-        return "" if part is None else f"least squares over {part.stop - part.start} steps"
-
-    def constant_speed(self) -> str:
-        """The steps at constant speed."""
-        part = None if self._run is None else self._run.constant_speed
-        return "" if part is None else f"steps {part.start + 1} to {part.stop}"
 
 
 def _verdict(one: _Test, found: Figures) -> Figures:

@@ -8,20 +8,18 @@ from collections.abc import Callable, Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, Final, NamedTuple
 
-from busplan.analysis.capacity import capacity
-from busplan.analysis.derive_bus import capacity_figures, latency_figures
+from busplan.analysis.derive_capacity import capacity_figures
+from busplan.analysis.derive_latency import latency_figures
+from busplan.analysis.derive_verdict import VERDICT_KEYS, verdict_figure
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.analysis.quantities import FIGURES, Command, Figure
-from busplan.analysis.trace import Input, Traced, inputs, lines, short, written
-from busplan.analysis.verdict import Verdict, verdicts
+from busplan.analysis.trace import Input, Traced, inputs, lines, written
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
 from busplan.timing import TRANSACTION_KINDS, TimingModelName, TransactionKind
 
 Progress = Callable[[int, int], None]
-
-_VERDICT_KEYS: Final = ("models_agree", "cheapest_change", "warnings", "text")
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest, and what is not for anyone to know."""
 
@@ -205,7 +203,9 @@ def _traced(
         return latency_figures(profile, model=model, kind=kind or TRANSACTION_KINDS[0])[key]
     if command == "capacity":
         return (
-            _verdict(profile, key, model=model) if key in _VERDICT_KEYS else capacity_figures(profile, model=model)[key]
+            verdict_figure(profile, key, model=model)
+            if key in VERDICT_KEYS
+            else capacity_figures(profile, model=model)[key]
         )
     from busplan.analysis.derive_circle import circle_figures  # as above
 
@@ -254,41 +254,3 @@ def _known(key: str, command: Command) -> Figure:
         if key in figures:
             return figures[key]
     return Figure(key, key, "", "")
-
-
-def _verdict(profile: Profile, key: str, *, model: TimingModelName) -> Traced:
-    """A figure of the verdict, which compares the models."""
-    result = capacity(profile, timing_models=(model, *(other for other in BOTH_MODELS if other != model)))
-    (verdict,) = verdicts(result)
-    derived = {one.timing_model: capacity_figures(profile, model=one.timing_model) for one in result.results}
-    fits = tuple(figures["fits"] for figures in derived.values())
-    stories = ", ".join(f"{one.timing_model}: {'fits' if one.fits else 'does not fit'}" for one in result.results)
-    if key == "models_agree":
-        return Traced(
-            verdict.models_agree, formula="fits is the same under every timing model", numbers=stories, parts=fits
-        )
-    if key == "cheapest_change":
-        return _change(verdict, fits)
-    parts = {
-        "warnings": ("gap_count_safe",),
-        "text": ("fits", "margin_us", "binding_term", "max_nodes", "gap_count_safe"),
-    }[key]
-    chosen = tuple(figures[part] for figures in derived.values() for part in parts)
-    # The sentences are a reporter's; it puts them in the place of this.
-    return Traced(None, formula="what is derived above, in words", parts=chosen)
-
-
-def _change(verdict: Verdict, fits: tuple[Traced, ...]) -> Traced:
-    change = verdict.change
-    purpose = "carries more nodes" if verdict.all_well else "makes every model fit with a safe gap count"
-    words = f"the first of gap count, slice ratio, period, speed and wiring that {purpose}"
-    if change is None:
-        return Traced(None, formula=words, numbers="none does", parts=fits)
-    settings = ", ".join(f"{key} = {value}" for key, value in change.changes.items())
-    after = change.figures
-    (now,) = (one for one in verdict.all_figures if one.timing_model == after.timing_model)
-    numbers = (
-        f"with {settings} the bus carries {after.max_nodes} nodes instead of {now.max_nodes}, and these {after.nodes} "
-        f"leave {short(after.margin_us)} us instead of {short(now.margin_us)} us ({after.timing_model} model)"
-    )
-    return Traced(settings, formula=words, numbers=numbers, parts=fits)
