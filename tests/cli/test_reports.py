@@ -160,7 +160,7 @@ def test_latency_as_a_table_names_the_equation_of_every_row(run: Run) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     table_rows = re.findall(r"(?m)^(?!-|phase| ).*\d\.\d{3}.*$", done.stdout)
     assert len(table_rows) == 2 * 14
-    assert all(re.search(r"\(\d+\)|measured", row) for row in table_rows)
+    assert all(re.search(r"\(\d+\)|profile", row) for row in table_rows)
 
 
 def test_a_payload_over_the_speeds_limit_is_warned_of_and_computed(run: Run) -> None:

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from busplan.analysis.schedule import Schedule, schedule, totals, zoom
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.report.scale import ticks
 from busplan.report.timeline.documents import timeline_document, timeline_rows
 from busplan.report.timeline.kinds import KINDS, STRIP, event_label
-from busplan.report.timeline.lanes import node_lanes, stretches, ticks
+from busplan.report.timeline.lanes import node_lanes, stretches
 from busplan.report.timeline.mermaid import timeline_mermaid
 from busplan.report.timeline.png import timeline_png
 from busplan.report.timeline.svg import timeline_svg

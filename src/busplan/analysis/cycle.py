@@ -1,6 +1,8 @@
 """One communication cycle: what it needs, what its slice gives it, and the limits of the standard that it may break."""
 
-from typing import Final, Literal, NamedTuple
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, Literal, NamedTuple, get_args
 
 from busplan import equations
 from busplan.analysis.latency import phases
@@ -13,6 +15,11 @@ Term = Literal["arbitration", "data", "acknowledge", "execution", "gaps", "sync"
 FIT_ROUNDING: Final = 1e-12
 """Relative allowance for the rounding of floats, so that a cycle that fills its slice exactly fits it. It is a
 billionth of a crystal's tolerance and buys no time."""
+
+TERM_KEYS: Final[Mapping[Term, str]] = MappingProxyType(
+    {term: f"{term}_us" if term in ("sync", "nonperiodic") else f"cycle_{term}_us" for term in get_args(Term)}
+)
+"""What each term of a cycle is called among the figures of `capacity`."""
 
 
 class Cycle(NamedTuple):

@@ -4,10 +4,10 @@ Only what is no operator is put into words here: comparisons, and a search's ans
 """
 
 from collections.abc import Mapping
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 from busplan.analysis.capacity import CapacityFigures, figures, numeric_figures
-from busplan.analysis.cycle import Cycle, Term, available_us, cycle
+from busplan.analysis.cycle import TERM_KEYS, Cycle, available_us, cycle
 from busplan.analysis.derive_latency import TracedBus, chosen, traced_bus, traced_phases
 from busplan.analysis.given import traced
 from busplan.analysis.node_limit import RequiredByNodes, most_nodes, required_by_nodes
@@ -23,10 +23,6 @@ from busplan.profile.sections import with_unchecked
 from busplan.timing import (
     TimingModelName,
 )
-
-_TERM_KEYS: Final[Mapping[Term, str]] = {
-    term: f"{term}_us" if term in ("sync", "nonperiodic") else f"cycle_{term}_us" for term in get_args(Term)
-}
 
 
 def capacity_figures(profile: Profile, *, model: TimingModelName) -> dict[str, Traced]:
@@ -129,7 +125,7 @@ def _words(found: Mapping[str, Any], plain: CapacityFigures, *, limits: tuple[An
     """Figures that are words or truths."""
     required, available = found["required_us"], found["available_us"]
     gaps = (found["gap_count"], found["safe_gap_count"])
-    terms = {term: found[key] for term, key in _TERM_KEYS.items()}
+    terms = {term: found[key] for term, key in TERM_KEYS.items()}
     broken = Traced(
         list(plain.exceeded),
         formula="which of payload, nodes, hops and time is over its limit",

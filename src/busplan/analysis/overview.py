@@ -5,9 +5,11 @@ from typing import Final, NamedTuple
 from busplan.analysis.capacity import Capacity, capacity
 from busplan.analysis.circle_test import CircleFigures, CircleTest, Progress, circle_test
 from busplan.analysis.contour_profile import ContourProfile, contour_profile
+from busplan.analysis.explain import assumptions
 from busplan.analysis.latency import BOTH_MODELS, LatencyResult, latency
 from busplan.analysis.node_steps import NodeSteps, node_steps
 from busplan.analysis.schedule import Schedule, schedule
+from busplan.analysis.trace import Input
 from busplan.analysis.verdict import Verdict, verdicts
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
@@ -38,6 +40,8 @@ class Overview(NamedTuple):
     """Contour error around the circle; None where the table did not follow it."""
     no_circle: tuple[str, ...]
     """Why the circle test cannot be run; nothing where it was not asked for."""
+    assumptions: tuple[Input, ...]
+    """What the figures rest on, the least well known first."""
 
     @property
     def circle_figures(self) -> CircleFigures | None:
@@ -76,6 +80,7 @@ def overview(profile: Profile, *, with_circle: bool = True, progress: Progress |
         circle=circle,
         contour=contour,
         no_circle=no_circle,
+        assumptions=assumptions(profile),
     )
 
 

@@ -65,13 +65,28 @@ _GAPS: Final = _by(eq.gaps_us)
 _ACKNOWLEDGE: Final = _by(eq.acknowledge_phase_us, eq.acknowledge_us)
 _ISO: Final = "ISO 230-4"
 
+_MODEL: Final = Figure("timing_model", "model", "profile", "timing model: paper or standard")
+_PERIOD: Final = Figure("period_us", "T_s", "profile", "communication period")
+_NODES: Final = Figure("nodes", "N", "profile", "distributed nodes, host not counted")
+_HOPS: Final = Figure("hops", "H", "profile", "cable hops to the farthest node")
+_GAP_COUNT: Final = Figure("gap_count", "g", "profile", "gap count in force")
+_AVAILABLE: Final = Figure(
+    "available_us", "alpha T_s", _by(eq.time_slice_us), "share of the period that is for communication"
+)
+_REQUIRED: Final = Figure("required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs")
+_SUBACTION_GAP: Final = Figure("subaction_gap_us", "T_sub", _by(eq.subaction_gap_us), "subaction gap")
+_RESET_GAP: Final = Figure(
+    "arbitration_reset_gap_us", "T_reset", _by(eq.arbitration_reset_gap_us), "arbitration reset gap"
+)
+_BOTH_GAPS: Final = Figure("gaps_us", "T_sum", _GAPS, "both gaps, after each transaction")
+
 _LATENCY_FIGURES: Final = (
-    Figure("timing_model", "model", "profile", "timing model: paper or standard"),
+    _MODEL,
     Figure("transaction", "kind", "profile", "read or write"),
     Figure("payload_bytes", "P", "profile", "payload of the transaction"),
-    Figure("nodes", "N", "profile", "distributed nodes, host not counted"),
-    Figure("hops", "H", "profile", "cable hops to the farthest node"),
-    Figure("gap_count", "g", "profile", "gap count in force"),
+    _NODES,
+    _HOPS,
+    _GAP_COUNT,
     Figure("request_bytes", "B_req", "packets", "request packet on the wire"),
     Figure("response_bytes", "B_resp", "packets", "response packet on the wire"),
     Figure("arbitration_us", "ArbP", _by(eq.arbitration_phase_us), "arbitration of either packet"),
@@ -91,9 +106,9 @@ _LATENCY_FIGURES: Final = (
     Figure(
         "response_and_acknowledge_us", "T4+T5", _by(eq.response_and_acknowledge_us), "second half of the transaction"
     ),
-    Figure("subaction_gap_us", "T_sub", _by(eq.subaction_gap_us), "subaction gap"),
-    Figure("arbitration_reset_gap_us", "T_reset", _by(eq.arbitration_reset_gap_us), "arbitration reset gap"),
-    Figure("gaps_us", "T_sum", _GAPS, "both gaps, after each transaction"),
+    _SUBACTION_GAP,
+    _RESET_GAP,
+    _BOTH_GAPS,
     Figure(
         "latency_with_gaps_us",
         "T_full",
@@ -102,23 +117,23 @@ _LATENCY_FIGURES: Final = (
     ),
 )
 _CAPACITY_FIGURES: Final = (
-    Figure("timing_model", "model", "profile", "timing model: paper or standard"),
-    Figure("period_us", "T_s", "profile", "communication period"),
-    Figure("nodes", "N", "profile", "distributed nodes, host not counted"),
+    _MODEL,
+    _PERIOD,
+    _NODES,
     Figure("axes", "axes", "profile", "axes of all nodes"),
-    Figure("hops", "H", "profile", "cable hops to the farthest node"),
-    Figure("gap_count", "g", "profile", "gap count in force"),
+    _HOPS,
+    _GAP_COUNT,
     Figure("safe_gap_count", "g_safe", "table", "smallest safe gap count for the hops"),
     Figure("gap_count_safe", "safe", "table", "whether the gap count is at least that"),
-    Figure("available_us", "alpha T_s", _by(eq.time_slice_us), "share of the period that is for communication"),
-    Figure("required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs"),
+    _AVAILABLE,
+    _REQUIRED,
     Figure("time_slice_us", "T_cs,given", _by(eq.time_slice_us), "time slice that the cycle gives each node"),
     Figure("required_time_slice_us", "T_cs,needed", _SLICE, "time slice that each node needs"),
     Figure("read_latency_us", "T_lant,read", _LATENCY, "one read, without the gaps after it"),
     Figure("write_latency_us", "T_lant,write", _LATENCY, "one write, without the gaps after it"),
-    Figure("gaps_us", "T_sum", _GAPS, "both gaps, after each transaction"),
-    Figure("subaction_gap_us", "T_sub", _by(eq.subaction_gap_us), "subaction gap"),
-    Figure("arbitration_reset_gap_us", "T_reset", _by(eq.arbitration_reset_gap_us), "arbitration reset gap"),
+    _BOTH_GAPS,
+    _SUBACTION_GAP,
+    _RESET_GAP,
     Figure("sync_us", "CTS", "profile", "the synchronous packet that opens a cycle"),
     Figure("nonperiodic_us", "T_npd", "profile", "time kept for non-periodic data"),
     Figure("cycle_arbitration_us", "arbitration", _by(eq.arbitration_phase_us), "all arbitration of a cycle"),
@@ -143,7 +158,7 @@ _CAPACITY_FIGURES: Final = (
     Figure("text", "text", _CYCLE, "the verdict in words"),
 )
 _CIRCLE_FIGURES: Final = (
-    Figure("period_us", "T", "profile", "communication period"),
+    _PERIOD,
     Figure("feed_mm_per_min", "F", "profile", "speed along the circle"),
     Figure("radius_mm", "r", "profile", "radius of the circle"),
     Figure("duration_s", "D", "path", "duration of the move"),
@@ -154,8 +169,8 @@ _CIRCLE_FIGURES: Final = (
     Figure("delay_us", "T_d", _SLICE, "bus delay inside the loop"),
     Figure("timing_model", "model", "profile", "timing model that decides whether the bus fits"),
     Figure("bus_fits", "fits", _CYCLE, "whether the cycle fits the bus"),
-    Figure("required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs"),
-    Figure("available_us", "alpha T_s", _by(eq.time_slice_us), "share of the period that is for communication"),
+    _REQUIRED,
+    _AVAILABLE,
     Figure("servo_grade", "grade", "profile", "how the servo values are known"),
     Figure("stable", "stable", "loop", "whether both position loops are stable"),
     Figure("phase_margin_deg", "phase margin", "loop", "turn of the loop's phase that makes it unstable"),

@@ -6,12 +6,12 @@ number of nodes, the words, and a table's interpolation.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple, get_args, get_type_hints
+from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
 
 from busplan.analysis.capacity import CapacityFigures, numeric_figures
-from busplan.analysis.cycle import Limit, Term, available_us, cycle, fits_in, limits_broken
+from busplan.analysis.cycle import TERM_KEYS, Limit, Term, available_us, cycle, fits_in, limits_broken
 from busplan.analysis.grid import Array, Chunk, Grid
 from busplan.analysis.node_limit import most_nodes, required_by_nodes
 from busplan.ieee1394 import MAX_HOPS
@@ -28,7 +28,7 @@ FIGURES: Final = CapacityFigures._fields
 WORD_FIGURES: Final = ("timing_model", "binding_term", "limited_by", "exceeded")
 """Those in words."""
 _TYPES: Final = get_type_hints(CapacityFigures)
-_TERMS: Final[tuple[Term, ...]] = get_args(Term)
+_TERMS: Final[tuple[Term, ...]] = tuple(TERM_KEYS)
 _LIMITS: Final[tuple[Limit, ...]] = ("payload", "nodes", "hops", "time")
 """In the order of `CapacityFigures.exceeded`."""
 _EXCEEDED: Final = tuple(
@@ -171,7 +171,7 @@ def _columns(where: Profile, values: Mapping[str, Array], model: TimingModelName
     numbers = numeric_figures(where, now)
     max_nodes, limited_by = _largest_nodes(where, values, model)
     late = np.logical_not(fits_in(numbers["required_us"], available_us=numbers["available_us"]))
-    terms_us = [numbers.get(f"cycle_{term}_us", numbers.get(f"{term}_us")) for term in _TERMS]
+    terms_us = [numbers[key] for key in TERM_KEYS.values()]
     broken = limits_broken(where)
     flags = [*(broken[limit] for limit in _LIMITS[:-1]), late]
     exceeded: Any = sum(flag * np.uint8(1 << bit) for bit, flag in enumerate(flags))

@@ -111,15 +111,17 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
 
 
 def _list(plan: "Profile", format_: ExplainFormat) -> None:
+    from busplan.analysis.explain import assumptions
     from busplan.report import explain as report
     from busplan.report import text
 
+    found = assumptions(plan)
     if format_ == "text":
-        emit(report.figure_lines())
+        emit(report.figure_lines(plan.name, found))
     elif format_ == "json":
-        emit_text(text.to_json(report.figure_document(plan)))
+        emit_text(text.to_json(report.figure_document(plan.name, found)))
     else:
-        emit_text(report.figure_markdown())
+        emit_text(report.figure_markdown(plan.name, found))
 
 
 def _write(found: "Explanation", format_: ExplainFormat) -> None:

@@ -1,22 +1,22 @@
 """`busplan explain` as text, as Markdown and as plain data."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Final
 
 from busplan.analysis.capacity import capacity
-from busplan.analysis.explain import Derivation, Explanation, Step, assumptions
+from busplan.analysis.explain import Derivation, Explanation, Step
 from busplan.analysis.quantities import FIGURES, Command, Figure
 from busplan.analysis.trace import Input, formula_of, short
 from busplan.analysis.verdict import verdicts
 from busplan.ieee1394 import CONSTANTS
-from busplan.profile.model import Profile
 from busplan.report import markdown
 from busplan.report.documents import Document, Row, capacity_document, document
 from busplan.report.lines import BLANK, Line, table
 from busplan.report.words import period
 from busplan.sourced import EQUATIONS
 
-_INPUT_HEADINGS = ("symbol", "name", "value", "unit", "grade", "source")
+_INPUT_HEADINGS: Final = ("symbol", "name", "value", "unit", "grade", "source")
+_FIGURE_HEADINGS: Final = ("command", "figure", "eq", "unit", "what it is")
 
 
 def figure_rows() -> list[Row]:
@@ -50,31 +50,48 @@ def constant_rows() -> list[Row]:
     ]
 
 
-def figure_document(profile: Profile) -> Document:
-    """Answer of `busplan explain PROFILE` as JSON: the whole registry, and what this profile's figures rest on."""
+def figure_document(profile: str, assumptions: Sequence[Input]) -> Document:
+    """Answer of `busplan explain PROFILE` as JSON: what the profile's figures rest on, and the whole registry."""
     return document(
         "explain",
-        profile=profile.name,
-        assumptions=[one._asdict() for one in assumptions(profile)],
+        profile=profile,
+        assumptions=[one._asdict() for one in assumptions],
         figures=figure_rows(),
         equations=equation_rows(),
         constants=constant_rows(),
     )
 
 
-def figure_lines() -> list[Line]:
-    """Answer of `busplan explain PROFILE` for people."""
+def figure_lines(profile: str, assumptions: Sequence[Input]) -> list[Line]:
+    """Answer of `busplan explain PROFILE` for people: what its figures rest on, and all that can be explained."""
     rows = ([command, one.key, one.reference, one.unit, one.meaning] for command, one in _all_figures())
-    return table(["command", "figure", "eq", "unit", "what it is"], rows, left=5)
+    return [
+        Line(f"What the figures of {profile} rest on, the least well known first", "heading"),
+        *table(_INPUT_HEADINGS[1:], (_row(one)[1:] for one in assumptions), left=5),
+        BLANK,
+        Line("Figures to explain", "heading"),
+        *table(_FIGURE_HEADINGS, rows, left=5),
+    ]
 
 
-def figure_markdown() -> str:
+def figure_markdown(profile: str, assumptions: Sequence[Input]) -> str:
     """Answer of `busplan explain PROFILE` as Markdown."""
     rows = (
         [command, markdown.code(one.key), one.reference, one.unit, markdown.escaped(one.meaning)]
         for command, one in _all_figures()
     )
-    return _text(markdown.table(["command", "figure", "eq", "unit", "what it is"], rows, left=5))
+    inputs = ((markdown.code(name), *map(markdown.escaped, others)) for _, name, *others in map(_row, assumptions))
+    return _text(
+        [
+            f"What the figures of {markdown.code(profile)} rest on, the least well known first:",
+            "",
+            *markdown.table(_INPUT_HEADINGS[1:], inputs, left=5),
+            "",
+            "Figures to explain:",
+            "",
+            *markdown.table(_FIGURE_HEADINGS, rows, left=5),
+        ]
+    )
 
 
 def in_words(explanation: Explanation) -> Explanation:

@@ -44,6 +44,7 @@ def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
             f"gap count {first.gap_count}."
         )
     )
+    lines.extend(execution_line(profile))
     over = sorted(
         {one.payload_bytes for one in result.transactions if one.payload_bytes > profile.bus.max_payload_bytes}
     )
@@ -52,7 +53,6 @@ def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
         lines.append(Line(f"Warning: over the {limit}: {', '.join(map(str, over))}.", "warning"))
     if first.hops > MAX_HOPS:
         lines.append(Line(f"Warning: {first.hops} hops are over the {MAX_HOPS:g} of one bus.", "warning"))
-    lines.extend(execution_line(profile))
     lines.extend(Line(warning, "warning") for warning in warnings(profile, nodes=first.nodes, most=0))
     return lines
 

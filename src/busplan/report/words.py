@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.capacity import CapacityFigures
-from busplan.analysis.cycle import Limit
+from busplan.analysis.cycle import TERM_KEYS, Limit
 from busplan.analysis.verdict import Verdict
 from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
 from busplan.profile.bus import Ieee1394Bus
@@ -49,9 +49,7 @@ def verdict_lines(verdict: Verdict, profile: Profile) -> Iterator[Line]:
 
 def binding_us(figures: CapacityFigures) -> float:
     """Size of the largest term [us]."""
-    key = figures.binding_term
-    own_key = f"{key}_us" if key in ("sync", "nonperiodic") else f"cycle_{key}_us"
-    return float(getattr(figures, own_key))
+    return float(getattr(figures, TERM_KEYS[figures.binding_term]))
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:

@@ -67,7 +67,7 @@ def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool)
 
     bus, periods = answer.capacity, answer.periods
     found = [
-        source("capacity", "verdict, timing models, terms", documents.capacity_document(bus, verdicts(bus)), *own),
+        source("capacity", "verdict, timing models, terms", documents.capacity_document(bus, (answer.verdict,)), *own),
         source("latency", "one read and one write", documents.latency_document(answer.latency)),
     ]
     if answer.schedule is not None:
@@ -76,5 +76,7 @@ def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool)
     if answer.circle is not None:
         document = documents.circle_document(answer.circle, with_contributions=True)
         found.append(source("circle", "the circle and its error sources", document, "--contributions", *own))
-    found.append(source("explain", "what the figures rest on", figure_document(answer.profile)))
+    found.append(
+        source("explain", "what the figures rest on", figure_document(answer.profile.name, answer.assumptions))
+    )
     return tuple(found)

@@ -5,6 +5,7 @@ from typing import Final
 
 from busplan.analysis.schedule import Event, Schedule, totals
 from busplan.report.lines import BLANK, Line, table, us
+from busplan.report.scale import ticks
 from busplan.report.timeline.kinds import KINDS, STRIP
 from busplan.report.timeline.lanes import (
     Lane,
@@ -19,7 +20,6 @@ from busplan.report.timeline.lanes import (
     stretches,
     strip_title,
     subject,
-    ticks,
 )
 from busplan.report.words import warnings
 
