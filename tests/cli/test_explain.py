@@ -73,7 +73,9 @@ def test_without_a_figure_all_are_listed(run: Run) -> None:
     assert {"assumptions", "figures", "equations", "constants"} <= set(registry)
     grades = {"published", "derived", "recalled", "measured", "calibrated", "assumed"}
     assert {row["grade"] for row in registry["constants"]} <= grades
-    assert run("explain", "paper-4ms", "--format", "markdown").stdout.startswith("What the figures of `paper-4ms` rest on")
+    assert run("explain", "paper-4ms", "--format", "markdown").stdout.startswith(
+        "What the figures of `paper-4ms` rest on"
+    )
 
 
 def test_markdown_shows_a_hostile_name_and_does_nothing_with_it(run: Run, tmp_path: Path) -> None:

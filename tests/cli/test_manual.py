@@ -150,7 +150,7 @@ def test_the_markdown_has_a_heading_a_link_and_a_row_for_each() -> None:
     [
         (("-o", "x.1"), "man"),
         (("-o", "x.md"), "markdown"),
-        (("-o", "x"), "markdown"),
+        (("-o", "x", "--format", "markdown"), "markdown"),
         (("-o", "x.1", "--format", "markdown"), "markdown"),
         (("--output", "x.md", "--format", "man"), "man"),
     ],
@@ -186,3 +186,8 @@ def test_its_name_and_forms_are_completed(run: Run) -> None:
         at = str(len(line.split()) - 1)
         done = run(env={"_BUSPLAN_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": at})
         assert done.stdout.split() == words.split()
+
+
+def test_a_name_that_says_no_form_is_refused(refused: Callable[..., str], tmp_path: Path) -> None:
+    assert "expected a name ending in .1, .md, or --format" in refused("manual", "-o", "x.html", cwd=tmp_path)
+    assert list(tmp_path.iterdir()) == []
