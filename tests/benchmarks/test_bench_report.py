@@ -10,7 +10,7 @@ from time import perf_counter
 
 from pytest_benchmark.fixture import BenchmarkFixture
 
-ROUNDS = 5
+ROUNDS = 3
 
 
 def seconds(*arguments: str, cwd: Path) -> float:
