@@ -55,7 +55,8 @@ def test_a_thousand_profiles(benchmark: BenchmarkFixture, folder: Path) -> None:
             least[name] = min(least[name], seconds(command, cwd=folder))
 
     benchmark.pedantic(lambda: seconds(ours, cwd=folder), setup=take_turns, rounds=ROUNDS)
-    assert benchmark.stats is not None
+    if benchmark.stats is None:  # run, and not measured
+        return
     whole = benchmark.stats.stats.min
     a_file, their_file = whole - least["one of ours"], least["theirs"] - least["one of theirs"]
     benchmark.extra_info["ratio_to_check_jsonschema_whole_process"] = round(whole / least["theirs"], 3)

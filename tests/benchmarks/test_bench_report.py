@@ -29,6 +29,7 @@ def test_whole_process(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     benchmark.pedantic(
         lambda: seconds(*page, cwd=tmp_path), setup=lambda: least.append(seconds(*circle, cwd=tmp_path)), rounds=ROUNDS
     )
-    assert benchmark.stats is not None
+    if benchmark.stats is None:  # run, and not measured
+        return
     benchmark.extra_info["ratio_to_the_circle_test"] = round(benchmark.stats.stats.min / min(least), 3)
     benchmark.extra_info["kilobytes"] = round((tmp_path / "report.html").stat().st_size / 1e3, 1)

@@ -56,7 +56,7 @@ def parameters() -> Iterator[Any]:
     for name in ("", *COMMANDS):
         here = context(name)
         for param in here.command.get_params(here):
-            yield pytest.param(param, param.get_help_record(here)[1], id=f"{name} {param.opts[-1]}".strip())
+            yield pytest.param(param, param.get_help_record(here)[1], id=f"{name} {max(param.opts, key=len)}".strip())
 
 
 EVERY_PARAMETER = pytest.mark.parametrize(("param", "said"), list(parameters()))
