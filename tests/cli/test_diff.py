@@ -154,9 +154,7 @@ def test_standard_input_is_one_side(run: Run, refused: Refused, repository: Path
     there = answer(run, "diff", "v1:profiles/line.toml", "-", cwd=repository, stdin=text)
     back = answer(run, "diff", "-", "v1:profiles/line.toml", cwd=repository, stdin=text)
     assert [one["key"] for one in there["changes"] + back["changes"]] == ["cycle.period_us"] * 2
-    assert refused("diff", "-", "-", stdin=text) == (
-        "A and B are both standard input, which can be read once: give a file for one of them"
-    )
+    assert refused("diff", "-", "-", stdin=text) == ("-: standard input can be read once; give files for the others")
 
 
 def test_what_is_wrong_with_either_side_is_said_together(refused: Refused, repository: Path) -> None:

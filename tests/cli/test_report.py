@@ -238,7 +238,7 @@ def test_a_comparison_stands_in_front_and_leads_to_each_profile(run: Run) -> Non
         (["nope"], "nope: no such file, and no shipped profile of that name"),
         (["paper-4ms", "-o", "x.pdf"], "--output x.pdf: expected a name ending in .html, .md, or --format"),
         (["paper-4ms", "-o", "no/such/x.html"], "there is no folder"),
-        (["-", "-"], "PROFILE -: standard input can be read once"),
+        (["-", "-"], "-: standard input can be read once"),
         (["paper-4ms", "--period", "4"], "--period 4: expected a time with its unit, as 4ms, 250us or 0.001s"),
         (["paper-4ms", "paper-1ms", "--period", "0s"], "--period 0s"),
         (["paper-4ms", "--title", "a\nb"], "--title 'a\\nb': expected words in one line"),

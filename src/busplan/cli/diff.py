@@ -1,5 +1,6 @@
 """`busplan diff`."""
 
+from itertools import count
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -8,15 +9,15 @@ import typer
 from busplan.cli.options import TimingOption, complete_profile, timing_models
 from busplan.cli.output import PlanFailsError, emit, emit_text, say
 from busplan.cli.progress import progress_bar
+from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from busplan.analysis.circle_test import CircleFigures, Progress
     from busplan.analysis.difference import Difference
     from busplan.profile.model import Profile
-
-_PARTS = 1000
-"""Parts of one circle test that progress counts."""
 
 
 def diff_command(
@@ -70,12 +71,12 @@ def diff_command(
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     from busplan.analysis.difference import difference
+    from busplan.profile.revision import load_revision
 
-    one, other = _profiles(a, b)
+    one, other = load_each((a, b), lambda argument: load_revision(argument).profile)
     with progress_bar("circle tests") as progress:
-        found = difference(
-            one, other, timing_models=timing_models(timing), circle=_Circles(progress) if circle else None
-        )
+        test = _circle(progress) if circle else None
+        found = difference(one, other, timing_models=timing_models(timing), circle=test)
     _emit(found, (a, b), format_=format_)
     regressions = found.regressions(tolerance=allowed / 100)
     if fail_on_regression and regressions:
@@ -95,42 +96,16 @@ def _tolerance(percent: float | None, *, wanted: bool) -> float:
     return percent
 
 
-def _profiles(a: str, b: str) -> "tuple[Profile, Profile]":
-    """Read both; what is wrong with either is said together."""
-    if a == b == "-":
-        raise BusplanError("A and B are both standard input, which can be read once: give a file for one of them")
-    from busplan.profile.revision import load_revision
+def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
+    """Run the circle tests of both profiles with one progress."""
+    number = count()
 
-    profiles: list[Profile] = []
-    problems: list[str] = []
-    for argument in (a, b):
-        try:
-            profiles.append(load_revision(argument).profile)
-        except BusplanError as error:
-            problems.extend(error.problems)
-    if problems:
-        raise BusplanError(*dict.fromkeys(problems))
-    one, other = profiles
-    return one, other
-
-
-class _Circles:
-    """The circle tests of both profiles, with one progress."""
-
-    def __init__(self, progress: "Progress") -> None:
-        self._progress = progress
-        self._done = 0
-
-    def __call__(self, profile: "Profile") -> "CircleFigures":
+    def run(plan: "Profile") -> "CircleFigures":
         from busplan.analysis.circle_test import circle_test
 
-        before = self._done
-        self._done += _PARTS
+        return circle_test(plan, explain=False, progress=part_of(progress, number=next(number), of=2)).results[0]
 
-        def report(done: int, total: int) -> None:
-            self._progress(before + done * _PARTS // total, 2 * _PARTS)
-
-        return circle_test(profile, explain=False, progress=report).results[0]
+    return run
 
 
 def _emit(found: "Difference", arguments: tuple[str, str], *, format_: str) -> None:

@@ -1,5 +1,6 @@
 """`busplan report`."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -8,6 +9,7 @@ import typer
 from busplan.cli.options import complete_profile, form_of_file, time_us
 from busplan.cli.output import emit_text, new_file, say
 from busplan.cli.progress import progress_bar
+from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -19,8 +21,6 @@ if TYPE_CHECKING:
 ReportFormat = Literal["html", "markdown"]
 
 _SUFFIXES: Final[dict[str, ReportFormat]] = {".html": "html", ".md": "markdown"}
-_PARTS: Final = 1000
-"""Parts of one profile's circle test that progress counts."""
 
 
 def report_command(
@@ -86,7 +86,7 @@ def report_command(
     chosen = form_of_file(format_, output, forms=_SUFFIXES, default="html")
     if title is not None and (not title.isprintable() or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
-    plans = _loaded(profiles, period)
+    plans = load_each(profiles, partial(_plan, period=period))
     if output is None:
         emit_text(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))
         return
@@ -96,25 +96,15 @@ def report_command(
     say(f"wrote {output}")
 
 
-def _loaded(arguments: "Sequence[str]", period: str | None) -> "list[Profile]":
-    """Read every profile; what is wrong with any of them is said of all."""
-    if arguments.count("-") > 1:
-        raise BusplanError("PROFILE -: standard input can be read once")
+def _plan(argument: str, *, period: str | None) -> "Profile":
     from busplan.profile.shipped import load
     from busplan.profile.toml import override
 
-    changes: dict[str, object] = {} if period is None else {"cycle.period_us": time_us(period, option="--period")}
-    plans: list[Profile] = []
-    problems: list[str] = []
-    for argument in arguments:
-        try:
-            plan = load(argument).profile
-            plans.append(override(plan, changes, origin={"cycle.period_us": f"--period {period}, in us"}))
-        except BusplanError as error:
-            problems += error.problems
-    if problems:
-        raise BusplanError(*dict.fromkeys(problems))
-    return plans
+    plan = load(argument).profile
+    if period is None:
+        return plan
+    asked_us = time_us(period, option="--period")
+    return override(plan, {"cycle.period_us": asked_us}, origin={"cycle.period_us": f"--period {period}, in us"})
 
 
 def _page(
@@ -126,11 +116,8 @@ def _page(
     subjects = []
     with progress_bar("circle tests") as progress:
         for number, (argument, plan) in enumerate(zip(arguments, plans, strict=True)):
-
-            def report(done: int, total: int, *, before: int = number * _PARTS) -> None:
-                progress(before + done * _PARTS // total, len(plans) * _PARTS)
-
-            answer = overview(plan, with_circle=circle, progress=report)
+            own = part_of(progress, number=number, of=len(plans))
+            answer = overview(plan, with_circle=circle, progress=own)
             subjects.append(Subject(argument, answer, other_period=period is not None))
     return page(subjects, title=title)
 
