@@ -275,6 +275,41 @@ def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) ->
     assert {(own, "mark paper"), (own, "mark standard")} <= set(marks)
 
 
+def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
+    steps = [node_steps(BASE, model=model) for model in ("paper", "standard")]
+    root = ET.fromstring(axes_chart(BASE, steps))
+    lines = [line for line in root.iter(f"{SVG}line") if line.get("class") == "rule" and line.get("x2") == "100%"]
+    figures = [text for text in root.iter(f"{SVG}text") if text.get("x") == "0" and text.get("class") == "small halo"]
+    heights = {
+        int((text.text or "").split()[0]): float(line.get("y1") or "")
+        for line, text in zip(lines, figures, strict=True)
+    }
+    most = max(heights)
+    per_axis = (heights[0] - heights[most]) / most
+    for axes, height in heights.items():
+        assert height == pytest.approx(heights[0] - axes * per_axis, abs=1)
+    (point,) = root.iter(f"{SVG}circle")
+    own_axes = BASE.bus.nodes * BASE.node.axes
+    assert float(point.get("cy") or "") == pytest.approx(heights[0] - own_axes * per_axis, abs=1)
+    marks = {rect.get("class"): svg for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")
+             if (svg.get("x") or "").endswith("%")}  # fmt: skip
+    for one in steps:
+        wanted = heights[0] - one.max_axes(BASE.cycle.period_us) * per_axis
+        assert float(marks[f"mark {one.timing_model}"].get("y") or "") == pytest.approx(wanted, abs=1)
+
+
+def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page() -> None:
+    results = overview(BASE, with_circle=False).capacity.results
+    root = ET.fromstring(terms_chart(results))
+    widths = [float((rect.get("width") or "").rstrip("%")) for rect in root.iter(f"{SVG}rect")]
+    bars = len([1 for one in results for term in TERMS if getattr(one, term.key) > 0])
+    alone = widths[-bars:]
+    longest = max(one.required_us for one in results)
+    shares = [one.required_us / longest * 100 for one in results]
+    first = len([1 for term in TERMS if getattr(results[0], term.key) > 0])
+    assert [sum(alone[:first]), sum(alone[first:])] == pytest.approx(shares, abs=0.01)
+
+
 def test_bars_are_the_terms_and_fill_the_slice() -> None:
     results = simulated().capacity.results
     root = ET.fromstring(terms_chart(results))
