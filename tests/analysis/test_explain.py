@@ -17,8 +17,9 @@ from busplan.analysis.derive_latency import latency_figures
 from busplan.analysis.explain import assumptions, explain, figure_named
 from busplan.analysis.latency import latency
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Traced, written
+from busplan.analysis.trace import Traced
 from busplan.analysis.verdict import verdicts
+from busplan.analysis.writing import written
 from busplan.errors import BusplanError
 from busplan.ieee1394 import CONSTANTS
 from busplan.profile.model import Profile

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan import equations
-from busplan.analysis.trace import Input, Traced, formula_of, inputs, lines, written
+from busplan.analysis.trace import Input, Traced, inputs, lines
+from busplan.analysis.writing import formula_of, written
 from busplan.sourced import EQUATIONS
 
 # As the paper prints them, in this program's symbols; hop is written out as the paper does.

@@ -12,7 +12,8 @@ from busplan.analysis.derive_latency import TracedBus, chosen, traced_bus, trace
 from busplan.analysis.given import traced
 from busplan.analysis.node_limit import RequiredByNodes, most_nodes, required_by_nodes
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Traced, against, short, value_of
+from busplan.analysis.trace import Traced, short, value_of
+from busplan.analysis.writing import against
 from busplan.ieee1394 import (
     MAX_HOPS,
     MAX_NODES,

@@ -7,7 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from busplan.analysis.given import given, traced
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Input, Traced, constant, short, value_of, written
+from busplan.analysis.trace import Input, Traced, constant, short, value_of
+from busplan.analysis.writing import written
 from busplan.ieee1394 import (
     BLOCK_READ_REQUEST_BYTES,
     BLOCK_READ_RESPONSE_OVERHEAD_BYTES,

@@ -13,7 +13,8 @@ from busplan.analysis.derive_latency import latency_figures
 from busplan.analysis.derive_verdict import VERDICT_KEYS, verdict_figure
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.analysis.quantities import FIGURES, Command, Figure
-from busplan.analysis.trace import Input, Traced, inputs, lines, written
+from busplan.analysis.trace import Input, Traced, inputs, lines
+from busplan.analysis.writing import written
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.toml import override

@@ -3,7 +3,8 @@
 import numpy as np
 
 from busplan.analysis.circle_test import CircleFigures
-from busplan.analysis.trace import less, short
+from busplan.analysis.trace import short
+from busplan.analysis.writing import less
 from busplan.servo.circle import CircleRun
 from busplan.servo.contour import contour_error
 

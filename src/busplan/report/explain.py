@@ -6,8 +6,9 @@ from typing import Any, Final
 from busplan.analysis.capacity import capacity
 from busplan.analysis.explain import Derivation, Explanation, Step
 from busplan.analysis.quantities import FIGURES, Command, Figure
-from busplan.analysis.trace import Input, formula_of, short
+from busplan.analysis.trace import Input, short
 from busplan.analysis.verdict import verdicts
+from busplan.analysis.writing import formula_of
 from busplan.ieee1394 import CONSTANTS
 from busplan.report import markdown
 from busplan.report.documents import Document, Row, capacity_document, document
