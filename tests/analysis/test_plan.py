@@ -172,35 +172,3 @@ def test_a_limit_of_the_standard_is_named_where_no_value_helps(make: Make) -> No
 def test_bad_values_are_refused(make: Make) -> None:
     with pytest.raises(BusplanError, match=r"bus\.nodes 0"):
         plan(make(), wanted={"bus.nodes": 0})
-
-
-@settings(max_examples=60, deadline=None)
-@given(data=st.data(), share=st.floats(0.01, 1.0), nodes=st.integers(0, 20), axes=st.integers(0, 60))
-def test_what_is_recommended_passes_its_own_gate(
-    data: st.DataObject, share: float, nodes: int, axes: int, any_profile: st.SearchStrategy[Profile]
-) -> None:
-    keys = {"max_utilisation": share, "min_spare_nodes": nodes, "min_spare_axes": axes}
-    asked: dict[str, object] = {f"limits.{key}": value for key, value in keys.items() if data.draw(st.booleans())}
-    profile = override(data.draw(any_profile), asked)
-    found = plan(profile).recommended
-    if found is None:
-        return
-    spare = found.deciding.max_nodes - found.deciding.nodes
-    assert "limits.max_utilisation" not in asked or found.deciding.utilisation <= share
-    assert "limits.min_spare_nodes" not in asked or spare >= nodes
-    assert "limits.min_spare_axes" not in asked or spare * found.profile.node.axes >= axes
-
-
-def test_limits_cost_no_more_than_they_need() -> None:
-    profile = load("paper-4ms").profile
-    cases: tuple[tuple[dict[str, object], dict[str, object]], ...] = (
-        ({"limits.max_utilisation": 0.11}, {}),
-        ({"limits.max_utilisation": 0.10}, {"bus.gap_count": 7}),
-        ({"limits.min_spare_nodes": 14}, {}),
-        ({"limits.min_spare_axes": 56}, {}),
-    )
-    for limits, changes in cases:
-        found = plan(override(profile, limits)).recommended
-        assert found is not None
-        assert found.changes == changes
-    assert plan(override(profile, {"limits.min_spare_nodes": 15})).recommended is None

@@ -65,13 +65,10 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
     assert "as it is" in proven
 
 
-def test_limits_that_the_plan_keeps_are_said(paper: Profile) -> None:
-    tight = override(paper, {"limits.max_utilisation": 0.4})
-    assert text(tight).startswith("paper-1ms with 2 nodes (8 axes) at 1 ms: set bus.gap_count = 7; then it fits both ")
-    assert "in the tighter one and keeps [limits]." in text(tight)
-    assert "in the tighter one, keeps [limits] and passes the circle." in text(tight, circle=lambda _: ())
-    assert "[limits]" not in text(paper)
-    assert "NO PLAN" in text(override(paper, {"limits.min_spare_nodes": 40}))
+def test_a_gate_that_the_plan_would_not_pass_is_said(paper: Profile) -> None:
+    tight = override(paper, {"limits.max_utilisation": 0.1})
+    assert "limits.max_utilisation allows 10.0%" in text(tight)
+    assert "limits.max_utilisation" not in text(paper)
 
 
 def test_no_line_of_the_table_is_longer_than_a_screen(paper: Profile) -> None:

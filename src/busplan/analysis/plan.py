@@ -6,11 +6,10 @@ Every option is put into the profile and computed again.
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from busplan.analysis.advice import Value, change_for_room, changes_to_fit
+from busplan.analysis.advice import Value, changes_to_fit
 from busplan.analysis.capacity import CapacityFigures, figures
 from busplan.analysis.cycle import broken_limits
 from busplan.analysis.latency import BOTH_MODELS
-from busplan.analysis.room import Room, asked_room
 from busplan.analysis.settings import (
     MAX_CIRCLES,
     Bound,
@@ -55,13 +54,8 @@ class Option(NamedTuple):
 
     @property
     def is_plan(self) -> bool:
-        """Whether both models fit with a safe gap count, [limits] are kept, and the circle passes if it was run."""
-        return self.fits_both and not self.circle_failures and asked_room(self.profile).is_kept(self.deciding)
-
-    @property
-    def fits_both(self) -> bool:
-        """Whether both models fit with a safe gap count."""
-        return self.deciding.fits and self.other.fits and self.deciding.gap_count_safe
+        """Whether both models fit, the gap count is safe, and the circle passes if it was run."""
+        return self.deciding.fits and self.other.fits and self.deciding.gap_count_safe and not self.circle_failures
 
 
 class Impossible(NamedTuple):
@@ -106,8 +100,8 @@ def plan(
 
     The recommended option is the first, in the order of `advice` (nothing, gap count, slice ratio, both, period, period
     and gap count; with them what the standard's own limits demand), after which the goal fits under both timing models
-    with a safe gap count, keeps [limits], and passes the circle test. It changes nothing that was asked for, and never
-    the number of nodes. The other options are found under the timing model that decides.
+    with a safe gap count, and passes the circle test. It changes nothing that was asked for, and never the number of
+    nodes. The other options are found under the timing model that decides.
 
     Parameters
     ----------
@@ -199,11 +193,6 @@ class _Planner:
 
     def recommended(self, *, keep: set[str]) -> Option | None:
         """The cheapest change that makes a plan, of those that leave some keys alone."""
-        found = next((option for option in self.candidates(keep) if option.is_plan), None)
-        return None if found is None else found._replace(recommended=True)
-
-    def candidates(self, keep: set[str]) -> Iterator[Option]:
-        """What fits both models, the cheapest first; each with more room behind it, where [limits] ask for it."""
         for change in changes_to_fit(self.goal, models=BOTH_MODELS):
             changes = dict(change.changes)
             if keep & set(changes):
@@ -222,17 +211,9 @@ class _Planner:
                 changes["cycle.period_us"] = found.period_us
                 bounded_by, proven = found.bounded_by, found.proven
             option = self.option("cheapest that meets both models", changes, bounded_by=bounded_by, proven=proven)
-            yield option
-            room = asked_room(option.profile)
-            if option.fits_both and not room.is_kept(option.deciding):
-                yield from self.with_room(option, room, keep)
-
-    def with_room(self, option: Option, room: Room, keep: set[str]) -> Iterator[Option]:
-        """The option with the room that [limits] ask for, where a change that leaves some keys alone gives it."""
-        nodes = max(room.nodes, option.profile.bus.nodes)
-        more = change_for_room(option.profile, model=self.model, nodes=nodes, utilisation=room.utilisation)
-        if more is not None and not keep & set(more.changes):
-            yield self.option("cheapest that keeps [limits]", {**option.changes, **more.changes}, bounded_by="time")
+            if option.is_plan:
+                return option._replace(recommended=True)
+        return None
 
     def option(self, title: str, changes: Changes, *, bounded_by: Bound | None = None, proven: bool = True) -> Option:
         """Put changes into the goal and compute what they bring."""

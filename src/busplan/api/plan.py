@@ -99,7 +99,7 @@ def plan(
     -------
     PlanAnswer
         The options, and the one to take: the cheapest after which the goal fits under both timing models with a safe
-        gap count, keeps the profile's [limits] and passes the circle. Times are in us.
+        gap count, and passes the circle. Times are in us.
 
     Raises
     ------

@@ -94,10 +94,10 @@ def plan_command(
     the bus and passes the circle, the best gap count for the hops, the largest payload (read and write alike), the
     smallest slice ratio, the most nodes, under the profile's bus.timing_model. Margins are in us.
 
-    One is recommended: the cheapest after which the goal fits under both timing models with a safe gap count, keeps
-    [limits] and passes the circle. Cheapest comes first: nothing, gap count, slice ratio (up to 0.9), both, period,
-    period and gap count. What is given by an option is kept, and so is the number of nodes; a payload, speed or wiring
-    is changed only where the standard's limits demand it. Exits 0 when there is such a plan, 1 when there is none.
+    One is recommended: the cheapest after which the goal fits under both timing models with a safe gap count, and
+    passes the circle. Cheapest comes first: nothing, gap count, slice ratio (up to 0.9), both, period, period and gap
+    count. What is given by an option is kept, and so is the number of nodes; a payload, speed or wiring is changed only
+    where the standard's limits demand it. Exits 0 when there is such a plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
     """

@@ -44,19 +44,17 @@ def goal_words(profile: Profile) -> str:
 
 
 def _headline(plan: Plan, *, with_circle: bool) -> Line:
-    option, kept = plan.recommended, ["keeps [limits]"] if plan.goal.limits.model_fields_set else []
-    kept += ["passes the circle"] if with_circle else []
-    besides = ", ".join(("", *kept[:-1])) + "".join(f" and {one}" for one in kept[-1:])
+    option, circle = plan.recommended, " and passes the circle" if with_circle else ""
     subject = f"{goal_words(plan.goal)} at {period(plan.goal.cycle.period_us)}"
     if option is None:
         why = _why_none(plan)
         return Line(
             f"{subject}: NO PLAN. Of gap count, slice ratio, period, speed and wiring, no change of what is left open "
-            f"fits both timing models with a safe gap count{besides}{why}.",
+            f"fits both timing models with a safe gap count{circle}{why}.",
             "bad",
         )
     spare = min(option.deciding.margin_us, option.other.margin_us)
-    result = f"fits both timing models with {us(spare)} us to spare in the tighter one{besides}"
+    result = f"fits both timing models with {us(spare)} us to spare in the tighter one{circle}"
     if not option.changes:
         return Line(f"{subject}: nothing to change; it {result}.", "good")
     return Line(f"{subject}: set {settings(option.changes)}; then it {result}.", "good")
@@ -70,7 +68,14 @@ def _why_none(plan: Plan) -> str:
 def _warnings(plan: Plan) -> list[str]:
     option = plan.recommended
     profile = plan.goal if option is None else option.profile
-    return warnings(profile, nodes=profile.bus.nodes, most=profile.bus.nodes)
+    found = warnings(profile, nodes=profile.bus.nodes, most=profile.bus.nodes)
+    limit = profile.limits.max_utilisation
+    if option is not None and limit is not None and option.deciding.utilisation > limit:
+        found.append(
+            f"Warning: {option.deciding.utilisation:.1%} of the slice is used, and limits.max_utilisation allows "
+            f"{limit:.1%}: `busplan check` will say so."
+        )
+    return found
 
 
 _SHORT: Final = {
