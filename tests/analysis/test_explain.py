@@ -14,8 +14,9 @@ from busplan.analysis.circle_test import CircleFigures, circle_test
 from busplan.analysis.derive_capacity import capacity_figures
 from busplan.analysis.derive_circle import circle_figures
 from busplan.analysis.derive_latency import latency_figures
+from busplan.analysis.derive_verdict import VERDICT_KEYS
 from busplan.analysis.explain import assumptions, explain, figure_named
-from busplan.analysis.latency import latency
+from busplan.analysis.latency import BOTH_MODELS, latency
 from busplan.analysis.quantities import FIGURES
 from busplan.analysis.trace import Traced
 from busplan.analysis.verdict import verdicts
@@ -69,7 +70,8 @@ def test_every_line_in_numbers_reads_back_as_its_result(
     data: st.DataObject, model: TimingModelName, key: str, any_profile: st.SearchStrategy[Profile]
 ) -> None:
     profile = data.draw(any_profile)
-    for step in explain(profile, f"capacity.{key}", timing_models=[model]).derivations[0].steps:
+    models = None if key in VERDICT_KEYS else [model]
+    for step in explain(profile, f"capacity.{key}", timing_models=models).derivations[0].steps:
         if ARITHMETIC.fullmatch(step.numbers):
             scale = max(map(abs, map(float, re.findall(r"[\d.]+(?:e[-+]?\d+)?", step.numbers))), default=1.0)
             found = eval(step.numbers.replace("^", "**"))
@@ -79,8 +81,8 @@ def test_every_line_in_numbers_reads_back_as_its_result(
 @pytest.mark.parametrize("name", shipped_names())
 def test_every_input_has_a_grade_a_source_and_a_meaning(name: str) -> None:
     profile = load(name).profile
-    for key in ("fits", "text"):
-        for one in explain(profile, key, timing_models=["paper", "standard"]).derivations:
+    for key, models in (("fits", BOTH_MODELS), ("text", None)):
+        for one in explain(profile, key, timing_models=models).derivations:
             assert {given.grade for given in one.inputs} <= GRADES
             assert all(given.source and given.meaning and given.name for given in one.inputs)
 
@@ -139,6 +141,18 @@ def test_grades_rank_from_the_weakest() -> None:
     ranked = [one.grade for one in assumptions(load("paper-4ms").profile)]
     assert ranked == sorted(ranked, key=order.index)
     assert {"recalled", "calibrated", "derived", "measured", "published"} <= set(ranked)
+
+
+def test_an_execution_time_that_nobody_graded_comes_first(make: Make) -> None:
+    first, *others = assumptions(make())
+    assert (first.name, first.grade) == ("node.execution.base_us", "given")
+    assert "given" not in {one.grade for one in others[1:]}
+    assert assumptions(make(node__execution__grade="measured"))[0].grade == "recalled"
+
+
+def test_a_warning_of_cables_rests_on_their_length(make: Make) -> None:
+    names = {one.name for one in explain(make(bus__cable_length_m=10.0), "warnings").derivations[0].inputs}
+    assert {"bus.cable_length_m", "REFERENCE_CABLE_M"} <= names
 
 
 def test_limits_and_tables_are_among_what_a_plan_starts_from(make: Make) -> None:
@@ -226,10 +240,11 @@ def test_periods_models_and_transactions_multiply() -> None:
         ("circle-test.required_us", {"timing_models": ["paper", "standard"]}),
         ("circular_deviation_mm", {"timing_models": ["standard"]}),
         ("required_us", {"transactions": ["read"]}),
+        ("models_agree", {"timing_models": ["standard"]}),
     ],
 )
 def test_what_a_figure_has_no_choice_of_is_refused(name: str, asked: Any) -> None:
-    with pytest.raises(BusplanError, match=r"no other, paper|no figure of latency"):
+    with pytest.raises(BusplanError, match=r"no other, paper|no figure of latency|no one of them"):
         explain(load("paper-4ms").profile, name, **asked)
 
 

@@ -130,6 +130,10 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.load_profile("paper-4ms", changes={1: 2}),  # type: ignore[dict-item]
         "changes 1: expected a dotted key of the profile",
     ),
+    "changes that are none": (
+        lambda: busplan.load_profile("paper-4ms", changes=[1]),  # type: ignore[arg-type]
+        "changes [1]: expected new values by key",
+    ),
     "keys that are none": (lambda: busplan.sweep("paper-4ms", vary={1: [2]}), "vary {1: [2]}: expected keys"),  # type: ignore[dict-item]
     "a window from nowhere": (lambda: busplan.timeline("paper-4ms", from_us=float("nan")), "from_us nan: expected"),
     "a window to no float": (lambda: busplan.timeline("paper-4ms", to_us=10**400), "to_us 1"),

@@ -220,6 +220,15 @@ def test_a_file_that_git_cannot_read_is_not_called_absent(
         load_revision("HEAD:profiles/line.toml")
 
 
+def test_a_tree_that_git_cannot_read_is_no_unknown_revision(
+    repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    damaged(repository, git, "")
+    monkeypatch.chdir(repository)
+    with pytest.raises(BusplanError, match="is in revision HEAD, and git cannot read it here"):
+        load_revision("HEAD:profiles/line.toml")
+
+
 def test_no_program_of_a_repository_is_run_to_fetch_what_is_missing(
     repository: Path, git: Git, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -242,14 +242,15 @@ def _verdict(one: _Test, found: Figures) -> Figures:
             numbers=f"failures: {said}",
             parts=(failures,),
         ),
-        "contributions": Traced(
-            [one._asdict() for one in ranked] if ranked is not None else None,
-            formula="the largest contour error less that of the same circle without the source, in mm, for each source",
-            numbers="; ".join(
+        "contributions": _measured(
+            one,
+            [source._asdict() for source in ranked] if ranked is not None else None,
+            "the largest contour error less that of the same circle without the source, in mm, for each source",
+            "; ".join(
                 f"{source.source}: {short(result.max_contour_error_mm)} - {short(source.max_contour_error_mm)}"
                 for source in ranked or ()
             )
-            or "not run",
-            parts=_simulated(one, found),
+            or "the profile has no source",
+            _simulated(one, found),
         ),
     }

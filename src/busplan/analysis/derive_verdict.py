@@ -4,9 +4,11 @@ from typing import Final
 
 from busplan.analysis.capacity import capacity
 from busplan.analysis.derive_capacity import capacity_figures
+from busplan.analysis.given import traced
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.analysis.trace import Traced, short
 from busplan.analysis.verdict import Verdict, verdicts
+from busplan.ieee1394 import REFERENCE_CABLE_M
 from busplan.profile.model import Profile
 from busplan.timing import TimingModelName
 
@@ -31,8 +33,9 @@ def verdict_figure(profile: Profile, key: str, *, model: TimingModelName) -> Tra
         "text": ("fits", "margin_us", "binding_term", "max_nodes", "gap_count_safe"),
     }[key]
     chosen = tuple(figures[part] for figures in derived.values() for part in parts)
+    cable = (traced(profile, "bus.cable_length_m"), REFERENCE_CABLE_M)
     # The sentences are a reporter's; it puts them in the place of this.
-    return Traced(None, formula="what is derived above, in words", parts=chosen)
+    return Traced(None, formula="what is derived above, in words", parts=(*chosen, *cable))
 
 
 def _change(verdict: Verdict, fits: tuple[Traced, ...]) -> Traced:

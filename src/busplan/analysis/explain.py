@@ -153,6 +153,8 @@ def explain(
     kinds: Sequence[TransactionKind | None] = (transactions or TRANSACTION_KINDS) if command == "latency" else [None]
     if command == "circle-test" and list(models) != [deciding]:
         raise BusplanError(f"{one.key}: a circle test has the timing model that decides and no other, {deciding}")
+    if one.key in VERDICT_KEYS and timing_models is not None:
+        raise BusplanError(f"{one.key}: compares the timing models, so it belongs to no one of them")
     if command != "latency" and transactions is not None:
         raise BusplanError(f"{one.key}: no figure of latency, so it belongs to no one transaction")
     found = []
@@ -177,6 +179,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
     -------
     tuple
         Inputs of the cycle under both timing models, and of the circle; without those that are the planner's to choose.
+        An execution time that nobody has graded is first.
     """
     found: dict[str, Input] = {}
     for model in BOTH_MODELS:
@@ -187,8 +190,9 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
 
         for one in simulated_inputs(profile):
             found.setdefault(one.name, one)
-    known = (one for one in found.values() if one.grade != "given")
-    return tuple(sorted(known, key=lambda one: _GRADES.index(one.grade)))
+    # The execution time is for somebody to know, and nobody says how well: that comes first.
+    known = (one for one in found.values() if one.grade != "given" or one.name.startswith("node.execution."))
+    return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 
 
 def _traced(

@@ -50,6 +50,8 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     >>> busplan.load_profile("paper-4ms", changes={"bus.nodes": 3, "bus.gap_count": "optimal"}).bus.nodes
     3
     """
+    if not isinstance(changes, Mapping | None):
+        raise BusplanError(f'changes {changes!r}: expected new values by key, as {{"bus.nodes": 3}}')
     found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
     return override(found, {_key(key): plain(value) for key, value in (changes or {}).items()})
 

@@ -18,6 +18,7 @@ _FORM: Final = re.compile(r"(?P<revision>(?:\{[^}]*\}|[^:{])+):(?P<path>.+)", re
 """A colon in braces belongs to the revision: main@{10:00}:line.toml."""
 _OBJECT: Final = re.compile(r"(?P<id>[0-9a-f]{40,64}) (?P<kind>\w+) (?P<size>[0-9]+)")
 """How git answers for what is there."""
+_DAMAGED: Final = "git cannot read it here: an object is damaged or was not fetched; git fsck tells"
 _NEVER: Final = ("\0", "\n", "\r")
 """What git takes for the end of a name."""
 _KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_NO_REPLACE")
@@ -86,6 +87,8 @@ def _content(place: _Place) -> bytes:
     tree, _, rest = answer.partition("\n")
     if _OBJECT.fullmatch(tree) is None:
         state = "ambiguous" if tree.endswith(" ambiguous") else "unknown"
+        if state == "unknown" and _is_commit(place):
+            raise BusplanError(f"{place.argument}: is in revision {place.revision}, and {_DAMAGED}")
         raise BusplanError(
             f"{place.argument}: revision {place.revision} is {state} in the git repository of "
             f"{place.folder.resolve()}; expected a commit, branch or tag, as HEAD~1 or main"
@@ -105,10 +108,14 @@ def _require_readable(place: _Place) -> None:
     """Tell a file that the revision does not have from one that it has and git cannot read."""
     listed = _git(place, "ls-tree", "-z", "--end-of-options", f"{place.revision}^{{tree}}", "--", f"./{place.rest}")
     if listed:
-        raise BusplanError(
-            f"{place.argument}: is in revision {place.revision}, and git cannot read it here: the object is damaged or "
-            "was not fetched; git fsck tells"
-        )
+        raise BusplanError(f"{place.argument}: is in revision {place.revision}, and {_DAMAGED}")
+
+
+def _is_commit(place: _Place) -> bool:
+    """Tell a revision whose files git cannot read from none at all."""
+    asked = os.fsencode(f"{place.revision}^{{commit}}\n")
+    answer = _git(place, "cat-file", "--batch-check", names=asked).decode(errors="replace")
+    return _OBJECT.fullmatch(answer.strip()) is not None
 
 
 def _no_file(place: _Place, said: str, *, is_object: bool) -> str:
