@@ -253,7 +253,7 @@ def test_a_bus_that_does_not_fit_needs_no_path(small: Profile, monkeypatch: pyte
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("a path was built")
 
-    monkeypatch.setattr("busplan.analysis.circle_test.circle_path", refuse)
+    monkeypatch.setattr("busplan.analysis.circle_setup.circle_path", refuse)
     huge: dict[str, object] = {"cycle.period_us": 1.0, "servo.step_us": 1.0, "circle.radius_mm": 10_000.0}
     result = only(override(small, huge))
     assert [one.name for one in result.failures] == ["required_us"]

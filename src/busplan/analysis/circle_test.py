@@ -7,7 +7,7 @@ stability: a host loop's delay makes the circle better while it eats the margin,
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, figures
+from busplan.analysis.capacity import CapacityFigures
 from busplan.analysis.circle_failures import (
     CONTOUR_MEASURES,
     LEAST_ARC_DEG,
@@ -16,12 +16,13 @@ from busplan.analysis.circle_failures import (
     circle_failures,
     tightest_margins,
 )
+from busplan.analysis.circle_setup import bus, loop_timing, setup
 from busplan.analysis.contributions import Contribution, Setup, contributions, sources
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
-from busplan.servo.circle import CircleRun, check_circle, simulate_circle
-from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import circle_path, circle_setpoints
+from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.parameters import LoopTiming
+from busplan.servo.path import circle_setpoints
 from busplan.timing import TimingModelName
 
 Progress = Callable[[int, int], None]
@@ -170,57 +171,6 @@ def circle_test(
         for variant, one in zip(variants, setups, strict=True)
     ]
     return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
-
-
-def bus(profile: Profile) -> CapacityFigures:
-    """Capacity under the timing model that decides."""
-    return figures(profile, model=profile.bus.timing_model)
-
-
-def setup(profile: Profile) -> Setup:
-    """What a profile's circle test simulates.
-
-    Raises
-    ------
-    BusplanError
-        As `circle_test`.
-    """
-    circle, servo, delivery, mechanics = profile.circle, profile.servo, profile.delivery, profile.mechanics
-    one = Setup(
-        path=circle_path(
-            circle.radius_mm,
-            feed_mm_per_min=circle.feed_mm_per_min,
-            period_us=profile.cycle.period_us,
-            ramp_periods=circle.ramp_periods,
-            direction=circle.direction,
-        ),
-        x=Axis(**servo.axis_keys("x")),
-        y=Axis(**servo.axis_keys("y")),
-        timing=loop_timing(profile),
-        delivery=Delivery(**delivery.model_dump()),
-        mechanics=Mechanics(**mechanics.model_dump()),
-    )
-    check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
-    return one
-
-
-def loop_timing(profile: Profile) -> LoopTiming:
-    """Where a profile closes its loops, and how often.
-
-    Raises
-    ------
-    BusplanError
-        The period is no multiple of the step.
-    """
-    period_us, servo = profile.cycle.period_us, profile.servo
-    return LoopTiming(
-        period_us=period_us,
-        step_us=servo.step_us,
-        loop=servo.loop,
-        interpolation=servo.interpolation,
-        # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
-        delay_us=min(bus(profile).required_us, period_us) if servo.loop == "host" else 0.0,
-    )
 
 
 class _Counter:

@@ -6,7 +6,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from busplan.analysis.capacity import figures
-from busplan.analysis.circle_test import bus, circle_test, loop_timing, setup
+from busplan.analysis.circle_setup import bus, loop_timing, setup
+from busplan.analysis.circle_test import circle_test
 from busplan.analysis.grid import Grid
 from busplan.analysis.sweep import FIGURES, Block, Column
 from busplan.errors import BusplanError
