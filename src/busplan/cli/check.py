@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from busplan.cli.options import complete_profile
+from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, emit_text, say, write_file
 from busplan.errors import BusplanError
 
@@ -39,15 +39,7 @@ def check_command(
             help="Form of the report; github, gitlab, junit and sarif are for the build service.",
         ),
     ] = "text",
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write the report to FILE; an old file is replaced.  [default: standard output]",
-        ),
-    ] = None,
+    output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
     fail_on: Annotated[
         Literal["error", "warning"], typer.Option("--fail-on", help="Least severity that fails the check.")
     ] = "error",

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from busplan.cli.options import form_of_file
+from busplan.cli.options import form_of_file, output_option
 from busplan.cli.output import emit_text, say, write_file
 
 
@@ -19,15 +19,7 @@ def manual_command(
             "[default: what the name of --output says, else markdown]",
         ),
     ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write it to FILE: .1 (man) or .md (Markdown); an old file is replaced.  [default: standard output]",
-        ),
-    ] = None,
+    output: Annotated[Path | None, output_option("Write it to FILE: .1 (man) or .md (Markdown)")] = None,
 ) -> None:
     """Write the whole manual: every command with its arguments, options and example, exit codes, variables and files.
 

@@ -3,7 +3,7 @@
 import re
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
 import typer
 
@@ -166,6 +166,18 @@ def plot_format(path: Path) -> str:
         raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
     require_matplotlib()
     return file_format
+
+
+def output_option(words: str) -> Any:
+    """Make the option that sends a document to a file.
+
+    Parameters
+    ----------
+    words
+        What is written where, without the full stop.
+    """
+    help_ = f"{words}; an old file is replaced.  [default: standard output]"
+    return typer.Option("--output", "-o", metavar="FILE", help=help_, show_default=False)
 
 
 def form_of_file(given: Form | None, output: Path | None, *, forms: "Mapping[str, Form]", default: Form) -> Form:

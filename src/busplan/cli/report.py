@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.options import complete_profile, form_of_file, time_us
+from busplan.cli.options import complete_profile, form_of_file, output_option, time_us
 from busplan.cli.output import emit_text, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
@@ -33,16 +33,7 @@ def report_command(
             show_default=False,
         ),
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write the page to FILE: .html or .md (Markdown).  [default: standard output]",
-            show_default=False,
-        ),
-    ] = None,
+    output: Annotated[Path | None, output_option("Write the page to FILE: .html or .md (Markdown)")] = None,
     format_: Annotated[
         ReportFormat | None,
         typer.Option(

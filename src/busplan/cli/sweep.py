@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.options import ProfileArgument, TimingOption, plot_format, timing_models
+from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -43,13 +43,7 @@ def sweep_command(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="Write the document to FILE.csv, .json, .jsonl or .npz, or as a table to any other name; an old "
-            "file is replaced.  [default: standard output]",
-        ),
+        output_option("Write the document to FILE.csv, .json, .jsonl or .npz, or as a table to any other name"),
     ] = None,
     columns: Annotated[
         str | None,

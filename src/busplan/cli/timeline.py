@@ -14,6 +14,7 @@ from busplan.cli.options import (
     ProfileArgument,
     bus_changes,
     form_of_file,
+    output_option,
     periods_us,
     time_us,
 )
@@ -100,15 +101,7 @@ def timeline_command(
         ),
     ] = None,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FILE",
-            help="Write it to FILE.svg, .png, .mmd (mermaid), .json, .csv or .txt; an old file is replaced.  "
-            "[default: standard output]",
-            show_default=False,
-        ),
+        Path | None, output_option("Write it to FILE.svg, .png, .mmd (mermaid), .json, .csv or .txt")
     ] = None,
 ) -> None:
     """Show one communication cycle as events, node by node and to scale.
