@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
+from busplan.analysis.explain import figure_named
+
 Run = Callable[..., Any]
 Refused = Callable[..., str]
 
@@ -55,6 +57,31 @@ def test_every_key_of_a_commands_json_is_explained_with_its_value(run: Run, comm
         if key not in ("text", "warnings", "cheapest_change"):
             assert value == row[key], key
             assert said["derivations"][0]["steps"] == [] or said["derivations"][0]["steps"][-1]["value"] == row[key]
+
+
+def keys_inside(value: Any) -> set[str]:
+    """Every key of a document, however deep; what a change sets has keys of a profile."""
+    if isinstance(value, list):
+        return set().union(*map(keys_inside, value))
+    if isinstance(value, dict):
+        return set(value).union(*(keys_inside(one) for key, one in value.items() if key != "changes"))
+    return set()
+
+
+def test_keys_inside_a_figure_mean_the_figure(run: Run, tmp_path: Path) -> None:
+    strict = (Path(__file__).resolve().parents[2] / "profiles" / "paper-1ms.toml").read_text(encoding="utf-8")
+    (tmp_path / "strict.toml").write_text(
+        strict.replace("max_contour_error_mm = 0.025", "max_contour_error_mm = 0.001")
+    )
+    found = keys_inside(json.loads(run("capacity", "paper-1ms", "--format", "json").stdout))
+    found |= keys_inside(json.loads(run("latency", "paper-1ms", "--format", "json").stdout))
+    circle = run("circle-test", "strict.toml", "--contributions", "--format", "json", cwd=tmp_path)
+    found |= keys_inside(json.loads(circle.stdout))
+    frame = {"schema", "command", "profile", "results", "transactions", "verdicts"}
+    for key in found - frame:
+        figure_named(key)
+    assert figure_named("circle-test.removed_mm")[1].key == "contributions"
+    assert figure_named("changes")[1].key == "cheapest_change"
 
 
 def test_options_multiply_as_in_the_commands(run: Run) -> None:

@@ -12,7 +12,7 @@ from busplan.analysis.derive_capacity import capacity_figures
 from busplan.analysis.derive_latency import latency_figures
 from busplan.analysis.derive_verdict import VERDICT_KEYS, verdict_figure
 from busplan.analysis.latency import BOTH_MODELS
-from busplan.analysis.quantities import FIGURES, Command, Figure
+from busplan.analysis.quantities import FIGURES, HOLDERS, Command, Figure
 from busplan.analysis.trace import Input, Traced, inputs, lines
 from busplan.analysis.writing import written
 from busplan.errors import BusplanError
@@ -89,7 +89,8 @@ def figure_named(name: str) -> tuple[Command, Figure]:
     Parameters
     ----------
     name
-        A key, as "required_us", or one with its command before it, as "circle-test.required_us".
+        A key, as "required_us", or one with its command before it, as "circle-test.required_us". A key inside a figure,
+        as "removed_mm", means that figure.
 
     Raises
     ------
@@ -105,6 +106,10 @@ def figure_named(name: str) -> tuple[Command, Figure]:
         key = name.removeprefix(f"{command}.")
         if key in figures and name in (key, f"{command}.{key}"):
             return command, figures[key]
+    before, _, inner = name.rpartition(".")
+    held = HOLDERS.get(inner)
+    if held is not None and before in ("", held[0]):
+        return held[0], FIGURES[held[0]][held[1]]
     known = [key for figures in FIGURES.values() for key in figures]
     close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
     hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""

@@ -197,3 +197,12 @@ FIGURES: Final[Mapping[Command, Mapping[str, Figure]]] = MappingProxyType(
     }
 )
 """Figures by command and key. A key that several commands give is the first one's, where no command is named."""
+
+HOLDERS: Final[Mapping[str, tuple[Command, str]]] = MappingProxyType(
+    {
+        "changes": ("capacity", "cheapest_change"),
+        **dict.fromkeys(("name", "value", "limit"), ("circle-test", "failures")),
+        **dict.fromkeys(("source", "removed_mm"), ("circle-test", "contributions")),
+    }
+)
+"""Keys that stand inside a figure, by that figure: they are derived with it."""
