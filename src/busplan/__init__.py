@@ -39,7 +39,7 @@ __all__ = [
 if TYPE_CHECKING:
     from busplan.api.capacity import CapacityAnswer, capacity
     from busplan.api.check import CheckAnswer, check
-    from busplan.api.circle_test import CircleTestAnswer, circle_test
+    from busplan.api.circle import CircleTestAnswer, circle_test
     from busplan.api.inputs import load_profile
     from busplan.api.latency import LatencyAnswer, latency
     from busplan.api.plan import PlanAnswer, plan
@@ -58,8 +58,8 @@ else:
         "capacity": "busplan.api.capacity",
         "CheckAnswer": "busplan.api.check",
         "check": "busplan.api.check",
-        "CircleTestAnswer": "busplan.api.circle_test",
-        "circle_test": "busplan.api.circle_test",
+        "CircleTestAnswer": "busplan.api.circle",
+        "circle_test": "busplan.api.circle",
         "LatencyAnswer": "busplan.api.latency",
         "latency": "busplan.api.latency",
         "PlanAnswer": "busplan.api.plan",

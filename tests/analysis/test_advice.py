@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.advice import MAX_ADVISED_RATIO, Change, change_for_more, change_to_fit
-from busplan.analysis.capacity import capacity, figures
-from busplan.analysis.verdict import verdicts
-from busplan.ieee1394 import safe_gap_count
+from busplan.analysis.capacity.figures import capacity, figures
+from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.planning.cures import MAX_ADVISED_RATIO, Change, change_for_more, change_to_fit
+from busplan.buses.ieee1394.constants import safe_gap_count
+from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.timing import TIMING_MODELS, TimingModelName
 
 Make = Callable[..., Profile]
 BOTH: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)

@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import theilslopes
 
-from busplan.analysis.calibration import Calibration, calibrate
+from busplan.analysis.calibration.calibrate import Calibration, calibrate
 from busplan.analysis.latency import phases
+from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TimingModelName
 from busplan.errors import BusplanError
 from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.measurements import Measurement, parse_measurements
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, locate_measurements
-from busplan.timing import TRANSACTION_KINDS, TimingModelName
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import CapacityFigures, capacity, figures
-from busplan.analysis.cycle import cycle, fits_in
-from busplan.analysis.node_limit import largest_nodes
+from busplan.analysis.capacity.cycle import cycle, fits_in
+from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures
+from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
 from busplan.profile.model import Profile
-from busplan.timing import TIMING_MODELS, TimingModelName
 
 Make = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]

@@ -5,9 +5,9 @@ from math import cos
 
 import pytest
 
-from busplan.analysis.capacity import figures
-from busplan.analysis.circle_test import CircleFigures, circle_test, to_attack
-from busplan.analysis.contour_profile import contour_profile
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.circle.contour_profile import contour_profile
+from busplan.analysis.circle.roundness import CircleFigures, circle_test, to_attack
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
@@ -253,7 +253,7 @@ def test_a_bus_that_does_not_fit_needs_no_path(small: Profile, monkeypatch: pyte
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("a path was built")
 
-    monkeypatch.setattr("busplan.analysis.circle_setup.circle_path", refuse)
+    monkeypatch.setattr("busplan.analysis.circle.setup.circle_path", refuse)
     huge: dict[str, object] = {"cycle.period_us": 1.0, "servo.step_us": 1.0, "circle.radius_mm": 10_000.0}
     result = only(override(small, huge))
     assert [one.name for one in result.failures] == ["required_us"]
@@ -274,7 +274,7 @@ def test_all_periods_are_checked_before_the_first_is_simulated(
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("simulated before all was checked")
 
-    monkeypatch.setattr("busplan.analysis.circle_test.simulate_circle", refuse)
+    monkeypatch.setattr("busplan.analysis.circle.roundness.simulate_circle", refuse)
     with pytest.raises(BusplanError, match=message):
         circle_test(override(small, changes), periods_us=[4000.0, 2000.0])
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.circle_test import CircleFigures, circle_test
-from busplan.analysis.difference import CIRCLE, CYCLE, PLAN, Difference, Figure, difference
+from busplan.analysis.circle.roundness import CircleFigures, circle_test
+from busplan.analysis.comparison.difference import CIRCLE, CYCLE, PLAN, Difference, Figure, difference
 from busplan.errors import BusplanError
 from busplan.profile.keys import dotted_keys
 from busplan.profile.model import Profile

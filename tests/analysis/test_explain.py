@@ -9,25 +9,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import CapacityFigures, capacity, figures
-from busplan.analysis.circle_test import CircleFigures, circle_test
-from busplan.analysis.derive_capacity import capacity_figures
-from busplan.analysis.derive_circle import circle_figures
-from busplan.analysis.derive_latency import latency_figures
-from busplan.analysis.derive_verdict import VERDICT_KEYS
-from busplan.analysis.explain import assumptions, explain, figure_named
+from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures
+from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.circle.roundness import CircleFigures, circle_test
+from busplan.analysis.derivation.capacity import capacity_figures
+from busplan.analysis.derivation.circle import circle_figures
+from busplan.analysis.derivation.explain import assumptions, explain, figure_named
+from busplan.analysis.derivation.formulas import written
+from busplan.analysis.derivation.latency import latency_figures
+from busplan.analysis.derivation.trace import Traced
+from busplan.analysis.derivation.verdict import VERDICT_KEYS
 from busplan.analysis.latency import BOTH_MODELS, latency
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.trace import Traced
-from busplan.analysis.verdict import verdicts
-from busplan.analysis.writing import written
+from busplan.buses.ieee1394.constants import CONSTANTS
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.ieee1394 import CONSTANTS
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.report.documents import capacity_document, latency_rows
-from busplan.timing import TimingModelName
 
 MODELS = st.sampled_from(["paper", "standard"])
 Make = Callable[..., Profile]

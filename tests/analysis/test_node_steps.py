@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import figures
-from busplan.analysis.node_steps import node_steps
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.capacity.node_steps import node_steps
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.timing import TimingModelName
 
 BASE = load("paper-4ms").profile
 MODELS = st.sampled_from(["paper", "standard"])

@@ -2,7 +2,7 @@
 
 import pytest
 
-from busplan.analysis.circle_test import circle_test
+from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, Comparison, paper_sections, published
 from busplan.profile.shipped import load
 

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.advice import MAX_ADVISED_RATIO
-from busplan.analysis.capacity import figures
-from busplan.analysis.cycle import broken_limits
-from busplan.analysis.plan import plan
+from busplan.analysis.capacity.cycle import broken_limits
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.planning.cures import MAX_ADVISED_RATIO
+from busplan.analysis.planning.options import plan
+from busplan.buses.ieee1394.timing import TIMING_MODELS
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.timing import TIMING_MODELS
 
 Make = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import figures
+from busplan.analysis.capacity.figures import figures
 from busplan.analysis.latency import BOTH_MODELS, phases
-from busplan.analysis.schedule import MOST_NODES, schedule, totals, zoom
+from busplan.analysis.timeline.schedule import MOST_NODES, schedule, totals, zoom
+from busplan.buses.ieee1394.timing import TRANSACTION_KINDS
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
-from busplan.timing import TRANSACTION_KINDS
 
 Maker = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity import CapacityFigures, figures
-from busplan.analysis.cycle import cycle
-from busplan.analysis.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
-from busplan.analysis.sweep import sweep
+from busplan.analysis.capacity.cycle import cycle
+from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.sweep.blocks import sweep
+from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
-from busplan.timing import TimingModelName
 
 Make = Callable[..., Profile]
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan import equations
-from busplan.analysis.trace import Input, Traced, inputs, lines
-from busplan.analysis.writing import formula_of, written
+from busplan.analysis.derivation.formulas import formula_of, written
+from busplan.analysis.derivation.trace import Input, Traced, inputs, lines
+from busplan.buses.ieee1394 import equations
 from busplan.sourced import EQUATIONS
 
 # As the paper prints them, in this program's symbols; hop is written out as the paper does.

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from busplan.analysis.values import listed
+from busplan.analysis.sweep.axis_values import listed
 from busplan.errors import BusplanError
 
 

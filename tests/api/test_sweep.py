@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import busplan
-from busplan.analysis.sweep import FIGURES
+from busplan.analysis.sweep.blocks import FIGURES
 from busplan.api.sweep import MOST_POINTS
 
 GRID: Mapping[str, Any] = {

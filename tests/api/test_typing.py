@@ -5,9 +5,9 @@ from typing import Any, assert_type
 from numpy.typing import NDArray
 
 import busplan
-from busplan.analysis.capacity import CapacityFigures
-from busplan.analysis.cycle import Term
-from busplan.analysis.plan import Option
+from busplan.analysis.capacity.cycle import Term
+from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.analysis.planning.options import Option
 from busplan.rules.report import Located
 
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from busplan.analysis.capacity import figures
-from busplan.analysis.grid import Chunk, Grid, Steps, checked_grid
-from busplan.analysis.sweep import CHUNK_POINTS, sweep
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
+from busplan.analysis.sweep.grid import Chunk, Grid, Steps, checked_grid
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
 

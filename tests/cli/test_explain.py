@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
-from busplan.analysis.explain import figure_named
+from busplan.analysis.derivation.explain import figure_named
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from busplan.analysis.grid import Listed
+from busplan.analysis.sweep.grid import Listed
 from busplan.cli.vary import parse_axes
 from busplan.errors import BusplanError
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan import equations as eq
+from busplan.buses.ieee1394 import equations as eq
 
 PAPER_CLOCK = 393.216
 BASE_CLOCK = 98.304

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan import ieee1394
+from busplan.buses.ieee1394 import constants as ieee1394
 from busplan.sourced import Sourced
 
 

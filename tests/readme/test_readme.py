@@ -13,16 +13,16 @@ import pytest
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from busplan.analysis.capacity import CapacityFigures, capacity
-from busplan.analysis.circle_test import CircleFigures
+from busplan.analysis.capacity.figures import CapacityFigures, capacity
+from busplan.analysis.circle.roundness import CircleFigures
+from busplan.analysis.derivation.trace import short
 from busplan.analysis.latency import latency
-from busplan.analysis.trace import short
-from busplan.profile.machine import AxisOverride
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.report.documents import capacity_rows, latency_rows
 from busplan.report.explain import constant_rows, equation_rows
 from busplan.report.markdown import code, table
+from busplan.sections.machine import AxisOverride
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -1,6 +1,6 @@
 """What `busplan calibrate` says."""
 
-from busplan.analysis.calibration import Calibration, calibrate
+from busplan.analysis.calibration.calibrate import Calibration, calibrate
 from busplan.profile.measurements import Measurement, parse_measurements
 from busplan.profile.shipped import load, locate_measurements
 from busplan.report.calibration import calibration_lines, calibration_warnings, execution_changes, provenance

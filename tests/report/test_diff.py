@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from busplan.analysis.circle_test import CircleFigures, circle_test
-from busplan.analysis.difference import CYCLE, PLAN, Difference, difference
+from busplan.analysis.circle.roundness import CircleFigures, circle_test
+from busplan.analysis.comparison.difference import CYCLE, PLAN, Difference, difference
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load

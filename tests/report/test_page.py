@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from busplan.analysis.contour_profile import ContourProfile
-from busplan.analysis.node_steps import node_steps
+from busplan.analysis.capacity.node_steps import node_steps
+from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.analysis.overview import Overview, overview
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load

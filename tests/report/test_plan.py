@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from busplan.analysis.plan import plan
+from busplan.analysis.planning.options import plan
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override

@@ -7,9 +7,9 @@ import math
 
 import pytest
 
-from busplan.analysis.capacity import capacity
+from busplan.analysis.capacity.figures import capacity
+from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.latency import latency
-from busplan.analysis.verdict import verdicts
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.schedule import Schedule, schedule, totals, zoom
+from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.scale import ticks

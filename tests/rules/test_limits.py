@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from busplan.ieee1394 import safe_gap_count
+from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.profile.shipped import locate
 from busplan.profile.toml import decode
 from busplan.rules.gate import check_document

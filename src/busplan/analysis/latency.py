@@ -3,10 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from busplan.errors import BusplanError
-from busplan.profile.bus import TableExecution
-from busplan.profile.model import Profile
-from busplan.timing import (
+from busplan.buses.ieee1394.timing import (
     TIMING_MODELS,
     TRANSACTION_KINDS,
     Phases,
@@ -14,6 +11,9 @@ from busplan.timing import (
     TransactionKind,
     transaction,
 )
+from busplan.errors import BusplanError
+from busplan.profile.bus import TableExecution
+from busplan.profile.model import Profile
 
 BOTH_MODELS: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)
 

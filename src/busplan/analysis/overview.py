@@ -2,18 +2,18 @@
 
 from typing import Final, NamedTuple
 
-from busplan.analysis.capacity import Capacity, capacity
-from busplan.analysis.circle_test import CircleFigures, CircleTest, Progress, circle_test
-from busplan.analysis.contour_profile import ContourProfile, contour_profile
-from busplan.analysis.explain import assumptions
+from busplan.analysis.capacity.figures import Capacity, capacity
+from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
+from busplan.analysis.capacity.verdict import Verdict, verdicts
+from busplan.analysis.circle.contour_profile import ContourProfile, contour_profile
+from busplan.analysis.circle.roundness import CircleFigures, CircleTest, Progress, circle_test
+from busplan.analysis.derivation.explain import assumptions
+from busplan.analysis.derivation.trace import Input
 from busplan.analysis.latency import BOTH_MODELS, LatencyResult, latency
-from busplan.analysis.node_steps import NodeSteps, node_steps
-from busplan.analysis.schedule import Schedule, schedule
-from busplan.analysis.trace import Input
-from busplan.analysis.verdict import Verdict, verdicts
+from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
-from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
 CONTOUR_SECTORS: Final = 720
 """Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""

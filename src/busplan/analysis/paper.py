@@ -6,10 +6,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
-from busplan import equations
-from busplan.analysis.circle_test import CircleFigures
+from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.latency import BOTH_MODELS, phases
-from busplan.ieee1394 import (
+from busplan.buses.ieee1394 import equations
+from busplan.buses.ieee1394.constants import (
     ARBITRATION_GAP_TICKS,
     ARBITRATION_HOLD_US,
     BITS_PER_BYTE,
@@ -17,8 +17,8 @@ from busplan.ieee1394 import (
     DATA_RATE_MBIT_S,
     REFERENCE_CABLE_M,
 )
+from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases
 from busplan.profile.model import Profile
-from busplan.timing import TIMING_MODELS, Phases
 
 Unit = Literal["us", "1", "s", "mm"]
 

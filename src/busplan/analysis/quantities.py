@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple
 
-from busplan import equations as eq
+from busplan.buses.ieee1394 import equations as eq
 from busplan.sourced import EQUATIONS
 
 Command = Literal["latency", "capacity", "circle-test"]

@@ -3,18 +3,18 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from busplan.analysis import capacity as analysis
-from busplan.analysis.capacity import Capacity, CapacityFigures
+from busplan.analysis.capacity import figures as analysis
+from busplan.analysis.capacity.figures import Capacity, CapacityFigures
+from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.latency import BOTH_MODELS
-from busplan.analysis.verdict import Verdict, verdicts
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.profile.model import Profile
 from busplan.report import documents
 from busplan.report.capacity import capacity_lines
 from busplan.report.lines import Line
 from busplan.report.text import to_json
-from busplan.timing import TimingModelName
 
 
 @dataclass(frozen=True, slots=True, repr=False)

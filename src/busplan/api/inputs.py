@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from busplan.analysis.latency import BOTH_MODELS
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
-from busplan.profile.sections import MAX_COUNT
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.timing import TimingModelName
+from busplan.sections.base import MAX_COUNT
 
 Path = str | os.PathLike[str]
 """A text may also be the name of a shipped profile; a path object is always a path."""

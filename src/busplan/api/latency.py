@@ -7,12 +7,12 @@ from busplan.analysis import latency as analysis
 from busplan.analysis.latency import BOTH_MODELS, Transaction
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.profile.model import Profile
 from busplan.report import documents
 from busplan.report.latency import latency_lines
 from busplan.report.lines import Line, plural
 from busplan.report.text import to_json
-from busplan.timing import TimingModelName
 
 
 @dataclass(frozen=True, slots=True, repr=False)

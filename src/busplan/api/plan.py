@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from busplan.analysis import plan as analysis
-from busplan.analysis.advice import Value
-from busplan.analysis.plan import Impossible, Option, Plan
-from busplan.analysis.settings import MAX_CIRCLES
+from busplan.analysis.planning import options as analysis
+from busplan.analysis.planning.best_values import MAX_CIRCLES
+from busplan.analysis.planning.cures import Value
+from busplan.analysis.planning.options import Impossible, Option, Plan
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
 from busplan.errors import BusplanError
@@ -130,7 +130,7 @@ def plan(
     tries = whole(max_circles, name="max_circles")
     check = None
     if with_circle:
-        from busplan.analysis.circle_check import CircleCheck
+        from busplan.analysis.circle.check import CircleCheck
 
         check = CircleCheck()
     found = analysis.plan(

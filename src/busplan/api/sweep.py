@@ -6,21 +6,21 @@ from typing import Any, Final
 
 import numpy as np
 
-from busplan.analysis import sweep as analysis
-from busplan.analysis.grid import Array, Grid, Values, checked_grid
 from busplan.analysis.latency import BOTH_MODELS
-from busplan.analysis.sweep import Block, Column
-from busplan.analysis.sweep_circle import MAX_CIRCLES, all_columns, require_circles, run_task, with_circles
-from busplan.analysis.values import listed, parse_values, stepped
+from busplan.analysis.sweep import blocks as analysis
+from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
+from busplan.analysis.sweep.blocks import Block, Column
+from busplan.analysis.sweep.circles import MAX_CIRCLES, all_columns, require_circles, run_task, with_circles
+from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.report.lines import Line
 from busplan.report.sweep.rows import json_footer, json_header, json_rows
 from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
 from busplan.report.text import csv_cell
-from busplan.timing import TimingModelName
 
 MOST_POINTS: Final = 2_000_000
 """Points that are kept in memory: about half a gigabyte. The command line writes any number of them in flat memory."""

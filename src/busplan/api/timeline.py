@@ -3,17 +3,17 @@
 from dataclasses import dataclass
 from typing import Final
 
-from busplan.analysis.capacity import CapacityFigures
-from busplan.analysis.schedule import Event, Schedule, Total, schedule, totals, zoom
+from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule, totals, zoom
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
+from busplan.buses.ieee1394.timing import TimingModelName, TransactionKind
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.report.lines import Line
 from busplan.report.text import to_json
 from busplan.report.timeline.documents import timeline_document
 from busplan.report.timeline.terminal import timeline_lines
-from busplan.timing import TimingModelName, TransactionKind
 
 _COLUMNS: Final = 80
 """Width of the drawing."""

@@ -73,7 +73,7 @@ def calibrate_command(
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
     if apply:
         require_own_file(profile)
-    from busplan.analysis.calibration import calibrate
+    from busplan.analysis.calibration.calibrate import calibrate
     from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
     from busplan.profile.shipped import load, locate_measurements
     from busplan.profile.toml import override, read_bytes

@@ -30,8 +30,8 @@ def capacity_command(
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
-    from busplan.analysis.capacity import capacity
-    from busplan.analysis.verdict import verdicts
+    from busplan.analysis.capacity.figures import capacity
+    from busplan.analysis.capacity.verdict import verdicts
     from busplan.profile.shipped import load
     from busplan.profile.toml import override
 

@@ -15,8 +15,8 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from busplan.analysis.circle_test import CircleFigures, Progress
-    from busplan.analysis.difference import Difference
+    from busplan.analysis.circle.roundness import CircleFigures, Progress
+    from busplan.analysis.comparison.difference import Difference
     from busplan.profile.model import Profile
 
 
@@ -70,7 +70,7 @@ def diff_command(
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
-    from busplan.analysis.difference import difference
+    from busplan.analysis.comparison.difference import difference
     from busplan.profile.revision import load_revision
 
     one, other = load_each((a, b), lambda argument: load_revision(argument).profile)
@@ -101,7 +101,7 @@ def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
     number = count()
 
     def run(plan: "Profile") -> "CircleFigures":
-        from busplan.analysis.circle_test import circle_test
+        from busplan.analysis.circle.roundness import circle_test
 
         return circle_test(plan, explain=False, progress=part_of(progress, number=next(number), of=2)).results[0]
 

@@ -20,9 +20,9 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.analysis.explain import Explanation
+    from busplan.analysis.derivation.explain import Explanation
+    from busplan.buses.ieee1394.timing import TransactionKind
     from busplan.profile.model import Profile
-    from busplan.timing import TransactionKind
 
 ExplainFormat = Literal["text", "json", "markdown"]
 
@@ -82,7 +82,7 @@ def explain_command(
         _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
         _list(plan, format_)
         return
-    from busplan.analysis.explain import explain
+    from busplan.analysis.derivation.explain import explain
     from busplan.cli.progress import progress_bar
 
     with progress_bar("circle test") as progress:
@@ -111,7 +111,7 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
 
 
 def _list(plan: "Profile", format_: ExplainFormat) -> None:
-    from busplan.analysis.explain import assumptions
+    from busplan.analysis.derivation.explain import assumptions
     from busplan.report import explain as report
     from busplan.report import text
 

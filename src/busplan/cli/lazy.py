@@ -29,7 +29,7 @@ COMMANDS: Final = (
     "profiles",
     "init",
 )
-"""In the order of the help. `circle-test` is `circle_test_command` of the module `circle_test`, and so for all."""
+"""In the order of the help. `circle-test` is in `circle`: a module called `circle_test` would be taken for tests."""
 
 
 class LazyCommands(Mapping[str, Any]):
@@ -43,7 +43,7 @@ class LazyCommands(Mapping[str, Any]):
             raise KeyError(name)
         if name not in self._made:
             stem = name.replace("-", "_")
-            module = import_module(f"busplan.cli.{stem}")
+            module = import_module(f"busplan.cli.{stem.removesuffix('_test')}")
             single = typer.Typer(
                 add_completion=False,
                 rich_markup_mode=None,

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, Self
 if TYPE_CHECKING:
     from types import TracebackType
 
-    from busplan.analysis.sweep import Block
+    from busplan.analysis.sweep.blocks import Block
 
 _COPIED_AT_ONCE: Final = 1 << 20
 

@@ -15,7 +15,7 @@ def paper_command(format_: FormatOption = "table") -> None:
 
     Example: busplan paper --format csv
     """
-    from busplan.analysis.circle_test import circle_test
+    from busplan.analysis.circle.roundness import circle_test
     from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
     from busplan.profile.shipped import load
 

@@ -12,8 +12,8 @@ from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.advice import Value
-    from busplan.analysis.plan import Plan
+    from busplan.analysis.planning.cures import Value
+    from busplan.analysis.planning.options import Plan
     from busplan.profile.model import Profile
     from busplan.profile.toml import LoadedProfile
 
@@ -102,7 +102,7 @@ def plan_command(
     Example: busplan plan paper-1ms --axes 16
     """
     _check_options(nodes=nodes, axes=axes, apply=apply, output=output, force=force)
-    from busplan.analysis.plan import plan
+    from busplan.analysis.planning.options import plan
     from busplan.profile.shipped import load, shipped_names
 
     if apply and (profile == "-" or profile in shipped_names()):
@@ -119,7 +119,7 @@ def plan_command(
         with progress_bar("circle tests") as progress:
             check = None
             if with_circle:
-                from busplan.analysis.circle_check import CircleCheck
+                from busplan.analysis.circle.check import CircleCheck
 
                 check = CircleCheck(progress=progress, expected=max_circles)
             result = plan(loaded.profile, wanted=wanted, circle=check, max_circles=max_circles)
@@ -155,7 +155,7 @@ def _wanted(
     profile: "Profile", *, nodes: int | None, axes: int | None, period: str | None, gap_count: str | None
 ) -> "dict[str, Value]":
     """What the options ask for by dotted key, checked."""
-    from busplan.analysis.plan import nodes_for_axes
+    from busplan.analysis.planning.options import nodes_for_axes
     from busplan.profile.toml import override
 
     origin = dict(BUS_OPTIONS)

@@ -9,7 +9,7 @@ from busplan.cli.options import ProfileArgument, TimingOption, output_option, pl
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.grid import Grid
+    from busplan.analysis.sweep.grid import Grid
 
 SweepFormat = Literal["table", "csv", "json", "jsonl", "npz"]
 _ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".npz": "npz"}
@@ -122,7 +122,7 @@ def sweep_command(
 
     axes = parse_axes(vary or [])
     file_format = None if plot is None else plot_format(plot)
-    from busplan.analysis.grid import checked_grid
+    from busplan.analysis.sweep.grid import checked_grid
     from busplan.cli.sweep_run import SweepJob, available_processors, run_sweep
     from busplan.profile.shipped import load
 
@@ -171,8 +171,8 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
 
 def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
     """Refuse a column that is not there or not in numbers, where only a number will do."""
-    from busplan.analysis.sweep import WORD_FIGURES
-    from busplan.analysis.sweep_circle import all_columns
+    from busplan.analysis.sweep.blocks import WORD_FIGURES
+    from busplan.analysis.sweep.circles import all_columns
 
     words = {*WORD_FIGURES, *(key for key, axis in grid.axes.items() if axis.has_words)}
     numbers = [name for name in all_columns(grid, with_circle=circle) if name not in words]
@@ -183,7 +183,7 @@ def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool)
 
 def _columns(asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str) -> tuple[str, ...]:
     """Columns to write: the varied keys and timing_model, then those asked for, or all, or a table's main ones."""
-    from busplan.analysis.sweep_circle import all_columns
+    from busplan.analysis.sweep.circles import all_columns
 
     known = all_columns(grid, with_circle=circle)
     front = (*grid.axes, "timing_model")

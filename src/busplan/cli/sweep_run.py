@@ -12,15 +12,15 @@ from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.grid import Grid
-    from busplan.analysis.sweep import Block
-    from busplan.analysis.sweep_circle import CircleTask, Figures
+    from busplan.analysis.sweep.blocks import Block
+    from busplan.analysis.sweep.circles import CircleTask, Figures
+    from busplan.analysis.sweep.grid import Grid
+    from busplan.buses.ieee1394.timing import TimingModelName
     from busplan.cli.npz import NpzColumns
     from busplan.cli.sweep import SweepFormat
     from busplan.profile.model import Profile
     from busplan.report.sweep.figure import FigureData
     from busplan.report.sweep.top import Tally
-    from busplan.timing import TimingModelName
 
 _CIRCLES_AT_ONCE: Final = 4
 """Points that each process tests between two looks at Ctrl-C."""
@@ -117,7 +117,7 @@ def _drawing(job: SweepJob) -> "FigureData | None":
 
 
 def _require_circles(job: SweepJob) -> None:
-    from busplan.analysis.sweep_circle import MAX_CIRCLES, require_circles
+    from busplan.analysis.sweep.circles import MAX_CIRCLES, require_circles
 
     if job.grid.points > MAX_CIRCLES and not job.force:
         raise BusplanError(
@@ -130,14 +130,14 @@ def _require_circles(job: SweepJob) -> None:
 @contextmanager
 def _blocks(job: SweepJob) -> "Iterator[Iterable[Block]]":
     """Blocks of a size that suits what is done with them."""
-    from busplan.analysis.sweep import CHUNK_POINTS, sweep
+    from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
     from busplan.report.sweep.rows import TEXT_POINTS
 
     if job.jobs is None:
         chunk_points = TEXT_POINTS if job.format_ in {"csv", "jsonl", "json"} else CHUNK_POINTS
         yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=chunk_points)
         return
-    from busplan.analysis.sweep_circle import with_circles
+    from busplan.analysis.sweep.circles import with_circles
 
     few = sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=_CIRCLES_AT_ONCE * job.jobs)
     with _circle_runner(min(job.jobs, job.grid.points)) as run:
@@ -151,7 +151,7 @@ def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iter
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    from busplan.analysis.sweep_circle import run_task
+    from busplan.analysis.sweep.circles import run_task
 
     if jobs == 1:
         yield lambda tasks: map(run_task, tasks)

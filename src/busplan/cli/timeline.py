@@ -22,8 +22,8 @@ from busplan.cli.output import emit, emit_text, say, write_file
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.schedule import Schedule
-    from busplan.timing import TransactionKind
+    from busplan.analysis.timeline.schedule import Schedule
+    from busplan.buses.ieee1394.timing import TransactionKind
 
 TimelineFormat = Literal["table", "json", "csv", "mermaid", "svg", "png"]
 
@@ -118,7 +118,7 @@ def timeline_command(
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
-    from busplan.analysis.schedule import schedule, zoom
+    from busplan.analysis.timeline.schedule import schedule, zoom
     from busplan.profile.shipped import load
     from busplan.profile.toml import override
 

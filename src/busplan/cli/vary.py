@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.grid import Values
+    from busplan.analysis.sweep.grid import Values
 
 
 def parse_axes(texts: list[str]) -> dict[str, "Values"]:
@@ -18,7 +18,7 @@ def parse_axes(texts: list[str]) -> dict[str, "Values"]:
     """
     if not texts:
         raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")
-    from busplan.analysis.values import parse_values
+    from busplan.analysis.sweep.axis_values import parse_values
 
     axes: dict[str, Values] = {}
     for text in texts:

@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
-from busplan.ieee1394 import (
+from busplan.buses.ieee1394.constants import (
     DATA_RATE_MBIT_S,
     MAX_GAP_COUNT,
     MAX_PAYLOAD_BYTES,
@@ -22,8 +22,8 @@ from busplan.ieee1394 import (
     Speed,
     gap_count_by_hops,
 )
-from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US, Bytes, Count, Problem, Section, TimeUs, refused
-from busplan.timing import Link, TimingModelName
+from busplan.buses.ieee1394.timing import Link, TimingModelName
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Bytes, Count, Problem, Section, TimeUs, refused
 
 
 def _known_speed(value: object) -> object:

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from typing import Final, NamedTuple
 
+from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TransactionKind
 from busplan.errors import PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import Lines
-from busplan.profile.sections import MAX_COUNT, MAX_TIME_US
-from busplan.timing import TRANSACTION_KINDS, TransactionKind
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US
 
 MAX_MEASUREMENTS_BYTES: Final = 20_000_000
 """About a million measurements. More is some other file."""

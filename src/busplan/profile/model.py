@@ -10,9 +10,9 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from busplan.profile.bus import Cycle, Ieee1394Bus, Node, Payload, TableExecution
-from busplan.profile.gate import Limits
-from busplan.profile.machine import Circle, Delivery, Mechanics, Servo, Tolerance
-from busplan.profile.sections import Problem, Section, refused
+from busplan.sections.base import Problem, Section, refused
+from busplan.sections.limits import Limits
+from busplan.sections.machine import Circle, Delivery, Mechanics, Servo, Tolerance
 
 SCHEMA_VERSION: Final = 1
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.calibration import OUTLIER_DEVIATIONS, Calibration, PayloadFit
+from busplan.analysis.calibration.calibrate import OUTLIER_DEVIATIONS, Calibration, PayloadFit
 from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.layout import written
 from busplan.report.documents import Document, Row, document

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Final
 
-from busplan.analysis.capacity import Capacity, CapacityFigures
+from busplan.analysis.capacity.figures import Capacity, CapacityFigures
+from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.verdict import Verdict
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, percent, plural, us, yes
 from busplan.report.words import verdict_lines
 

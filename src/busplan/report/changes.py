@@ -6,7 +6,7 @@ from itertools import takewhile
 from operator import eq
 from typing import Any, Final
 
-from busplan.analysis.difference import KeyDifference
+from busplan.analysis.comparison.difference import KeyDifference
 from busplan.profile.keys import KeyValue
 
 CHANGE_HEADINGS: Final = ("key", "A", "B")

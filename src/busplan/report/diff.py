@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.difference import CircleSide, Difference, Figure, Judgement
+from busplan.analysis.comparison.difference import CircleSide, Difference, Figure, Judgement
 from busplan.analysis.latency import BOTH_MODELS
 from busplan.profile.model import Profile
 from busplan.report import markdown

@@ -6,14 +6,14 @@ Keys carry their units and are stable between releases; new ones may be added.
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from busplan.analysis.capacity import Capacity, CapacityFigures
+from busplan.analysis.capacity.figures import Capacity, CapacityFigures
+from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.latency import LatencyResult, Transaction
-from busplan.analysis.verdict import Verdict
 from busplan.profile.model import Profile
 from busplan.report.words import verdict_lines, warnings
 
 if TYPE_CHECKING:
-    from busplan.analysis.circle_test import CircleTest
+    from busplan.analysis.circle.roundness import CircleTest
     from busplan.analysis.paper import PaperSection
 
 JSON_SCHEMA: Final = 1

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from busplan.analysis.capacity import capacity
-from busplan.analysis.explain import Derivation, Explanation, Step
+from busplan.analysis.capacity.figures import capacity
+from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.derivation.explain import Derivation, Explanation, Step
+from busplan.analysis.derivation.formulas import formula_of
+from busplan.analysis.derivation.trace import Input, short
 from busplan.analysis.quantities import FIGURES, Command, Figure
-from busplan.analysis.trace import Input, short
-from busplan.analysis.verdict import verdicts
-from busplan.analysis.writing import formula_of
-from busplan.ieee1394 import CONSTANTS
+from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.report import markdown
 from busplan.report.documents import Document, Row, capacity_document, document
 from busplan.report.lines import BLANK, Line, table

@@ -5,7 +5,7 @@ from typing import Final
 
 from busplan.analysis.latency import LatencyResult, Transaction
 from busplan.analysis.quantities import FIGURES
-from busplan.ieee1394 import MAX_HOPS
+from busplan.buses.ieee1394.constants import MAX_HOPS
 from busplan.profile.model import Profile
 from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
 from busplan.report.words import execution_line, warnings

@@ -2,8 +2,8 @@
 
 from typing import Any, Final
 
-from busplan.analysis.advice import Value
-from busplan.analysis.plan import Option, Plan
+from busplan.analysis.planning.cures import Value
+from busplan.analysis.planning.options import Option, Plan
 from busplan.profile.model import Profile
 from busplan.report.documents import Document, Row, document
 from busplan.report.lines import BLANK, Line, plural, table, us

@@ -11,7 +11,7 @@ import numpy as np
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.circle_test import CircleFigures, CircleTest
+    from busplan.analysis.circle.roundness import CircleFigures, CircleTest
     from busplan.servo.circle import CircleRun
 
 PLOT_FORMATS: Final = ("png", "svg", "pdf")

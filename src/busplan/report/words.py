@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.analysis.capacity import CapacityFigures
-from busplan.analysis.cycle import TERM_KEYS, Limit
-from busplan.analysis.verdict import Verdict
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
+from busplan.analysis.capacity.cycle import TERM_KEYS, Limit
+from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.analysis.capacity.verdict import Verdict
+from busplan.buses.ieee1394.constants import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
 from busplan.profile.bus import Ieee1394Bus
 from busplan.profile.model import Profile
 from busplan.report.lines import Line, plural, us

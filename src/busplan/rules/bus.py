@@ -4,9 +4,16 @@ from collections.abc import Iterator
 from math import ceil
 from typing import Final
 
-from busplan.analysis.advice import Change, change_for_room, change_to_fit
-from busplan.analysis.capacity import CapacityFigures, figures
-from busplan.ieee1394 import MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, QUADLET_BYTES, REFERENCE_CABLE_M, padded_bytes
+from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.planning.cures import Change, change_for_room, change_to_fit
+from busplan.buses.ieee1394.constants import (
+    MAX_HOPS,
+    MAX_NODES,
+    MAX_PAYLOAD_BYTES,
+    QUADLET_BYTES,
+    REFERENCE_CABLE_M,
+    padded_bytes,
+)
 from busplan.profile.toml import override
 from busplan.rules.finding import Problem, Rule, Subject
 

@@ -18,8 +18,8 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
 
     A cycle that does not fit has its own rule, and no circle.
     """
-    from busplan.analysis.circle_failures import CONTOUR_MEASURES
-    from busplan.analysis.circle_test import circle_test, to_attack
+    from busplan.analysis.circle.failures import CONTOUR_MEASURES
+    from busplan.analysis.circle.roundness import circle_test, to_attack
 
     if not subject.profile.asks_for_circle or not subject.deciding.fits:
         return

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Literal, NamedTuple
 
-from busplan.analysis.capacity import CapacityFigures, figures
-from busplan.analysis.cycle import cycle, fits_in
+from busplan.analysis.capacity.cycle import cycle, fits_in
+from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.latency import BOTH_MODELS
+from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.profile.toml import LoadedProfile
-from busplan.timing import TimingModelName
 
 Severity = Literal["error", "warning"]
 

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from busplan.analysis.overview import Overview
 from busplan.analysis.quantities import FIGURES, Figure
-from busplan.ieee1394 import MAX_NODES
+from busplan.buses.ieee1394.constants import MAX_NODES
 from busplan.report.capacity import CAPACITY_ROWS
 from busplan.report.latency import LATENCY_ROWS
 from busplan.report.lines import GridRow, count, percent, plural, us, yes

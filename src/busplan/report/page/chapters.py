@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from busplan import __version__
 from busplan.analysis.overview import Overview
-from busplan.report.circle_test import um
+from busplan.report.circle import um
 from busplan.report.lines import count, percent, plural, us
 from busplan.report.page.bus import axes_part, bus_verdict, fit_word, models_part, plain, terms_part, timeline_part
 from busplan.report.page.circle import circle_part, circle_verdict, sources_part

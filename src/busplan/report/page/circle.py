@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Final
 
-from busplan.analysis.circle_test import CircleFigures
+from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.overview import Overview
-from busplan.report.circle_test import circle_verdict_lines, signed_um, two_decimals, um
+from busplan.report.circle import circle_verdict_lines, signed_um, two_decimals, um
 from busplan.report.lines import GridRow, count, yes
 from busplan.report.page.bus import plain
 from busplan.report.page.charts.bars import signed_bar

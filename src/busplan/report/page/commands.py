@@ -3,8 +3,8 @@
 import os
 import shlex
 
+from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.overview import Overview
-from busplan.analysis.verdict import verdicts
 from busplan.report import documents
 from busplan.report.explain import figure_document
 from busplan.report.page.content import Source

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from busplan.analysis.grid import Grid
-from busplan.analysis.sweep import Block
+from busplan.analysis.sweep.blocks import Block
+from busplan.analysis.sweep.grid import Grid
 from busplan.errors import BusplanError
 from busplan.report.plot import metadata, require_matplotlib
 

@@ -10,8 +10,8 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from busplan.analysis.grid import Array, Grid
-from busplan.analysis.sweep import Block, Column
+from busplan.analysis.sweep.blocks import Block, Column
+from busplan.analysis.sweep.grid import Array, Grid
 from busplan.report.documents import Document, document
 from busplan.report.text import csv_cell
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from busplan.analysis.sweep import Block
+from busplan.analysis.sweep.blocks import Block
 from busplan.report.lines import BLANK, Line, plural, table, us, yes
 
 DEFAULT_COLUMNS: Final = (

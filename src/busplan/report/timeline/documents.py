@@ -1,6 +1,6 @@
 """A timeline as plain data: what `--format json` and `--format csv` write."""
 
-from busplan.analysis.schedule import Schedule, totals
+from busplan.analysis.timeline.schedule import Schedule, totals
 from busplan.report.documents import Document, Row, document
 from busplan.report.timeline.kinds import KINDS
 from busplan.report.words import warnings

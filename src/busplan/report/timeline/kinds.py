@@ -5,8 +5,8 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from busplan.analysis.quantities import FIGURES
-from busplan.analysis.schedule import Event, EventKind
-from busplan.timing import TransactionKind
+from busplan.analysis.timeline.schedule import Event, EventKind
+from busplan.buses.ieee1394.timing import TransactionKind
 
 
 class KindStyle(NamedTuple):

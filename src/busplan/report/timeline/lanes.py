@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from busplan.analysis.schedule import Event, EventKind, Schedule
+from busplan.analysis.timeline.schedule import Event, EventKind, Schedule
+from busplan.buses.ieee1394.timing import TransactionKind
 from busplan.report.lines import plural, us
 from busplan.report.timeline.kinds import event_label, event_title
 from busplan.report.words import period, story
-from busplan.timing import TransactionKind
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events are drawn in a row each; more of them in a row for each node. One node's whole cycle is 20."""

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.analysis.schedule import Event, Schedule
+from busplan.analysis.timeline.schedule import Event, Schedule
 from busplan.report.timeline.kinds import STRIP, event_label
 from busplan.report.timeline.lanes import Stretch, headline, overruns, stretches
 

@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from busplan.analysis.schedule import Event, Schedule, totals
+from busplan.analysis.timeline.schedule import Event, Schedule, totals
 from busplan.report.lines import us
 from busplan.report.timeline.kinds import KINDS, STRIP
 from busplan.report.timeline.lanes import (

@@ -5,7 +5,7 @@ from textwrap import wrap
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.schedule import Event, Schedule, totals
+from busplan.analysis.timeline.schedule import Event, Schedule, totals
 from busplan.report.lines import us
 from busplan.report.svg import LINE, Scale, drawing, inside, markup, text_at
 from busplan.report.timeline.kinds import KINDS, STRIP, event_title

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.schedule import Event, Schedule, totals
+from busplan.analysis.timeline.schedule import Event, Schedule, totals
 from busplan.report.lines import BLANK, Line, table, us
 from busplan.report.scale import ticks
 from busplan.report.timeline.kinds import KINDS, STRIP

@@ -6,12 +6,12 @@ from math import ceil, floor, log10
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.node_steps import NodeSteps
+from busplan.analysis.capacity.node_steps import NodeSteps
 from busplan.profile.model import Profile
-from busplan.profile.sections import MAX_TIME_US
 from busplan.report.lines import plural
 from busplan.report.svg import drawing, markup, text_at
 from busplan.report.words import period
+from busplan.sections.base import MAX_TIME_US
 
 _TOP: Final = 50
 _HEIGHT: Final = 230

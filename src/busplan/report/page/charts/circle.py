@@ -5,7 +5,7 @@ from math import ceil, cos, pi, sin
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.contour_profile import ContourProfile
+from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.report.plot import ERROR_SHARE, nice_step
 from busplan.report.svg import drawing, markup, text_at
 

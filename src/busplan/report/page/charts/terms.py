@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.capacity import CapacityFigures
-from busplan.analysis.schedule import EventKind
+from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.analysis.timeline.schedule import EventKind
 from busplan.report.lines import us
 from busplan.report.svg import LINE, Scale, drawing, markup, text_at
 

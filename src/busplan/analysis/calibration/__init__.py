@@ -1,0 +1,1 @@
+"""From measured latencies to the execution time of a node."""

@@ -1,0 +1,304 @@
+"""From measured latencies to the execution time of a node: the inverse of equation (3)."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from statistics import fmean, median, stdev
+from typing import Final, Literal, NamedTuple
+
+from busplan.analysis.calibration.execution_fit import METHODS, Form, Groups, Method, fit_execution, middles, theil_sen
+from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases, TimingModelName, transaction
+from busplan.errors import BusplanError
+from busplan.profile.bus import LinearExecution, TableExecution
+from busplan.profile.measurements import Measurement
+from busplan.profile.model import Profile
+
+Way = Literal["timing-model", "measured-halves"]
+"""Where the two halves come from that are taken off a latency."""
+
+OUTLIER_DEVIATIONS: Final = 3.5
+"""How many robust standard deviations from the fit make an outlier (Iglewicz and Hoaglin)."""
+OUTLIER_SHARE: Final = 0.01
+"""How far from the fit an outlier lies at least, as a share of its latency: steps of a timer are no outliers."""
+_DEVIATION_PER_MAD: Final = 1.4826
+"""Standard deviation of a normal distribution whose median absolute deviation is 1."""
+_FEWEST_FOR_OUTLIERS: Final = 3
+
+_EXACT_DECIMALS: Final = 6
+"""A picosecond: what is less is rounding of the subtraction, and no residual."""
+
+
+class Residual(NamedTuple):
+    """One measurement beside the fit."""
+
+    line: int
+    transaction: str
+    payload_bytes: int
+    latency_us: float
+    packets_us: float
+    """What was taken off the latency: both halves, (T1+T2) + (T4+T5)."""
+    execution_us: float
+    """T_exec of this measurement."""
+    residual_us: float
+    """T_exec less that of the fit."""
+
+
+class PayloadFit(NamedTuple):
+    """All measurements of one payload, times in us."""
+
+    payload_bytes: int
+    measurements: int
+    latency_us: float
+    """T_lant: the mean, or the median of a robust fit."""
+    packets_us: float
+    execution_us: float
+    """T_exec: the mean, or the median of a robust fit."""
+    deviation_us: float | None
+    """Standard deviation of the repetitions' T_exec; none for a single one."""
+    range_us: float
+    """Largest less smallest T_exec of the repetitions."""
+    fitted_us: float
+    """T_exec of the fit."""
+    residual_us: float
+    """`execution_us` less `fitted_us`."""
+    read_less_write_us: float | None
+    """T_exec of the reads less that of the writes, where there are both: the timing model says 0."""
+    request_and_acknowledge_us: float | None
+    """T1 + T2, measured."""
+    model_request_and_acknowledge_us: float
+    """T1 + T2 of the timing model, (13)."""
+    unexplained_us: float | None
+    """T1 + T2, measured less modelled."""
+
+
+class Calibration(NamedTuple):
+    """Answer of `calibrate`."""
+
+    profile: Profile
+    """The profile as it was on the bench."""
+    timing_model: TimingModelName
+    way: Way
+    method: Method
+    execution: LinearExecution | TableExecution
+    residuals: tuple[Residual, ...]
+    payloads: tuple[PayloadFit, ...]
+    rms_residual_us: float
+    largest: Residual
+    """The measurement that is farthest from the fit."""
+    outliers: tuple[Residual, ...]
+    """Measurements that are farther from the robust fit than the others' spread explains."""
+    robust: bool
+    """Whether the fit is the robust one, on which outliers have no pull."""
+
+
+def calibrate(
+    profile: Profile,
+    measurements: Sequence[Measurement],
+    *,
+    source: str,
+    timing_model: TimingModelName | None = None,
+    form: Form | None = None,
+    robust: bool = False,
+    grade: Literal["measured", "derived"] = "measured",
+) -> Calibration:
+    """Find the execution time of a node from measured latencies.
+
+    What a latency holds beside T_exec is taken off: 2 (T1 + T2) where T1 + T2 was measured with it, otherwise
+    (T1 + T2) + (T4 + T5) of the timing model.
+
+    Parameters
+    ----------
+    profile
+        The network that was measured; the transactions are those of its farthest node.
+    measurements
+        At least one; with T1 + T2 all, or none.
+    source
+        What to call the measurements in messages.
+    timing_model
+        Timing model; without it the one that decides.
+    form
+        Form of the execution time; without it the profile's own. A table holds the mean at each payload, a line is the
+        one of least squares over all measurements.
+    robust
+        The median at each payload instead, and the line of Theil and Sen through these medians: its slope is the
+        median of the slopes between any two payloads, its base the median of what is left. Both have no tuning
+        constant, and stay where they are until about 29 % of the payloads are wrong.
+    grade
+        How the execution time is known.
+
+    Returns
+    -------
+    Calibration
+        The execution time, and how well it explains what was measured.
+
+    Raises
+    ------
+    BusplanError
+        A latency shorter than its packets, a payload over the limit of the speed, a line through one payload or
+        with a negative part.
+
+    References
+    ----------
+    Paper, equations (3), (13) and (14); Table I. P. K. Sen, "Estimates of the regression coefficient based on
+    Kendall's tau", JASA 63 (1968). B. Iglewicz, D. Hoaglin, "How to Detect and Handle Outliers" (1993).
+    """
+    model = timing_model or profile.bus.timing_model
+    halves = _packet_phases(profile, measurements, model)
+    way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
+    raw = [(one, _packets_us(one, halves)) for one in measurements]
+    _require_possible(profile, raw, source=source, way=way, model=model)
+    groups: defaultdict[int, list[float]] = defaultdict(list)
+    for one, packets_us in raw:
+        groups[one.payload_bytes].append(one.latency_us - packets_us)
+    chosen = form or profile.node.execution.kind
+    fit = fit_execution(groups, chosen, robust=robust, grade=grade, source=source)
+    residuals = _residuals(raw, fit)
+    return Calibration(
+        profile=profile,
+        timing_model=model,
+        way=way,
+        method=METHODS[chosen, robust],
+        execution=fit,
+        residuals=residuals,
+        payloads=tuple(_payload_fits(residuals, measurements, halves, fit, robust=robust)),
+        rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
+        largest=max(residuals, key=lambda one: abs(one.residual_us)),
+        outliers=_outliers(residuals, groups, chosen),
+        robust=robust,
+    )
+
+
+_Halves = Mapping[tuple[str, int], Phases]
+
+
+def _packet_phases(profile: Profile, measurements: Sequence[Measurement], model: TimingModelName) -> _Halves:
+    """Phases of every transaction and payload that was measured, without any execution."""
+    bus = profile.bus
+    return {
+        (kind, size): transaction(
+            kind,
+            model=TIMING_MODELS[model],
+            link=bus.link(bus.nodes),
+            payload_bytes=size,
+            overhead_bytes=profile.payload.overhead_bytes,
+            execution_us=0.0,
+        )
+        for kind, size in dict.fromkeys((one.transaction, one.payload_bytes) for one in measurements)
+    }
+
+
+def _packets_us(one: Measurement, halves: _Halves) -> float:
+    """What a latency holds beside T_exec [us]."""
+    if one.request_and_acknowledge_us is not None:
+        return 2 * one.request_and_acknowledge_us
+    return halves[one.transaction, one.payload_bytes].latency_us
+
+
+def _require_possible(
+    profile: Profile, raw: Sequence[tuple[Measurement, float]], *, source: str, way: Way, model: TimingModelName
+) -> None:
+    """Refuse what cannot have been measured on this bus, all of it at once."""
+    limit = profile.bus.max_payload_bytes
+    needed = "twice its T1 + T2 is" if way == "measured-halves" else f"the packets alone take in the {model} model"
+    problems = [
+        f"{source}:{one.line}: payload {one.payload_bytes} bytes is over the {limit} bytes of {profile.bus.speed}"
+        for one, _ in raw
+        if one.payload_bytes > limit
+    ]
+    short = [(one, packets_us) for one, packets_us in raw if one.latency_us < packets_us]
+    problems += [
+        f"{source}:{one.line}: latency {one.latency_us:g} us at {one.payload_bytes} bytes is below the "
+        f"{packets_us:.3f} us that {needed}"
+        for one, packets_us in short
+    ]
+    if len(short) == len(raw) and way == "timing-model":
+        problems.append(f"{source}: every latency is too short: is latency_us in us?")
+    if problems:
+        raise BusplanError(*problems[:_MOST_SHOWN], *_more(source, len(problems) - _MOST_SHOWN))
+
+
+_MOST_SHOWN: Final = 50
+
+
+def _more(source: str, hidden: int) -> list[str]:
+    return [f"{source}: and {hidden} more problems"] if hidden > 0 else []
+
+
+def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> tuple[Residual, ...]:
+    fitted_us = {size: fit.execution_us(size) for size in {one.payload_bytes for one, _ in raw}}
+    found = []
+    for one, packets_us in raw:
+        execution_us = round(one.latency_us - packets_us, _EXACT_DECIMALS)
+        found.append(
+            Residual(
+                line=one.line,
+                transaction=one.transaction,
+                payload_bytes=one.payload_bytes,
+                latency_us=one.latency_us,
+                packets_us=packets_us,
+                execution_us=execution_us,
+                residual_us=round(execution_us - fitted_us[one.payload_bytes], _EXACT_DECIMALS),
+            )
+        )
+    return tuple(found)
+
+
+def _outliers(residuals: Sequence[Residual], groups: Groups, form: Form) -> tuple[Residual, ...]:
+    """Measurements that stand off the robust fit: of a table payload by payload, of a line over all."""
+    sturdy_us = middles(groups, robust=True)
+    if form == "linear":
+        base_us, per_byte_us = theil_sen(groups)
+        sturdy_us = {size: base_us + per_byte_us * size for size in groups}
+    pools: defaultdict[int, list[tuple[Residual, float]]] = defaultdict(list)
+    for one in residuals:
+        away_us = abs(one.execution_us - sturdy_us[one.payload_bytes])
+        pools[one.payload_bytes if form == "table" else 0].append((one, away_us))
+    found = []
+    for group in pools.values():
+        deviation_us = _DEVIATION_PER_MAD * median(away_us for _, away_us in group)
+        found += [
+            one
+            for one, away_us in group
+            if len(group) >= _FEWEST_FOR_OUTLIERS
+            and away_us > max(OUTLIER_DEVIATIONS * deviation_us, OUTLIER_SHARE * one.latency_us)
+        ]
+    return tuple(sorted(found))
+
+
+def _payload_fits(
+    residuals: Sequence[Residual],
+    measurements: Sequence[Measurement],
+    halves: _Halves,
+    fit: LinearExecution | TableExecution,
+    *,
+    robust: bool,
+) -> list[PayloadFit]:
+    middle = median if robust else fmean
+    groups: defaultdict[int, list[tuple[Residual, Measurement]]] = defaultdict(list)
+    for one, measured in zip(residuals, measurements, strict=True):
+        groups[one.payload_bytes].append((one, measured))
+
+    def of_payload(size: int, group: Sequence[tuple[Residual, Measurement]]) -> PayloadFit:
+        times_us = [one.execution_us for one, _ in group]
+        by_kind = {
+            kind: [one.execution_us for one, _ in group if one.transaction == kind] for kind in ("read", "write")
+        }
+        measured_us = [one.request_and_acknowledge_us for _, one in group if one.request_and_acknowledge_us is not None]
+        half_us = middle(measured_us) if measured_us else None
+        model_us = middle([halves[one.transaction, size].request_and_acknowledge_us for one, _ in group])
+        return PayloadFit(
+            payload_bytes=size,
+            measurements=len(group),
+            latency_us=middle([one.latency_us for one, _ in group]),
+            packets_us=middle([one.packets_us for one, _ in group]),
+            execution_us=middle(times_us),
+            deviation_us=stdev(times_us) if len(group) > 1 else None,
+            range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),
+            fitted_us=fit.execution_us(size),
+            residual_us=round(middle(times_us) - fit.execution_us(size), _EXACT_DECIMALS),
+            read_less_write_us=middle(by_kind["read"]) - middle(by_kind["write"]) if all(by_kind.values()) else None,
+            request_and_acknowledge_us=half_us,
+            model_request_and_acknowledge_us=model_us,
+            unexplained_us=None if half_us is None else half_us - model_us,
+        )
+
+    return [of_payload(size, groups[size]) for size in sorted(groups)]

@@ -1,0 +1,49 @@
+"""How many nodes a bus carries over its period, exactly: from which period on each further one fits."""
+
+from bisect import bisect_right
+from typing import NamedTuple
+
+from busplan.analysis.capacity.cycle import FIT_ROUNDING, Limit, cycle
+from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+from busplan.sections.base import MAX_TIME_US
+
+
+class NodeSteps(NamedTuple):
+    """The steps of the largest number of nodes over the period, under one timing model."""
+
+    timing_model: TimingModelName
+    axes_per_node: int
+    from_us: tuple[float, ...]
+    """Smallest period that 1, 2, ... nodes fit in; none where no period helps."""
+    limited_by: Limit
+    """What keeps it from going on."""
+
+    def max_axes(self, period_us: float) -> int:
+        """Most axes that a period carries [1]."""
+        return self.axes_per_node * bisect_right(self.from_us, period_us * (1 + FIT_ROUNDING))
+
+
+def node_steps(profile: Profile, *, model: TimingModelName) -> NodeSteps:
+    """Find the period from which on each number of nodes fits.
+
+    Parameters
+    ----------
+    profile
+        The network; its own period and number of nodes play no part.
+    model
+        Timing model.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> steps = node_steps(load("paper-1ms").profile, model="paper")
+    >>> steps.max_axes(1000.0), steps.limited_by
+    (16, 'hops')
+    """
+    most, limit = largest_nodes(override(profile, {"cycle.period_us": MAX_TIME_US}), model=model)
+    ratio = profile.cycle.slice_ratio
+    from_us = (cycle(profile, model=model, nodes=nodes).required_us / ratio for nodes in range(1, most + 1))
+    return NodeSteps(model, profile.node.axes, tuple(from_us), limit)

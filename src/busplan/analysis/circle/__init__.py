@@ -1,0 +1,1 @@
+"""Is the circle still round?"""

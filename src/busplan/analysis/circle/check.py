@@ -1,0 +1,54 @@
+"""The circle test as a question that a search asks many times: what does it not hold?"""
+
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.circle.roundness import Progress, circle_test
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+
+_PARTS = 1000
+"""Parts of one test that progress counts."""
+
+
+class CircleCheck:
+    """Answers for variants of one profile that differ in bus, cycle and payload alone; each simulation runs once.
+
+    Parameters
+    ----------
+    progress
+        Called with the parts of tests done and those expected.
+    expected
+        Number of tests expected [1].
+    """
+
+    def __init__(self, *, progress: Progress | None = None, expected: int = 1) -> None:
+        self._progress = progress
+        self._expected = expected
+        self._known: dict[tuple[float, float], tuple[str, ...]] = {}
+
+    def __call__(self, profile: Profile) -> tuple[str, ...]:
+        """Run the circle test: what it does not hold, or why it cannot be run; nothing when it passes.
+
+        Parameters
+        ----------
+        profile
+            A variant that fits its bus.
+        """
+        # A loop on the node sees of the bus no more than the period; one on the host has the cycle inside it.
+        on_host = profile.servo.loop == "host"
+        delay_us = figures(profile, model=profile.bus.timing_model).required_us if on_host else 0.0
+        key = (profile.cycle.period_us, delay_us)
+        if key not in self._known:
+            self._known[key] = self._run(profile)
+        return self._known[key]
+
+    def _run(self, profile: Profile) -> tuple[str, ...]:
+        try:
+            result = circle_test(profile, explain=False, progress=self._report).results[0]
+        except BusplanError as error:
+            return error.problems
+        return tuple(failure.text for failure in result.failures)
+
+    def _report(self, done: int, total: int) -> None:
+        if self._progress is not None:
+            tests = len(self._known)
+            self._progress(tests * _PARTS + done * _PARTS // total, max(self._expected, tests + 1) * _PARTS)

@@ -1,0 +1,132 @@
+"""What a circle test does not hold: the bus, stability, the turn, margins and tolerances, each in words."""
+
+from math import inf
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.buses.ieee1394.constants import MAX_HOPS, MAX_NODES
+from busplan.profile.model import Profile
+from busplan.servo.circle import FULL_TURN_DEG, CircleRun
+
+if TYPE_CHECKING:
+    from busplan.analysis.capacity.cycle import Limit
+
+CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
+"""Measures of roundness that have a tolerance, in the order in which they are looked at."""
+LEAST_ARC_DEG: Final = 270.0
+"""Arc that the circular deviation G needs: the least-squares centre of a shorter one follows its errors."""
+_FAILURES: Final[dict[str, str]] = {
+    "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
+    "hops": "{value:.0f} hops are over the {limit:.0f} of one bus",
+    "nodes": "{value:.0f} nodes are over the {limit:.0f} of one bus",
+    "payload_bytes": "a payload of {value:.0f} bytes is over the limit of {limit:.0f} bytes",
+    "stability": "the position loop is unstable",
+    "circle_not_followed": "the table did not follow the circle (not the whole turn, or an error above the radius): "
+    "it went {value:.0f} deg of {limit:.0f} deg round the centre",
+    "min_phase_margin_deg": "the phase margin of {value:.2f} deg is {under:.2f} deg under its {limit:g} deg",
+    "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
+    "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+    "constant_speed_deg": "the circular deviation G cannot be told: its least-squares centre needs {limit:.0f} deg of "
+    "the circle at constant speed, not {value:.0f} deg; shorten circle.ramp_periods or lower circle.feed_mm_per_min",
+    "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+}
+
+
+class Failure(NamedTuple):
+    """One thing that the test does not hold: a tolerance by its key, a limit of the bus, or stability."""
+
+    name: str
+    value: float | None
+    limit: float | None
+
+    @property
+    def text(self) -> str:
+        """What does not hold, and by how much."""
+        value, limit = self.value or 0.0, self.limit or 0.0
+        return _FAILURES[self.name].format(
+            value=value,
+            limit=limit,
+            under=limit - value,
+            um=value * 1e3,
+            limit_um=limit * 1e3,
+            over_um=(value - limit) * 1e3,
+        )
+
+
+def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float | None]:
+    """Smallest phase margin [deg] and gain margin [dB] of both axes, and the crossover of the former [Hz].
+
+    One axis may have the smaller phase margin and the other the smaller gain margin. An unstable loop has neither, and
+    hides what the other axis has.
+    """
+    axes = (run.margins_x, run.margins_y)
+    if not all(one.stable for one in axes):
+        return None, None, None
+    gains = [one.gain_margin_db for one in axes if one.gain_margin_db is not None]
+    phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
+    return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
+
+
+def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
+    """Tell which limits of the bus a cycle breaks.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    capacity
+        Its figures under the timing model that decides.
+    """
+    payload, bus_section = profile.payload, profile.bus
+    broken: dict[Limit, Failure] = {
+        "time": Failure("required_us", capacity.required_us, capacity.available_us),
+        "hops": Failure("hops", capacity.hops, MAX_HOPS),
+        "nodes": Failure("nodes", capacity.nodes, MAX_NODES),
+        "payload": Failure(
+            "payload_bytes", max(payload.read_bytes, payload.write_bytes), bus_section.max_payload_bytes
+        ),
+    }
+    return tuple(broken[limit] for limit in capacity.exceeded)
+
+
+def circle_failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
+    """Tell what a simulated circle does not hold: stability first, then the turn, the margins and the contour.
+
+    Parameters
+    ----------
+    profile
+        The network and its tolerances.
+    run
+        The simulation.
+    """
+    contour, tolerance = run.contour, profile.tolerance
+    if not (run.margins_x.stable and run.margins_y.stable):
+        return (Failure("stability", None, None),)
+    phase_deg, gain_db, _ = tightest_margins(run)
+    low = (
+        ("min_phase_margin_deg", inf if phase_deg is None else phase_deg, tolerance.min_phase_margin_deg),
+        ("min_gain_margin_db", inf if gain_db is None else gain_db, tolerance.min_gain_margin_db),
+    )
+    # Radial errors do not show it: a table that stands still on the circle has none.
+    strayed = () if run.follows else (("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)
+    high = (
+        ("mean_contour_error_mm", contour.mean_contour_error_mm, tolerance.mean_contour_error_mm),
+        ("max_contour_error_mm", contour.max_contour_error_mm, tolerance.max_contour_error_mm),
+        ("circular_deviation_mm", contour.circular_deviation_mm, tolerance.circular_deviation_mm),
+    )
+    arc_deg = run.constant_speed_deg
+    blind = arc_deg < LEAST_ARC_DEG and tolerance.circular_deviation_mm is not None
+    return tuple(
+        Failure(name, value, limit)
+        for name, value, limit in (
+            *strayed,
+            *((name, value, limit) for name, value, limit in low if value < limit),
+            *(
+                (name, value, limit)
+                for name, value, limit in high
+                if limit is not None and value > limit and not (blind and name == "circular_deviation_mm")
+            ),
+            *((("constant_speed_deg", arc_deg, LEAST_ARC_DEG),) if blind else ()),
+        )
+    )

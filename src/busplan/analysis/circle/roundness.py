@@ -1,0 +1,272 @@
+"""The circle test: is the circle still round at this period, and does the bus carry it at all?
+
+The bus comes first. A cycle that does not fit its period delivers no set-points, so there is nothing to simulate. Then
+stability: a host loop's delay makes the circle better while it eats the margin, so no circle passes without one.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.analysis.circle.contributions import Contribution, Setup, contributions, sources
+from busplan.analysis.circle.failures import (
+    CONTOUR_MEASURES,
+    LEAST_ARC_DEG,
+    Failure,
+    bus_failures,
+    circle_failures,
+    tightest_margins,
+)
+from busplan.analysis.circle.setup import bus, loop_timing, setup
+from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.parameters import LoopTiming
+from busplan.servo.path import circle_setpoints
+
+Progress = Callable[[int, int], None]
+"""Called with the steps done and the steps to do."""
+
+
+class CircleFigures(NamedTuple):
+    """The circle test at one period. What was not simulated is None."""
+
+    period_us: float
+    feed_mm_per_min: float
+    radius_mm: float
+    duration_s: float
+    setpoints: int
+    steps: int
+    step_us: float
+    loop: str
+    delay_us: float
+    """Bus delay inside the loop: the capacity result's required_us when the loop is on the host, otherwise 0."""
+    timing_model: TimingModelName
+    """Timing model that decided whether the bus fits."""
+    bus_fits: bool
+    required_us: float
+    available_us: float
+    servo_grade: str
+    """How the servo values are known: measured, calibrated or assumed."""
+    stable: bool | None
+    phase_margin_deg: float | None
+    """The smaller one of both axes; None also where no loop gain reaches one."""
+    gain_margin_db: float | None
+    """The smaller one of both axes, whichever has it; None also where no gain makes a loop unstable."""
+    crossover_hz: float | None
+    """Of the axis with the smaller phase margin."""
+    mean_contour_error_mm: float | None
+    max_contour_error_mm: float | None
+    radial_deviation_min_mm: float | None
+    radial_deviation_max_mm: float | None
+    circular_deviation_mm: float | None
+    """About the least-squares centre; None, as radius and centre, where `constant_speed_deg` is too short."""
+    radius_deviation_mm: float | None
+    centre_offset_mm: tuple[float, float] | None
+    constant_speed_deg: float | None
+    """Arc at constant speed, with the loops settled, from which F, G, radius and centre are taken."""
+    passed: bool
+    failures: tuple[Failure, ...]
+    contributions: tuple[Contribution, ...] | None
+    """Ranked, largest first; None where they were not asked for and nothing failed that they could explain."""
+
+
+def failed_measure(result: CircleFigures) -> str | None:
+    """Name of the first contour measure that misses its tolerance; None where only something else fails.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period.
+    """
+    return next((failure.name for failure in result.failures if failure.name in CONTOUR_MEASURES), None)
+
+
+def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
+    """Tell which source takes most of the first contour measure that fails, and how much it takes [mm].
+
+    Parameters
+    ----------
+    result
+        The circle test at one period, with contributions.
+
+    Returns
+    -------
+    tuple or None
+        None where no contour measure fails, or no source takes anything of it.
+    """
+    measure = failed_measure(result)
+    if measure is None or not result.contributions:
+        return None
+    first = min(result.contributions, key=lambda one: float(getattr(one, measure)))
+    removed_mm = float(getattr(result, measure)) - float(getattr(first, measure))
+    return (first, removed_mm) if removed_mm > 0 else None
+
+
+class CircleTest(NamedTuple):
+    """Answer of `circle_test`: the profile as it was tested, and the figures and simulation of each period."""
+
+    profile: Profile
+    results: tuple[CircleFigures, ...]
+    runs: tuple[CircleRun | None, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every period holds every tolerance."""
+        return all(result.passed for result in self.results)
+
+
+def circle_test(
+    profile: Profile,
+    *,
+    periods_us: Sequence[float] | None = None,
+    with_contributions: bool = False,
+    explain: bool = True,
+    progress: Progress | None = None,
+) -> CircleTest:
+    """Run the circle test of a profile.
+
+    Parameters
+    ----------
+    profile
+        The network, its servo and its circle.
+    periods_us
+        Communication periods T_s [us]; without them the profile's own.
+    with_contributions
+        Run again without each error source in turn; a contour tolerance that fails asks for it by itself.
+    explain
+        Whether it does; a search for what passes has no use for reasons.
+    progress
+        Called now and then with the steps simulated so far and those known to be needed.
+
+    Returns
+    -------
+    CircleTest
+        One result for each period.
+
+    Raises
+    ------
+    BusplanError
+        The period is no multiple of the step, the drive cannot reach the feed, or the circle is too short for its
+        ramps.
+
+    References
+    ----------
+    ISO 230-4 for the measures; the paper's section IV-B for the test.
+    """
+    periods = [profile.cycle.period_us] if periods_us is None else periods_us
+    variants = [
+        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
+    ]
+    counter = _Counter(progress)
+    # Everything is set up before anything is simulated: what is wrong with the last period is said at once. What the
+    # bus does not carry needs no path, however many set-points it has.
+    setups = [setup(variant) if bus(variant).fits else loop_timing(variant) for variant in variants]
+    for one in setups:
+        if isinstance(one, Setup):
+            counter.expect(one, *(sources(one).values() if with_contributions else ()))
+    pairs = [
+        _test(variant, one, with_contributions=with_contributions, explain=explain, counter=counter)
+        for variant, one in zip(variants, setups, strict=True)
+    ]
+    return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
+
+
+class _Counter:
+    """Adds the steps of many runs up to one progress."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress = progress
+        self._expected = 0
+        self._done = 0
+
+    def expect(self, *setups: Setup) -> None:
+        self._expected += sum(2 * one.steps for one in setups)
+
+    def run(self, one: Setup) -> CircleRun:
+        before = self._done
+
+        def report(done: int, _total: int) -> None:
+            self._done = before + done
+            if self._progress is not None:
+                self._progress(self._done, max(self._expected, self._done))
+
+        run = simulate_circle(
+            one.path,
+            x=one.x,
+            y=one.y,
+            timing=one.timing,
+            delivery=one.delivery,
+            mechanics=one.mechanics,
+            progress=report,
+        )
+        self._done = before + 2 * one.steps
+        return run
+
+
+def _test(
+    profile: Profile, one: Setup | LoopTiming, *, with_contributions: bool, explain: bool, counter: _Counter
+) -> tuple[CircleFigures, CircleRun | None]:
+    capacity = bus(profile)
+    if isinstance(one, LoopTiming):
+        return _figures(profile, one, capacity, None), None
+    run = counter.run(one)
+    result = _figures(profile, one.timing, capacity, run)
+    if with_contributions or (explain and failed_measure(result)):
+        if not with_contributions:
+            counter.expect(*sources(one).values())
+        ranked = contributions(one, max_contour_error_mm=run.contour.max_contour_error_mm, simulate=counter.run)
+        result = result._replace(contributions=ranked)
+    return result, run
+
+
+def _figures(
+    profile: Profile,
+    timing: LoopTiming,
+    capacity: CapacityFigures,
+    run: CircleRun | None,
+) -> CircleFigures:
+    phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
+    contour = run.contour if run else None
+    # A short arc has a least-squares centre too, but not one that means anything.
+    round_ = contour if run and run.constant_speed_deg >= LEAST_ARC_DEG else None
+    circle = profile.circle
+    setpoints = circle_setpoints(
+        circle.radius_mm,
+        feed_mm_per_min=circle.feed_mm_per_min,
+        period_us=timing.period_us,
+        ramp_periods=circle.ramp_periods,
+    )
+    failures = bus_failures(profile, capacity) if run is None else circle_failures(profile, run)
+    return CircleFigures(
+        period_us=profile.cycle.period_us,
+        feed_mm_per_min=circle.feed_mm_per_min,
+        radius_mm=circle.radius_mm,
+        duration_s=setpoints * timing.period_us / 1e6,
+        setpoints=setpoints,
+        steps=setpoints * timing.steps_per_period,
+        step_us=timing.step_us,
+        loop=timing.loop,
+        delay_us=timing.delay_us,
+        timing_model=capacity.timing_model,
+        bus_fits=capacity.fits,
+        required_us=capacity.required_us,
+        available_us=capacity.available_us,
+        servo_grade=profile.servo.grade,
+        stable=run.margins_x.stable and run.margins_y.stable if run else None,
+        phase_margin_deg=phase_deg,
+        gain_margin_db=gain_db,
+        crossover_hz=crossover_hz,
+        mean_contour_error_mm=contour.mean_contour_error_mm if contour else None,
+        max_contour_error_mm=contour.max_contour_error_mm if contour else None,
+        radial_deviation_min_mm=contour.radial_deviation_min_mm if contour else None,
+        radial_deviation_max_mm=contour.radial_deviation_max_mm if contour else None,
+        circular_deviation_mm=round_.circular_deviation_mm if round_ else None,
+        radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
+        centre_offset_mm=round_.centre_offset_mm if round_ else None,
+        constant_speed_deg=run.constant_speed_deg if run else None,
+        passed=not failures,
+        failures=failures,
+        contributions=None,
+    )

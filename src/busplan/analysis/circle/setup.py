@@ -1,0 +1,59 @@
+"""What a profile's circle test simulates: path, axes, timing, delivery and mechanics, from its sections."""
+
+from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.circle.contributions import Setup
+from busplan.profile.model import Profile
+from busplan.servo.circle import check_circle
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
+from busplan.servo.path import circle_path
+
+
+def bus(profile: Profile) -> CapacityFigures:
+    """Capacity under the timing model that decides."""
+    return figures(profile, model=profile.bus.timing_model)
+
+
+def setup(profile: Profile) -> Setup:
+    """What a profile's circle test simulates.
+
+    Raises
+    ------
+    BusplanError
+        As `circle_test`.
+    """
+    circle, servo, delivery, mechanics = profile.circle, profile.servo, profile.delivery, profile.mechanics
+    one = Setup(
+        path=circle_path(
+            circle.radius_mm,
+            feed_mm_per_min=circle.feed_mm_per_min,
+            period_us=profile.cycle.period_us,
+            ramp_periods=circle.ramp_periods,
+            direction=circle.direction,
+        ),
+        x=Axis(**servo.axis_keys("x")),
+        y=Axis(**servo.axis_keys("y")),
+        timing=loop_timing(profile),
+        delivery=Delivery(**delivery.model_dump()),
+        mechanics=Mechanics(**mechanics.model_dump()),
+    )
+    check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
+    return one
+
+
+def loop_timing(profile: Profile) -> LoopTiming:
+    """Where a profile closes its loops, and how often.
+
+    Raises
+    ------
+    BusplanError
+        The period is no multiple of the step.
+    """
+    period_us, servo = profile.cycle.period_us, profile.servo
+    return LoopTiming(
+        period_us=period_us,
+        step_us=servo.step_us,
+        loop=servo.loop,
+        interpolation=servo.interpolation,
+        # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
+        delay_us=min(bus(profile).required_us, period_us) if servo.loop == "host" else 0.0,
+    )

@@ -1,0 +1,266 @@
+"""Where a figure comes from: every step to it, in symbols and in numbers, and everything it starts from.
+
+Nothing is computed a second time by other means: the functions that give the figure are given numbers that remember
+what was done with them (`busplan.analysis.derivation.trace`).
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from difflib import get_close_matches
+from typing import Any, Final, NamedTuple
+
+from busplan.analysis.derivation.capacity import capacity_figures
+from busplan.analysis.derivation.formulas import written
+from busplan.analysis.derivation.latency import latency_figures
+from busplan.analysis.derivation.trace import Input, Traced, inputs, lines
+from busplan.analysis.derivation.verdict import VERDICT_KEYS, verdict_figure
+from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.quantities import FIGURES, HOLDERS, Command, Figure
+from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TimingModelName, TransactionKind
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+
+Progress = Callable[[int, int], None]
+_GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
+"""From the weakest to the strongest, and what is not for anyone to know."""
+
+
+class Step(NamedTuple):
+    """One line of a derivation.
+
+    Parameters
+    ----------
+    key
+        Name of the figure in the results; one of the derivation's own where it is no figure.
+    symbol
+        What stands for it.
+    reference
+        Numbers of its equations, or where else it comes from.
+    formula
+        How it is computed, in symbols.
+    numbers
+        The same with the numbers put in.
+    value
+        The result: a number, a truth, a word or a list; None where there is none.
+    unit
+        Its unit; empty for counts, shares and words.
+    """
+
+    key: str
+    symbol: str
+    reference: str
+    formula: str
+    numbers: str
+    value: Any
+    unit: str
+
+
+class Derivation(NamedTuple):
+    """A figure and the way to it."""
+
+    command: Command
+    figure: Figure
+    timing_model: TimingModelName
+    transaction: TransactionKind | None
+    """Of a figure of `latency`."""
+    period_us: float
+    value: Any
+    """As the command's JSON has it."""
+    steps: tuple[Step, ...]
+    """What is computed first comes first; the figure itself is last, unless it is an input."""
+    inputs: tuple[Input, ...]
+
+    @property
+    def weakest_grade(self) -> str:
+        """The grade of the least well known of its inputs."""
+        return min((one.grade for one in self.inputs), key=_GRADES.index, default=_GRADES[-1])
+
+
+class Explanation(NamedTuple):
+    """Answer of `explain`."""
+
+    profile: Profile
+    derivations: tuple[Derivation, ...]
+
+
+def figure_named(name: str) -> tuple[Command, Figure]:
+    """Find the figure that a name means.
+
+    Parameters
+    ----------
+    name
+        A key, as "required_us", or one with its command before it, as "circle-test.required_us". A key inside a figure,
+        as "removed_mm", means that figure.
+
+    Raises
+    ------
+    BusplanError
+        There is none; those that are spelt alike are named.
+
+    Examples
+    --------
+    >>> figure_named("latency.gaps_us")[1].meaning
+    'both gaps, after each transaction'
+    """
+    for command, figures in FIGURES.items():
+        key = name.removeprefix(f"{command}.")
+        if key in figures and name in (key, f"{command}.{key}"):
+            return command, figures[key]
+    before, _, inner = name.rpartition(".")
+    held = HOLDERS.get(inner)
+    if held is not None and before in ("", held[0]):
+        return held[0], FIGURES[held[0]][held[1]]
+    known = [key for figures in FIGURES.values() for key in figures]
+    close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
+    hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
+    raise BusplanError(f"{name or repr(name)}: no such figure{hint}? Without a figure, explain lists them all")
+
+
+def explain(
+    profile: Profile,
+    figure: str,
+    *,
+    periods_us: Sequence[float] | None = None,
+    timing_models: Sequence[TimingModelName] | None = None,
+    transactions: Sequence[TransactionKind] | None = None,
+    progress: Progress | None = None,
+) -> Explanation:
+    """Derive a figure of `latency`, `capacity` or `circle-test`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    figure
+        Its key, with or without its command, as `figure_named` takes it.
+    periods_us
+        Communication periods T_s [us]; without them the profile's own.
+    timing_models
+        Which timing models; without them the one that decides. A circle test has no other.
+    transactions
+        Which transactions, for a figure of `latency`; without them both.
+    progress
+        As for `circle_test`.
+
+    Returns
+    -------
+    Explanation
+        One derivation for each period, transaction and model, in this nesting.
+
+    Raises
+    ------
+    BusplanError
+        There is no such figure, what is asked for does not go with it, or the command itself refuses.
+    """
+    command, one = figure_named(figure)
+    deciding = profile.bus.timing_model
+    models = [deciding] if timing_models is None else timing_models
+    kinds: Sequence[TransactionKind | None] = (transactions or TRANSACTION_KINDS) if command == "latency" else [None]
+    if command == "circle-test" and list(models) != [deciding]:
+        raise BusplanError(f"{one.key}: a circle test has the timing model that decides and no other, {deciding}")
+    if one.key in VERDICT_KEYS and timing_models is not None:
+        raise BusplanError(f"{one.key}: compares the timing models, so it belongs to no one of them")
+    if command != "latency" and transactions is not None:
+        raise BusplanError(f"{one.key}: no figure of latency, so it belongs to no one transaction")
+    found = []
+    for period_us in [profile.cycle.period_us] if periods_us is None else periods_us:
+        where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": "period"})
+        for kind in kinds:
+            for model in models:
+                traced = _traced(where, command, one.key, model=model, kind=kind, progress=progress)
+                found.append(_derivation(where, command, one, traced, model=model, kind=kind))
+    return Explanation(profile, tuple(found))
+
+
+def assumptions(profile: Profile) -> tuple[Input, ...]:
+    """What the figures of a profile rest on, each with its grade, the least well known first.
+
+    Parameters
+    ----------
+    profile
+        The network; what its circle test starts from is among them where it asks for one.
+
+    Returns
+    -------
+    tuple
+        Inputs of the cycle under both timing models, and of the circle; without those that are the planner's to choose.
+        An execution time that nobody has graded is first.
+    """
+    found: dict[str, Input] = {}
+    for model in BOTH_MODELS:
+        for one in inputs(capacity_figures(profile, model=model)["fits"]):
+            found.setdefault(one.name, one)
+    if profile.asks_for_circle:
+        from busplan.analysis.derivation.circle import simulated_inputs  # loads the simulation, and numpy with it
+
+        for one in simulated_inputs(profile):
+            found.setdefault(one.name, one)
+    # The execution time is for somebody to know, and nobody says how well: that comes first.
+    known = (one for one in found.values() if one.grade != "given" or one.name.startswith("node.execution."))
+    return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
+
+
+def _traced(
+    profile: Profile,
+    command: Command,
+    key: str,
+    *,
+    model: TimingModelName,
+    kind: TransactionKind | None,
+    progress: Progress | None,
+) -> Traced:
+    if command == "latency":
+        return latency_figures(profile, model=model, kind=kind or TRANSACTION_KINDS[0])[key]
+    if command == "capacity":
+        return (
+            verdict_figure(profile, key, model=model)
+            if key in VERDICT_KEYS
+            else capacity_figures(profile, model=model)[key]
+        )
+    from busplan.analysis.derivation.circle import circle_figures  # as above
+
+    return circle_figures(profile, with_contributions=key == "contributions", progress=progress)[key]
+
+
+def _derivation(
+    profile: Profile,
+    command: Command,
+    figure: Figure,
+    traced: Traced,
+    *,
+    model: TimingModelName,
+    kind: TransactionKind | None,
+) -> Derivation:
+    steps = tuple(_steps(traced, command, figure))
+    return Derivation(
+        command=command,
+        figure=figure,
+        timing_model=model,
+        transaction=kind,
+        period_us=profile.cycle.period_us,
+        value=traced.value,
+        steps=steps,
+        inputs=tuple(inputs(traced)),
+    )
+
+
+def _steps(traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
+    for one in lines(traced):
+        known = figure if one is traced else _known(one.key, command)
+        yield Step(
+            key=known.key,
+            symbol=figure.symbol if one is traced else one.symbol,
+            reference=known.reference,
+            formula=written(one, in_numbers=False),
+            numbers=written(one, in_numbers=True),
+            value=one.value,
+            unit=known.unit,
+        )
+
+
+def _known(key: str, command: Command) -> Figure:
+    """What the registry says of a line; one that is no figure stands for itself."""
+    for figures in (FIGURES[command], *FIGURES.values()):
+        if key in figures:
+            return figures[key]
+    return Figure(key, key, "", "")

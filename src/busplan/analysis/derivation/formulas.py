@@ -1,0 +1,111 @@
+"""How the lines of a derivation are written: in symbols, and with the numbers put in."""
+
+from inspect import signature
+from typing import Final
+
+from busplan.analysis.derivation.trace import DIGITS, OPERATIONS, Input, Operand, Traced, short, value_of
+from busplan.buses.ieee1394.equations import SYMBOLS
+from busplan.sourced import Equation
+
+_ATOM: Final = 4
+_MOST_DIGITS: Final = 17
+"""As many as tell every float from every other."""
+_SUPPORTS: Final = 1e-4
+"""Largest share of a result by which its line may miss it, for the digits that the line does not show."""
+
+
+def against(left: float, sign: str, right: float) -> str:
+    """Write a comparison with so many digits that it can be seen to hold.
+
+    Examples
+    --------
+    >>> against(205.917, "<=", 2000.0), against(205.91746955, ">", 205.91746954)
+    ('205.917 <= 2000', '205.91746955 > 205.91746954')
+    """
+    digits = DIGITS
+    while left != right and f"{left:.{digits}g}" == f"{right:.{digits}g}" and digits < _MOST_DIGITS:
+        digits += 1
+    return f"{left:.{digits}g} {sign} {right:.{digits}g}"
+
+
+def less(left: float, right: float) -> str:
+    """Write a difference with so many digits that the line gives its result.
+
+    Examples
+    --------
+    >>> less(2000.0, 205.91747), less(320.00001432686, 320.0)
+    ('2000 - 205.9175', '320.000014327 - 320')
+    """
+    digits = DIGITS
+    while digits < _MOST_DIGITS:
+        seen = float(f"{left:.{digits}g}") - float(f"{right:.{digits}g}")
+        if abs(seen - (left - right)) <= _SUPPORTS * abs(left - right):
+            break
+        digits += 1
+    return f"{left:.{digits}g} - {right:.{digits}g}"
+
+
+def written(operand: Operand, *, in_numbers: bool) -> str:
+    """Write the expression behind a number, down to what has a name.
+
+    Parameters
+    ----------
+    operand
+        A computed number.
+    in_numbers
+        Write the values of what has a name, instead of the symbols.
+
+    Examples
+    --------
+    >>> hops = Traced(2, given=Input("H", "bus.nodes", 2, "hops", "given", "profile", "cable hops"))
+    >>> delay = 0.25 * (hops + 1)
+    >>> written(delay, in_numbers=False), written(delay, in_numbers=True), delay.value
+    ('0.25 (H + 1)', '0.25 * (2 + 1)', 0.75)
+    """
+    if isinstance(operand, Traced) and not operand.operation:
+        return operand.numbers if in_numbers else operand.formula
+    if in_numbers and operand.operation == "sub" and all(_is_atom(part) for part in operand.parts):
+        return less(*(float(value_of(part)) for part in operand.parts))
+    return _written(operand, in_numbers=in_numbers, top=True)[0]
+
+
+def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
+    """Text of an operand, and how tightly it holds together."""
+    if not isinstance(operand, Traced):
+        return _atom(short(value_of(operand)))
+    if not top and (operand.symbol or not operand.operation):
+        return _atom(short(operand.value) if in_numbers or not operand.symbol else operand.symbol)
+    operation = OPERATIONS[operand.operation]
+    (left, left_rank), (right, right_rank) = (_written(part, in_numbers=in_numbers) for part in operand.parts)
+    left = f"({left})" if left_rank < operation.rank else left
+    # What is taken off, divided by or raised to must hold together more tightly than what it is taken off.
+    tighter = operation.rank + (operation.sign in "-/^")
+    right = f"({right})" if right_rank < tighter else right
+    if operation.sign == "*" and not in_numbers and not right[0].isdigit():
+        return f"{left} {right}", operation.rank
+    return f"{left} {operation.sign} {right}", operation.rank
+
+
+def _is_atom(operand: Operand) -> bool:
+    return not isinstance(operand, Traced) or bool(operand.symbol) or not operand.operation
+
+
+def _atom(text: str) -> tuple[str, int]:
+    rank = 1 if " + " in text or text.startswith("-") else 2 if " " in text else _ATOM
+    return text, rank
+
+
+def formula_of(equation: Equation) -> str:
+    """Write an equation in symbols, by computing it with numbers that remember.
+
+    Examples
+    --------
+    >>> from busplan.sourced import EQUATIONS
+    >>> formula_of(EQUATIONS["acknowledge_phase_us"])
+    '(0.023 L / 4.5 + 14 / C) H + 0.25'
+    """
+    names = list(signature(equation.function).parameters)
+    # Any number but 0 and 1 will do: those are what a comparison gives.
+    first, *others = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
+    found = equation.function(first, **dict(zip(names[1:], others, strict=True)))
+    return found.symbol or written(found, in_numbers=False)

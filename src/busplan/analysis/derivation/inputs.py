@@ -1,0 +1,94 @@
+"""What a profile gives a derivation: its keys as inputs, each with its grade and where it stands."""
+
+from types import MappingProxyType
+from typing import Any, Final
+
+from busplan.analysis.derivation.trace import Input, Traced
+from busplan.buses.ieee1394.constants import (
+    PACKET_OVERHEAD_BYTES,
+    PING_PER_NODE_US,
+    PING_US,
+    REFERENCE_CABLE_M,
+    SLICE_RATIO,
+)
+from busplan.buses.ieee1394.equations import SYMBOLS
+from busplan.profile.model import Profile
+
+_DEFAULTS: Final = MappingProxyType(
+    {
+        "bus.cable_length_m": REFERENCE_CABLE_M,
+        "cycle.slice_ratio": SLICE_RATIO,
+        "cycle.sync.ping_us": PING_US,
+        "cycle.sync.ping_per_node_us": PING_PER_NODE_US,
+        "payload.overhead_bytes": PACKET_OVERHEAD_BYTES,
+    }
+)
+"""Keys whose default is a figure with a source."""
+
+_SYMBOLS: Final = MappingProxyType(
+    {
+        "payload.read_bytes": "P_read",
+        "payload.write_bytes": "P_write",
+        "payload.overhead_bytes": "overhead",
+        "cycle.sync.ping_us": "ping",
+        "cycle.sync.ping_per_node_us": "ping_node",
+        "node.axes": "axes_node",
+        "node.execution.base_us": "base",
+        "node.execution.per_byte_us": "per_byte",
+        "circle.feed_mm_per_min": "F",
+        "circle.radius_mm": "r",
+        "circle.ramp_periods": "ramp",
+        "servo.step_us": "h",
+        "servo.position_gain_per_s": "kp",
+        "servo.integral_gain_per_s2": "ki",
+        "servo.derivative_gain": "kd",
+        "servo.velocity_feedforward": "k_vff",
+        "servo.acceleration_feedforward_s": "k_aff",
+        "servo.drive_lag_us": "tau",
+    }
+)
+"""What stands for a key in formulas, where it is no quantity of the equations."""
+
+
+def given(profile: Profile, key: str) -> Input:
+    """Give a key of a profile as the input of a derivation.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    key
+        Dotted key, as "cycle.period_us".
+
+    Returns
+    -------
+    Input
+        Its grade is that of its section where the section has one, that of a sourced figure where it is that figure,
+        and "given" for all else that the profile sets.
+    """
+    *sections, name = key.split(".")
+    section: Any = profile
+    is_set, own_grade, graded_by = True, None, ""
+    for number, part in enumerate(sections, start=1):
+        is_set = is_set and part in section.model_fields_set
+        section = getattr(section, part)
+        if getattr(section, "grade", None):
+            own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
+    is_set = is_set and name in section.model_fields_set
+    description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
+    value = getattr(section, name)
+    grade = own_grade or "given"
+    source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
+    default = _DEFAULTS.get(key)
+    if default is not None and value == default:
+        grade, source = default.grade, f"{source}, as {default.source}"
+    # A plain number has no unit to show.
+    unit = "" if unit == "1" else unit
+    symbol = _SYMBOLS.get(key) or SYMBOLS.get(name) or name
+    return Input(symbol, key, value, unit, grade, source, description)
+
+
+def traced(profile: Profile, key: str) -> Traced:
+    """Give a key of a profile as a number that remembers where it comes from."""
+    one = given(profile, key)
+    return Traced(one.value, given=one)

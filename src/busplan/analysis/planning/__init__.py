@@ -1,0 +1,1 @@
+"""What to set, and the cheapest change that makes a network fit."""

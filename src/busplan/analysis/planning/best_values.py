@@ -1,0 +1,150 @@
+"""The best value of one setting, the others as they are: period, slice ratio, payload, nodes.
+
+What has a closed form is computed, and its neighbours on the grid of settings are tested. The largest payload and the
+smallest period that passes the circle are scanned: neither a measured execution table nor a contour error is monotone.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from decimal import Decimal
+from math import ceil
+from typing import Final, Literal, NamedTuple
+
+from busplan.analysis.capacity.cycle import cycle, fits_in
+from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.analysis.planning.cures import RATIO_STEPS
+from busplan.buses.ieee1394.constants import QUADLET_BYTES, padded_bytes, safe_gap_count
+from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.profile.bus import TableExecution
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+from busplan.sections.base import MAX_TIME_US
+
+Bound = Literal["time", "circle", "speed", "execution", "gap table", "hops", "nodes", "payload"]
+Models = Sequence[TimingModelName]
+Circle = Callable[[Profile], tuple[str, ...]]
+"""Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
+
+MAX_CIRCLES: Final = 50
+"""So many periods in a row are tested for the smallest one that passes the circle. Chosen: some seconds."""
+
+
+class PeriodSearch(NamedTuple):
+    """Smallest period that was found."""
+
+    period_us: float | None
+    """None when none was found."""
+    bounded_by: Bound
+    proven: bool
+    """Whether every smaller one fails; False when the search was cut short."""
+
+
+class Largest(NamedTuple):
+    """Largest value of a setting, 0 when there is none, and what keeps it from being larger."""
+
+    value: int
+    bounded_by: Bound
+
+
+def required_us(profile: Profile, *, models: Models) -> float:
+    """What the cycle needs under the model that needs most [us]."""
+    return max(cycle(profile, model=model, nodes=profile.bus.nodes).required_us for model in models)
+
+
+def smallest_ratio(profile: Profile, *, models: Models) -> float:
+    """Smallest slice ratio that the cycle fits with, in steps of 0.0001; above 1 there is none."""
+    needed_us, period_us = required_us(profile, models=models), profile.cycle.period_us
+    steps = _smallest(
+        needed_us / period_us * RATIO_STEPS,
+        fits=lambda number: fits_in(needed_us, available_us=number / RATIO_STEPS * period_us),
+    )
+    return steps / RATIO_STEPS
+
+
+def smallest_period(
+    profile: Profile, *, models: Models, circle: Circle | None = None, max_circles: int = MAX_CIRCLES
+) -> PeriodSearch:
+    """Find the smallest period that the cycle fits in and that passes the circle.
+
+    For the bus alone there is a closed form, rounded up to whole us. The circle asks for multiples of the servo's step,
+    and each one from there on is tested: the first to pass is the smallest. After `max_circles` of them the strides
+    double, and what passes then is not proven to be the smallest.
+
+    Parameters
+    ----------
+    profile
+        The network; its own period plays no part.
+    models
+        Timing models that it must fit under.
+    circle
+        The circle test; without it no circle is run.
+    max_circles
+        How many periods in a row are tested, 1 or more [1].
+    """
+    needed_us, ratio = required_us(profile, models=models), profile.cycle.slice_ratio
+    step_us = 1.0 if circle is None else profile.servo.step_us
+    first = _smallest(
+        needed_us / ratio / step_us,
+        fits=lambda number: fits_in(needed_us, available_us=ratio * _times(number, step_us)),
+    )
+    if _times(first, step_us) > MAX_TIME_US:
+        return PeriodSearch(None, "time", proven=True)
+    for tried, number in enumerate(_numbers(first, in_a_row=max_circles)):
+        period_us, proven = _times(number, step_us), tried < max_circles
+        if period_us > MAX_TIME_US:
+            return PeriodSearch(None, "circle", proven=proven)
+        if circle is None or not circle(override(profile, {"cycle.period_us": period_us})):
+            return PeriodSearch(period_us, "circle" if tried else "time", proven=proven)
+    raise AssertionError("the numbers never end")
+
+
+def largest_payload(profile: Profile, *, model: TimingModelName) -> Largest:
+    """Largest payload of read and write alike that fits the period, in whole quadlets [bytes].
+
+    Every size is tried from the largest one that the speed carries and the execution table knows.
+    """
+    bus, execution = profile.bus, profile.node.execution
+    smallest, most = QUADLET_BYTES, Largest(bus.max_payload_bytes, "speed")
+    if isinstance(execution, TableExecution):
+        smallest = max(smallest, padded_bytes(execution.payload_bytes[0]))
+        known = execution.payload_bytes[-1] // QUADLET_BYTES * QUADLET_BYTES
+        most = min(most, Largest(known, "execution"), key=lambda one: one.value)
+    available_us = profile.cycle.slice_ratio * profile.cycle.period_us
+    for size in range(most.value, smallest - 1, -QUADLET_BYTES):
+        needed_us = cycle(profile, model=model, nodes=bus.nodes, payload_bytes=size).required_us
+        if fits_in(needed_us, available_us=available_us):
+            return most if size == most.value else Largest(size, "time")
+    return Largest(0, "execution" if most.value < smallest else "time")
+
+
+def most_nodes(profile: Profile, *, model: TimingModelName) -> Largest:
+    """Largest number of nodes that fits the period, and that the profile's gap count is safe for."""
+    most, limit = largest_nodes(profile, model=model)
+    bus, safe = profile.bus, most
+    while safe and bus.gap_count_for(safe) < safe_gap_count(bus.hops(safe)):
+        safe -= 1
+    return Largest(safe, limit if safe == most else "gap table")
+
+
+def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:
+    """Smallest whole number above 0 that fits, from its estimate in floats; every larger one must fit too."""
+    number = max(1, ceil(estimate))
+    while number > 1 and fits(number - 1):
+        number -= 1
+    while not fits(number):
+        number += 1
+    return number
+
+
+def _numbers(first: int, *, in_a_row: int) -> Iterator[int]:
+    """Some numbers in a row, then in strides that double."""
+    yield from range(first, first + in_a_row)
+    number, stride = first + in_a_row - 1, 2
+    while True:
+        number += stride
+        yield number
+        stride *= 2
+
+
+def _times(number: int, step_us: float) -> float:
+    """A multiple of a step as it is written: three times 0.1 is 0.3 [us]."""
+    return float(number * Decimal(str(step_us)))

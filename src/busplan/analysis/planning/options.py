@@ -1,0 +1,279 @@
+"""What to set for a number of nodes: the best value of each setting, and the one change to make.
+
+Every option is put into the profile and computed again.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from busplan.analysis.capacity.cycle import broken_limits
+from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.planning.best_values import (
+    MAX_CIRCLES,
+    Bound,
+    Circle,
+    largest_payload,
+    most_nodes,
+    required_us,
+    smallest_period,
+    smallest_ratio,
+)
+from busplan.analysis.planning.cures import Value, changes_to_fit
+from busplan.buses.ieee1394.constants import REFERENCE_CABLE_M, safe_gap_count
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+
+Changes = dict[str, Value]
+
+
+class Option(NamedTuple):
+    """One way to set the network, computed with it in place."""
+
+    title: str
+    changes: Changes
+    """What the option sets, by dotted key; what was asked for is not among it."""
+    profile: Profile
+    """The profile with the changes and with what was asked for."""
+    deciding: CapacityFigures
+    """Capacity under the timing model that decides."""
+    other: CapacityFigures
+    """Capacity under the other timing model."""
+    bounded_by: Bound | None = None
+    """What keeps the value from being better; None where there is no value to choose."""
+    circle_failures: tuple[str, ...] | None = None
+    """What the circle does not hold; None when it was not run."""
+    proven: bool = True
+    """Whether no better value can exist; False when the search for it was cut short."""
+    recommended: bool = False
+
+    @property
+    def circle_passed(self) -> bool | None:
+        """Whether the circle holds its tolerances; None when it was not run."""
+        return None if self.circle_failures is None else not self.circle_failures
+
+    @property
+    def is_plan(self) -> bool:
+        """Whether both models fit, the gap count is safe, and the circle passes if it was run."""
+        return self.deciding.fits and self.other.fits and self.deciding.gap_count_safe and not self.circle_failures
+
+
+class Impossible(NamedTuple):
+    """A setting without a value that would do."""
+
+    title: str
+    reason: str
+    proven: bool = True
+    """Whether there is none; False when the search was cut short."""
+
+
+class Plan(NamedTuple):
+    """Answer of `plan`."""
+
+    profile: Profile
+    """The profile as it was read."""
+    goal: Profile
+    """The profile with what was asked for."""
+    wanted: Changes
+    """What was asked for and is not in the profile yet, by dotted key."""
+    options: tuple[Option, ...]
+    impossible: tuple[Impossible, ...]
+
+    @property
+    def recommended(self) -> Option | None:
+        """The option to take; None when there is no plan for the goal."""
+        return next((option for option in self.options if option.recommended), None)
+
+    def all_changes(self, option: Option) -> Changes:
+        """What turns the profile as it was read into an option."""
+        return {**self.wanted, **option.changes}
+
+
+def plan(
+    profile: Profile,
+    *,
+    wanted: Mapping[str, Value] | None = None,
+    circle: Circle | None = None,
+    max_circles: int = MAX_CIRCLES,
+) -> Plan:
+    """Find what to set.
+
+    The recommended option is the first, in the order of `advice` (nothing, gap count, slice ratio, both, period, period
+    and gap count; with them what the standard's own limits demand), after which the goal fits under both timing models
+    with a safe gap count, and passes the circle test. It changes nothing that was asked for, and never the number of
+    nodes. The other options are found under the timing model that decides.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    wanted
+        What is asked for, by dotted key: {"bus.nodes": 6}.
+    circle
+        The circle test; without it no circle is run.
+    max_circles
+        How many periods in a row are tried for the circle before the search takes longer strides [1].
+
+    Returns
+    -------
+    Plan
+        The options, those that do not exist with the reason, and the one to take.
+
+    Raises
+    ------
+    BusplanError
+        A value that the profile's schema refuses.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> found = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
+    >>> found.recommended.changes, round(found.recommended.deciding.margin_us, 1)
+    ({'bus.gap_count': 10}, 143.1)
+    """
+    asked = dict(wanted or {})
+    goal = override(profile, dict(asked))
+    planner = _Planner(goal, circle=circle, max_circles=max_circles)
+    found = list(planner.options())
+    options = [one for one in found if isinstance(one, Option)]
+    recommended = planner.recommended(keep={"bus.nodes", *asked})
+    if recommended is not None:
+        same = next((number for number, one in enumerate(options) if one.changes == recommended.changes), None)
+        if same is None:
+            options.append(recommended)
+        else:
+            options[same] = options[same]._replace(recommended=True)
+    return Plan(
+        profile=profile,
+        goal=goal,
+        wanted=_differing(profile, asked),
+        options=tuple(options),
+        impossible=tuple(one for one in found if isinstance(one, Impossible)),
+    )
+
+
+def nodes_for_axes(profile: Profile, axes: int) -> int:
+    """Nodes that so many axes need, at the profile's axes of each."""
+    return -(-axes // profile.node.axes)
+
+
+def _differing(profile: Profile, changes: Changes) -> Changes:
+    """The changes that a profile does not hold already."""
+    return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
+
+
+class _Planner:
+    """Makes the options of one goal."""
+
+    def __init__(self, goal: Profile, *, circle: Circle | None, max_circles: int) -> None:
+        self.goal = goal
+        self.model = goal.bus.timing_model
+        self.circle = circle
+        self.max_circles = max_circles
+
+    def options(self) -> Iterator[Option | Impossible]:
+        """The best value of each setting under the model that decides."""
+        goal, bus = self.goal, self.goal.bus
+        yield self.option("as it is", {})
+        safe = safe_gap_count(bus.hops(bus.nodes))
+        best_gap: Changes = {}
+        if bus.cable_is_standard:
+            best_gap = {"bus.gap_count": safe} if bus.gap_count_for(bus.nodes) != safe else {}
+            yield self.option("best gap count", best_gap, bounded_by="gap table")
+        else:
+            yield Impossible("best gap count", f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
+        yield self.period("smallest period", {})
+        if best_gap:
+            yield self.period("smallest period, best gap count", best_gap)
+        yield self.ratio("smallest slice ratio")
+        yield self.payload("largest payload")
+        yield self.nodes("most nodes", goal)
+        if bus.cable_is_standard and bus.gap_count != "optimal":
+            yield self.nodes("most nodes, best gap count", override(goal, {"bus.gap_count": "optimal"}))
+
+    def recommended(self, *, keep: set[str]) -> Option | None:
+        """The cheapest change that makes a plan, of those that leave some keys alone."""
+        for change in changes_to_fit(self.goal, models=BOTH_MODELS):
+            changes = dict(change.changes)
+            if keep & set(changes):
+                continue
+            bounded_by, proven = None, True
+            if "cycle.period_us" in changes:
+                del changes["cycle.period_us"]
+                found = smallest_period(
+                    override(self.goal, dict(changes)),
+                    models=BOTH_MODELS,
+                    circle=self.circle,
+                    max_circles=self.max_circles,
+                )
+                if found.period_us is None:
+                    continue
+                changes["cycle.period_us"] = found.period_us
+                bounded_by, proven = found.bounded_by, found.proven
+            option = self.option("cheapest that meets both models", changes, bounded_by=bounded_by, proven=proven)
+            if option.is_plan:
+                return option._replace(recommended=True)
+        return None
+
+    def option(self, title: str, changes: Changes, *, bounded_by: Bound | None = None, proven: bool = True) -> Option:
+        """Put changes into the goal and compute what they bring."""
+        changed = override(self.goal, dict(changes))
+        deciding = figures(changed, model=self.model)
+        (other,) = (model for model in BOTH_MODELS if model != self.model)
+        return Option(
+            title=title,
+            changes=changes,
+            profile=changed,
+            deciding=deciding,
+            other=figures(changed, model=other),
+            bounded_by=bounded_by,
+            circle_failures=self.circle(changed) if self.circle and deciding.fits else None,
+            proven=proven,
+        )
+
+    def fitting(self, title: str, changes: Changes, *, bounded_by: Bound, proven: bool = True) -> Option | Impossible:
+        """An option, unless it still does not fit."""
+        broken = broken_limits(override(self.goal, dict(changes)))
+        if broken:
+            return Impossible(title, f"the standard's limit of {' and '.join(broken)} is broken")
+        return self.option(title, changes, bounded_by=bounded_by, proven=proven)
+
+    def period(self, title: str, changes: Changes) -> Option | Impossible:
+        changed = override(self.goal, dict(changes))
+        if broken_limits(changed):
+            return self.fitting(title, changes, bounded_by="time")
+        found = smallest_period(changed, models=[self.model], circle=self.circle, max_circles=self.max_circles)
+        if found.period_us is None:
+            reason = "no period passes the circle" if found.bounded_by == "circle" else "it would be over 1000 s"
+            return Impossible(title, reason, found.proven)
+        changes = {**changes, "cycle.period_us": found.period_us}
+        return self.fitting(title, changes, bounded_by=found.bounded_by, proven=found.proven)
+
+    def ratio(self, title: str) -> Option | Impossible:
+        ratio = smallest_ratio(self.goal, models=[self.model])
+        if ratio > 1:
+            needed_us = required_us(self.goal, models=[self.model])
+            return Impossible(title, f"the cycle needs {needed_us:.3f} us, more than the whole period")
+        return self.fitting(title, {"cycle.slice_ratio": ratio}, bounded_by="time")
+
+    def payload(self, title: str) -> Option | Impossible:
+        size, bounded_by = largest_payload(self.goal, model=self.model)
+        if not size:
+            reason = (
+                "the execution table holds no whole quadlets"
+                if bounded_by == "execution"
+                else "not even the smallest fits"
+            )
+            return Impossible(title, reason)
+        changes: Changes = {"payload.read_bytes": size, "payload.write_bytes": size}
+        return self.fitting(title, changes, bounded_by=bounded_by)
+
+    def nodes(self, title: str, profile: Profile) -> Option | Impossible:
+        nodes, bounded_by = most_nodes(profile, model=self.model)
+        if not nodes:
+            reason = "no node fits" if bounded_by == "time" else f"limited by {bounded_by}"
+            return Impossible(title, reason)
+        changes: Changes = {"bus.nodes": nodes}
+        if profile.bus.gap_count != self.goal.bus.gap_count:
+            changes["bus.gap_count"] = safe_gap_count(self.goal.bus.hops(nodes))
+        return self.fitting(title, changes, bounded_by=bounded_by)

@@ -1,0 +1,1 @@
+"""The same figures over a grid of values."""

@@ -1,0 +1,125 @@
+"""Circle tests over a grid: one for each point and timing model, in any order and in any process."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.circle.roundness import circle_test
+from busplan.analysis.circle.setup import bus, loop_timing, setup
+from busplan.analysis.sweep.blocks import FIGURES, Block, Column
+from busplan.analysis.sweep.grid import Grid
+from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.errors import BusplanError
+from busplan.profile.model import Profile
+from busplan.profile.toml import override
+
+CIRCLE_FIGURES: Final = (
+    "mean_contour_error_mm",
+    "max_contour_error_mm",
+    "circular_deviation_mm",
+    "phase_margin_deg",
+    "gain_margin_db",
+    "passed",
+)
+"""Columns that circle tests add, by their names in `circle-test`."""
+MAX_CIRCLES: Final = 1000
+"""Circle tests that are run without being asked twice: minutes with numba, an hour without."""
+
+Figures = tuple[float | bool | None, ...]
+
+
+def all_columns(grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
+    """All columns of a sweep: the varied keys, the figures of `capacity`, and those of circle tests."""
+    return (*grid.axes, *FIGURES, *(CIRCLE_FIGURES if with_circle else ()))
+
+
+class CircleTask(NamedTuple):
+    """One point's circle tests; a process can be handed it."""
+
+    profile: Profile
+    changes: dict[str, object]
+    timing_models: tuple[TimingModelName, ...]
+
+
+def run_task(task: CircleTask) -> list[Figures]:
+    """Run the circle test of a point under each timing model, as if that model decided."""
+    found: dict[TimingModelName, Figures] = {}
+    on_node: Figures | None = None
+    for model in task.timing_models:
+        profile = override(task.profile, {**task.changes, "bus.timing_model": model})
+        if on_node is not None and bus(profile).fits:
+            found[model] = on_node
+            continue
+        (result,) = circle_test(profile, explain=False).results
+        found[model] = tuple(getattr(result, name) for name in CIRCLE_FIGURES)
+        if result.bus_fits and result.loop == "node":
+            # Such a loop knows nothing of the bus but whether it fits: the next model's circle is the same.
+            on_node = found[model]
+    return [found[model] for model in task.timing_models]
+
+
+def require_circles(profile: Profile, grid: Grid) -> None:
+    """Refuse a grid with a point that has no circle test, before any is run.
+
+    Raises
+    ------
+    BusplanError
+        The first such point, with the reason: its period is no multiple of the step, the drive cannot reach the feed,
+        or the circle is too short for its ramps.
+    """
+    for chunk in grid.chunks(1):
+        changes = chunk.point(0)
+        variant = override(profile, changes)
+        try:
+            # No model carries it: it has an answer, but no circle.
+            carried = any(figures(variant, model=model).fits for model in ("paper", "standard"))
+            _ = setup(variant) if carried else loop_timing(variant)
+        except BusplanError as error:
+            point = ", ".join(f"{key} = {value}" for key, value in changes.items())
+            raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None
+
+
+def with_circles(
+    profile: Profile,
+    block: Block,
+    *,
+    timing_models: Sequence[TimingModelName],
+    run: Callable[[Iterable[CircleTask]], Iterable[list[Figures]]],
+) -> Block:
+    """Add the columns of circle tests to a block.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    block
+        Its capacity.
+    timing_models
+        The models that it was computed under.
+    run
+        Runs `run_task` for each task, here or in other processes, and keeps their order.
+    """
+    models = tuple(timing_models)
+    tasks = (CircleTask(profile, block.chunk.point(index), models) for index in range(block.chunk.points))
+    results = list(run(tasks))
+    return block._replace(
+        models=tuple(
+            {
+                **figures,
+                **{
+                    name: Column(_array([point[number][place] for point in results]).reshape(block.chunk.shape))
+                    for place, name in enumerate(CIRCLE_FIGURES)
+                },
+            }
+            for number, figures in enumerate(block.models)
+        )
+    )
+
+
+def _array(values: Sequence[Any]) -> Any:
+    """Truths as they are, and numbers with NaN for what was not simulated or does not exist."""
+    if all(isinstance(value, bool) for value in values):
+        return np.array(values, dtype=bool)
+    return np.array([np.nan if value is None else value for value in values], dtype=float)

@@ -1,0 +1,1 @@
+"""One cycle as events, one behind the other."""

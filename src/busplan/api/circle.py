@@ -1,0 +1,108 @@
+"""`busplan.circle_test`."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from busplan.analysis.circle import roundness as analysis
+from busplan.analysis.circle.contour_profile import contour_profile
+from busplan.analysis.circle.roundness import CircleFigures, CircleTest
+from busplan.api.answer import Answer
+from busplan.api.inputs import ProfileLike, items, load_profile
+from busplan.profile.model import Profile
+from busplan.report import documents
+from busplan.report.circle import PLOT_SECTORS, circle_lines
+from busplan.report.lines import Line
+from busplan.report.text import to_json
+from busplan.servo.circle import CircleRun
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class CircleTestAnswer(Answer):
+    """Answer of `circle_test`.
+
+    Parameters
+    ----------
+    profile
+        The network, its servo and its circle.
+    results
+        Figures of each period; what was not simulated is None.
+    runs
+        The simulation of each period, with its `trace`; None where the bus does not carry the cycle.
+    with_contributions
+        Whether the document and the report rank the error sources.
+    """
+
+    profile: Profile
+    results: tuple[CircleFigures, ...]
+    runs: tuple[CircleRun | None, ...]
+    with_contributions: bool
+
+    @property
+    def passed(self) -> bool:
+        """Whether every period holds every tolerance."""
+        return self._found.passed
+
+    def to_json(self) -> str:
+        """Write the document of `busplan circle-test --format json`."""
+        return to_json(documents.circle_document(self._found, with_contributions=self.with_contributions))
+
+    def _report(self) -> list[Line]:
+        profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in self.runs]
+        return circle_lines(self._found, profiles, with_contributions=self.with_contributions)
+
+    @property
+    def _found(self) -> CircleTest:
+        return CircleTest(self.profile, self.results, self.runs)
+
+
+def circle_test(
+    profile: ProfileLike,
+    *,
+    periods_us: Iterable[float] | None = None,
+    with_contributions: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> CircleTestAnswer:
+    """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
+
+    Parameters
+    ----------
+    profile
+        The network, its servo and its circle: a `Profile`, a path or a shipped name.
+    periods_us
+        Communication periods T_s [us], shape (n,); without them the profile's own.
+    with_contributions
+        Remove each error source in turn and rank them.
+    progress
+        Called now and then with the steps simulated so far and those known to be needed.
+
+    Returns
+    -------
+    CircleTestAnswer
+        Its `results` and `runs` have n entries. Errors are in mm, margins in deg and dB.
+
+    Raises
+    ------
+    BusplanError
+        No profile, a period that is no multiple of the step, a feed that the drive cannot reach, or a circle too short
+        for its ramps.
+
+    References
+    ----------
+    ISO 230-4 for the measures; the paper's section IV-B for the test.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.circle_test("paper-4ms")
+    >>> answer.passed, round(answer.results[0].max_contour_error_mm, 6)
+    (True, 0.018967)
+    >>> answer.runs[0].trace(every=10).contour_error_mm.shape
+    (48656,)
+    """
+    found = analysis.circle_test(
+        load_profile(profile),
+        periods_us=None if periods_us is None else items(periods_us, name="periods_us"),
+        with_contributions=with_contributions,
+        progress=progress,
+    )
+    return CircleTestAnswer(*found, with_contributions=with_contributions)

@@ -1,0 +1,162 @@
+"""`busplan circle-test`."""
+
+import os
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, BinaryIO
+
+import typer
+
+from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
+from busplan.cli.output import NewFile, PlanFailsError, emit, emit_text, new_file, say
+from busplan.cli.progress import progress_bar
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.analysis.circle.roundness import CircleTest
+
+_OPTIONS = {"circle.feed_mm_per_min": "--feed", "circle.radius_mm": "--radius", "delivery.seed": "--seed"}
+
+
+def circle_test_command(
+    profile: ProfileArgument,
+    period: PeriodsOption = None,
+    feed: Annotated[
+        float | None,
+        typer.Option(
+            "--feed",
+            metavar="MM_PER_MIN",
+            help="Speed along the circle [mm/min].  [default: the profile's circle.feed_mm_per_min]",
+        ),
+    ] = None,
+    radius: Annotated[
+        float | None,
+        typer.Option(
+            "--radius", metavar="MM", help="Radius of the circle [mm].  [default: the profile's circle.radius_mm]"
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed",
+            metavar="N",
+            help="Seed of jitter and lost set-points: the same seed, the same run.  "
+            "[default: the profile's delivery.seed]",
+        ),
+    ] = None,
+    contributions: Annotated[
+        bool, typer.Option("--contributions", help="Rank the error sources: test again without each in turn.")
+    ] = False,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            "--trace",
+            metavar="FILE.csv",
+            help="Write time [us], commanded and actual position [mm] and contour error [mm] as CSV; an old file is "
+            "replaced.  [default: no file]",
+        ),
+    ] = None,
+    every: Annotated[
+        int | None,
+        typer.Option("--every", metavar="N", help="Write one of N steps of the simulation to --trace.  [default: 10]"),
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Draw the magnified polar error and the error over time into FILE.png, FILE.svg or FILE.pdf; an old "
+            "file is replaced. Needs the extra plot (matplotlib).  [default: no figure]",
+        ),
+    ] = None,
+    format_: FormatOption = "table",
+) -> None:
+    """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
+
+    First the bus: a cycle that does not fit its period fails the test before any simulation. Then stability: a loop
+    without its phase and gain margin fails, however round its circle. Then the tolerances of the profile. Errors are
+    in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4. Exits 0 when every
+    tolerance holds and 1 when one does not.
+
+    Example: busplan circle-test paper-4ms --contributions
+    """
+    if every is not None and trace is None:
+        raise BusplanError("--every: goes with --trace FILE.csv")
+    if every is not None and every < 1:
+        raise BusplanError(f"--every {every}: must be 1 or more")
+    _require_two_files(trace, plot)
+    file_format = None if plot is None else plot_format(plot)
+    from busplan.analysis.circle.roundness import circle_test
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    asked = {"circle.feed_mm_per_min": feed, "circle.radius_mm": radius, "delivery.seed": seed}
+    changes: dict[str, object] = {key: value for key, value in asked.items() if value is not None}
+    plan = override(load(profile).profile, changes, origin=_OPTIONS)
+    with ExitStack() as files:
+        # Opened before the simulation: a path that cannot be written is said at once.
+        trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
+        plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
+        with progress_bar("circle test") as progress:
+            test = circle_test(
+                plan,
+                periods_us=periods_us(period, plan),
+                with_contributions=contributions,
+                progress=progress,
+            )
+        if trace_file is not None:
+            _write_trace(test, trace_file, every=every or 10)
+        if plot_file is not None and file_format is not None:
+            _draw(test, plot_file, file_format=file_format)
+    _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
+    _emit(test, format_=format_, contributions=contributions)
+    if not test.passed:
+        raise PlanFailsError
+
+
+def _require_two_files(trace: Path | None, plot: Path | None) -> None:
+    if trace and plot and os.path.realpath(trace) == os.path.realpath(plot):
+        raise BusplanError(f"--trace {trace} and --plot {plot}: the same file; give two names")
+
+
+def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
+    """Draw what was simulated; where no period was, the old file stays as it is."""
+    if all(run is None for run in test.runs):
+        file.abandon()
+        return
+    from busplan.report.plot import circle_figure
+
+    file.write(circle_figure(test, file_format=file_format))
+
+
+def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
+    if trace is not None:
+        say(f"wrote {trace}")
+    if plot is not None:
+        say(f"wrote {plot}" if drawn else f"{plot}: not written, for no period fits the bus: nothing to draw")
+
+
+def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
+    from busplan.report.documents import TRACE_COLUMNS, trace_rows
+    from busplan.report.text import csv_blocks
+
+    file.writelines(block.encode() for block in csv_blocks(trace_rows(test, every=every), columns=TRACE_COLUMNS))
+
+
+def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
+    if format_ == "table":
+        from busplan.analysis.circle.contour_profile import contour_profile
+        from busplan.report.circle import PLOT_SECTORS, circle_lines
+
+        profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in test.runs]
+        emit(circle_lines(test, profiles, with_contributions=contributions))
+        return
+    from busplan.report import documents, text
+
+    emit_text(
+        text.to_json(documents.circle_document(test, with_contributions=contributions))
+        if format_ == "json"
+        else text.to_csv(
+            documents.with_profile(test.profile.name, documents.circle_rows(test, with_contributions=contributions))
+        )
+    )

@@ -1,0 +1,1 @@
+"""The sections that profiles of every kind of bus share."""
