@@ -46,13 +46,13 @@ if TYPE_CHECKING:
     from busplan.api.sweep import SweepAnswer, sweep
     from busplan.api.timeline import TimelineAnswer, timeline
     from busplan.errors import BusplanError
-    from busplan.profile.model import Profile
+    from busplan.sections.profile import Profile
 else:
     # Loaded when they are first asked for: the command line imports this package too, and must not pay. Type checkers
     # do not see it, so that a name that is not there stays an error to them.
     _HOMES = {
         "BusplanError": "busplan.errors",
-        "Profile": "busplan.profile.model",
+        "Profile": "busplan.sections.profile",
         "load_profile": "busplan.api.inputs",
         "CapacityAnswer": "busplan.api.capacity",
         "capacity": "busplan.api.capacity",

@@ -1,7 +1,8 @@
 """Numbers and equations that carry where they come from, and numbers how well they are known."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, Final, Literal, NamedTuple, Self, TypeVar
 
 Grade = Literal["published", "derived", "recalled", "measured", "calibrated", "assumed"]
@@ -28,6 +29,8 @@ class Sourced(float):
         Where it stands: equation, table, document.
     meaning
         What the number is, in one line.
+    symbol
+        What stands for it in formulas; without one its value does.
 
     Examples
     --------
@@ -38,21 +41,45 @@ class Sourced(float):
     'eqs (4)-(6)'
     """
 
-    __slots__ = ("grade", "meaning", "source", "unit")
+    __slots__ = ("grade", "meaning", "name", "source", "symbol", "unit")
 
     unit: str
     grade: Grade
     source: str
     meaning: str
+    symbol: str
+    name: str
+    """Its name among the constants of its module; until they are listed, what it means."""
 
-    def __new__(cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str) -> Self:
+    def __new__(cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str, symbol: str = "") -> Self:
         """Make the number; see the class."""
         number = super().__new__(cls, value)
         number.unit = unit
         number.grade = grade
         number.source = source
         number.meaning = meaning
+        number.symbol = symbol
+        number.name = meaning
         return number
+
+
+def constants(namespace: Mapping[str, Any]) -> Mapping[str, Sourced]:
+    """List the sourced numbers of a module by name, and tell each its name.
+
+    Parameters
+    ----------
+    namespace
+        The module's `globals()`: sourced numbers, and mappings of them.
+    """
+    found: dict[str, Sourced] = {}
+    for name, value in namespace.items():
+        if isinstance(value, Sourced):
+            found[name] = value
+        elif isinstance(value, MappingProxyType):
+            found |= {f"{name}[{key}]": one for key, one in value.items() if isinstance(one, Sourced)}
+    for name, number in found.items():
+        number.name = name
+    return MappingProxyType(found)
 
 
 class Equation(NamedTuple):
@@ -93,7 +120,9 @@ class Equation(NamedTuple):
 
 
 EQUATIONS: Final[dict[str, Equation]] = {}
-"""Every function that computes an equation, by its name, in the order of the source."""
+"""Every function that computes an equation, by its name; the modules of equations fill it."""
+SYMBOLS: Final[dict[str, str]] = {}
+"""What stands for a quantity in the equations, by its name here; the modules of equations fill it."""
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

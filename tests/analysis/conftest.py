@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import strategies as st
 
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 # By hand from the standard's gap-count table, 1 to 23 hops.
 GAP_COUNTS = [5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 48, 51, 54, 57, 59, 62]

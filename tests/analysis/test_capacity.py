@@ -12,7 +12,7 @@ from busplan.analysis.capacity.cycle import cycle, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures
 from busplan.analysis.capacity.node_limit import largest_nodes
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]

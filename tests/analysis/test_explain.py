@@ -24,7 +24,7 @@ from busplan.analysis.quantities import FIGURES
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.report.documents import capacity_document, latency_rows

@@ -6,7 +6,7 @@ import pytest
 
 from busplan.analysis.latency import latency
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 

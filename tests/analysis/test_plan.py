@@ -14,7 +14,7 @@ from busplan.analysis.planning.cures import MAX_ADVISED_RATIO
 from busplan.analysis.planning.options import plan
 from busplan.buses.ieee1394.timing import TIMING_MODELS
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 

@@ -15,7 +15,7 @@ from busplan.analysis.latency import BOTH_MODELS, phases
 from busplan.analysis.timeline.schedule import MOST_NODES, schedule, totals, zoom
 from busplan.buses.ieee1394.timing import TRANSACTION_KINDS
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 
 Maker = Callable[..., Profile]

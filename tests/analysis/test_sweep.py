@@ -17,7 +17,7 @@ from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.toml import override
 
 Make = Callable[..., Profile]

@@ -17,7 +17,7 @@ import pytest
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
 from busplan.analysis.sweep.grid import Chunk, Grid, Steps, checked_grid
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.toml import override
 
 MODELS = ("paper", "standard")

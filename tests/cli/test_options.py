@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from busplan.cli.options import bus_changes, complete_profile, parse_sizes, periods_us, timing_models
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 
 

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from busplan.errors import BusplanError
 from busplan.profile.document import Document
 from busplan.profile.edit import edited, edited_file
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 
 LINEAR = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}

@@ -9,8 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
-from busplan.profile.bus import Cycle, Ieee1394Bus, LinearExecution, Node, Payload, Sync, TableExecution
-from busplan.profile.model import Profile
+from busplan.buses.ieee1394.section import (
+    Ieee1394Bus,
+    Ieee1394CycleSection,
+    Ieee1394Payload,
+    Ieee1394Profile,
+    Sync,
+)
+from busplan.sections.cycle import NodeSection
+from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.profile import Profile
 
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
 
@@ -268,7 +276,16 @@ def test_every_default_is_a_value_that_the_schema_takes() -> None:
     assert Profile.model_validate(profile().model_dump()) == profile()
 
 
-SECTIONS = (Profile, Ieee1394Bus, Cycle, Sync, Payload, Node, LinearExecution, TableExecution)
+SECTIONS = (
+    Ieee1394Profile,
+    Ieee1394Bus,
+    Ieee1394CycleSection,
+    Sync,
+    Ieee1394Payload,
+    NodeSection,
+    LinearExecution,
+    TableExecution,
+)
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -276,7 +293,7 @@ def test_every_example_is_a_value_that_the_schema_takes(section: type[BaseModel]
     # Messages about a missing key show the first one.
     examples = {name: field.examples[0] for name, field in section.model_fields.items() if field.examples}
     sections = {"bus": data()["bus"], "cycle": data()["cycle"], "payload": data()["payload"], "node": data()["node"]}
-    rest = {Profile: sections, Node: {"execution": data()["node"]["execution"]}}
+    rest = {Ieee1394Profile: sections, NodeSection: {"execution": data()["node"]["execution"]}}
     assert section.model_validate({**examples, **rest.get(section, {})})
 
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text

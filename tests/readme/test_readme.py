@@ -17,7 +17,7 @@ from busplan.analysis.capacity.figures import CapacityFigures, capacity
 from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
 from busplan.analysis.latency import latency
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.report.documents import capacity_rows, latency_rows
 from busplan.report.explain import constant_rows, equation_rows

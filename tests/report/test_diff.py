@@ -11,7 +11,7 @@ from markdown_it import MarkdownIt
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.comparison.difference import CYCLE, PLAN, Difference, difference
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.changes import shown_value

@@ -19,7 +19,7 @@ from markdown_it import MarkdownIt
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.analysis.overview import Overview, overview
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.page.chapters import Subject, page

@@ -10,7 +10,7 @@ import pytest
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.latency import latency
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.report.capacity import capacity_lines

@@ -11,7 +11,7 @@ from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.sweep.blocks import FIGURES, Block, Column, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
 from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report import documents, text

@@ -12,7 +12,7 @@ from busplan.profile.document import Document
 from busplan.profile.toml import MAX_FILE_BYTES, decode
 from busplan.rules import bus
 from busplan.rules.gate import FileResult, check_document, unreadable
-from busplan.rules.registry import RULES
+from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport
 
 Changed = Callable[..., str]
@@ -211,7 +211,7 @@ def test_fingerprints_are_unique_and_do_not_move(changed: Changed, check: Check)
 def test_severities_decide_what_fails() -> None:
     def report(*codes: str) -> CheckReport:
         template = check_document(Document("a.toml", "x")).findings[0]
-        found = tuple(template._replace(code=code, severity=RULES[code].severity) for code in codes)
+        found = tuple(template._replace(code=code, severity=all_rules()[code].severity) for code in codes)
         return CheckReport((FileResult("a.toml", "a", found, {}, ("",) * len(found)),))
 
     assert not report().has_findings("warning")

@@ -1,33 +1,37 @@
-"""Latency of single transactions: a profile in, every phase under each timing model out."""
+"""Latency on the bus: a profile in, every part of what takes time under each timing model out."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
-from busplan.buses.ieee1394.timing import (
-    TIMING_MODELS,
-    TRANSACTION_KINDS,
-    Phases,
-    TimingModelName,
-    TransactionKind,
-    transaction,
-)
+from busplan.analysis.network import bus_of, model_names, network_of
+from busplan.buses.bus import BusLatency
 from busplan.errors import BusplanError
-from busplan.profile.bus import TableExecution
-from busplan.profile.model import Profile
-
-BOTH_MODELS: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)
+from busplan.sections.base import with_unchecked
+from busplan.sections.execution import TableExecution
+from busplan.sections.profile import Profile
 
 
 class Transaction(NamedTuple):
-    """One transaction of the farthest node, taken apart."""
+    """One thing that takes time on the bus, taken apart: a read or a write of the farthest node, or a whole cycle."""
 
-    timing_model: TimingModelName
-    transaction: TransactionKind
-    payload_bytes: int
+    timing_model: str
+    transaction: str
+    payload_bytes: int | None
     nodes: int
-    hops: int
-    gap_count: int
-    phases: Phases
+    figures: Mapping[str, Any]
+    """Its figures by key, as the register of the bus has them."""
+
+    def __getattr__(self, key: str) -> Any:
+        # Only what is no field comes here.
+        if key in self.figures:
+            return self.figures[key]
+        raise AttributeError(f"{self.transaction} has no figure {key!r}")
+
+    @property
+    def phases(self) -> SimpleNamespace:
+        """Its figures as attributes."""
+        return SimpleNamespace(**self.figures)
 
 
 class LatencyResult(NamedTuple):
@@ -41,18 +45,18 @@ def latency(
     profile: Profile,
     *,
     payloads_bytes: Sequence[int] | None = None,
-    timing_models: Sequence[TimingModelName] = BOTH_MODELS,
+    timing_models: Sequence[str] | None = None,
 ) -> LatencyResult:
-    """Take the read and the write of a profile apart.
+    """Take what a profile sends apart.
 
     Parameters
     ----------
     profile
-        The network; the transaction is that of its farthest node.
+        The network; a transaction is that of its farthest node.
     payloads_bytes
         Payloads of both read and write [bytes]; without them the profile's own.
     timing_models
-        Which timing models, in this order.
+        Which timing models, in this order; without them all of the kind of bus.
 
     Returns
     -------
@@ -68,67 +72,27 @@ def latency(
     ----------
     Paper, equations (3)-(10), (12)-(14).
     """
-    own = {"read": profile.payload.read_bytes, "write": profile.payload.write_bytes}
-    wanted: list[tuple[TransactionKind, int]] = (
-        [(kind, own[kind]) for kind in TRANSACTION_KINDS]
-        if payloads_bytes is None
-        else [(kind, size) for size in payloads_bytes for kind in TRANSACTION_KINDS]
-    )
-    _require_execution(profile, [size for _, size in wanted])
+    models = model_names(profile) if timing_models is None else timing_models
+    _require_execution(profile, payloads_bytes or ())
+    variants = [profile] if payloads_bytes is None else [with_payload(profile, size) for size in payloads_bytes]
     return LatencyResult(
         profile.name,
         tuple(
-            Transaction(
-                timing_model=model,
-                transaction=kind,
-                payload_bytes=size,
-                nodes=profile.bus.nodes,
-                hops=profile.bus.hops(profile.bus.nodes),
-                gap_count=profile.bus.gap_count_for(profile.bus.nodes),
-                phases=phases(profile, kind, model=model, payload_bytes=size),
-            )
-            for kind, size in wanted
-            for model in timing_models
+            Transaction(model, one.name, one.payload_bytes, profile.bus.nodes, one.phases)
+            for variant in variants
+            for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
+            for model, one in zip(models, alike, strict=True)
         ),
     )
 
 
-def phases(
-    profile: Profile,
-    kind: TransactionKind,
-    *,
-    model: TimingModelName,
-    payload_bytes: int,
-    nodes: int | None = None,
-) -> Phases:
-    """Phases of one transaction of a profile's farthest node.
+def with_payload(profile: Profile, size_bytes: int) -> Profile:
+    """A profile with another payload of read and write alike, not checked [bytes]."""
+    return with_unchecked(with_unchecked(profile, "payload.read_bytes", size_bytes), "payload.write_bytes", size_bytes)
 
-    Parameters
-    ----------
-    profile
-        The network.
-    kind
-        "read" or "write".
-    model
-        Timing model.
-    payload_bytes
-        Payload [bytes].
-    nodes
-        Nodes on the bus [1]; without it the profile's own number.
 
-    Raises
-    ------
-    ValueError
-        The execution time of that payload is not known (`latency` and the profile have checked).
-    """
-    return transaction(
-        kind,
-        model=TIMING_MODELS[model],
-        link=profile.bus.link(profile.bus.nodes if nodes is None else nodes),
-        payload_bytes=payload_bytes,
-        overhead_bytes=profile.payload.overhead_bytes,
-        execution_us=profile.node.execution.execution_us(payload_bytes),
-    )
+def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:
+    return bus_of(profile).cycle(network_of(profile), model=model).latencies()
 
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:

@@ -9,11 +9,12 @@ from busplan.analysis.circle.contour_profile import ContourProfile, contour_prof
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, Progress, circle_test
 from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.trace import Input
-from busplan.analysis.latency import BOTH_MODELS, LatencyResult, latency
+from busplan.analysis.latency import LatencyResult, latency
+from busplan.analysis.network import model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+from busplan.sections.profile import Profile
 
 CONTOUR_SECTORS: Final = 720
 """Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""
@@ -75,7 +76,7 @@ def overview(profile: Profile, *, with_circle: bool = True, progress: Progress |
         latency=latency(profile),
         schedule=plan,
         no_schedule=no_schedule,
-        steps=tuple(node_steps(profile, model=model) for model in BOTH_MODELS),
+        steps=tuple(node_steps(profile, model=model) for model in model_names(profile)),
         periods=capacity(profile, periods_us=periods_us),
         circle=circle,
         contour=contour,

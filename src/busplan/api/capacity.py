@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from busplan.analysis.capacity import figures as analysis
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict, verdicts
-from busplan.analysis.latency import BOTH_MODELS
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
 from busplan.report import documents
 from busplan.report.capacity import capacity_lines
 from busplan.report.lines import Line
 from busplan.report.text import to_json
+from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -56,7 +54,7 @@ def capacity(
     profile: ProfileLike,
     *,
     periods_us: Iterable[float] | None = None,
-    timing_models: Iterable[TimingModelName] = BOTH_MODELS,
+    timing_models: Iterable[str] | None = None,
 ) -> CapacityAnswer:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
@@ -67,7 +65,8 @@ def capacity(
     periods_us
         Communication periods T_s [us], shape (n,); without them the profile's own.
     timing_models
-        "paper" for the paper's equations as published, "standard" for the standard's clock and packets, in this order.
+        Names of timing models, in this order; without them all of the kind of bus. IEEE 1394 has "paper" for the
+        paper's equations as published, and "standard" for the standard's clock and packets.
 
     Returns
     -------
@@ -92,9 +91,10 @@ def capacity(
     >>> answer.verdicts[0].change.changes
     {'bus.gap_count': 7}
     """
+    network = load_profile(profile)
     found = analysis.capacity(
-        load_profile(profile),
+        network,
         periods_us=None if periods_us is None else items(periods_us, name="periods_us"),
-        timing_models=checked_models(timing_models),
+        timing_models=checked_models(timing_models, network),
     )
     return CapacityAnswer(*found, verdicts=verdicts(found))

@@ -8,11 +8,11 @@ from busplan.analysis.circle.contour_profile import contour_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, items, load_profile
-from busplan.profile.model import Profile
 from busplan.report import documents
 from busplan.report.circle import PLOT_SECTORS, circle_lines
 from busplan.report.lines import Line
 from busplan.report.text import to_json
+from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
 
 

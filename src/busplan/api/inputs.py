@@ -5,13 +5,13 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-from busplan.analysis.latency import BOTH_MODELS
-from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.analysis.network import model_names
+from busplan.analysis.planning.cures import listed
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT
+from busplan.sections.profile import Profile
 
 Path = str | os.PathLike[str]
 """A text may also be the name of a shipped profile; a path object is always a path."""
@@ -99,17 +99,22 @@ def items(values: Iterable[Any], *, name: str) -> list[Any]:
     return found
 
 
-def checked_models(timing_models: Iterable[TimingModelName]) -> tuple[TimingModelName, ...]:
-    """Timing models, each once.
+def checked_models(timing_models: Iterable[str] | None, profile: Profile) -> tuple[str, ...]:
+    """Timing models, each once; without any all of the profile's kind of bus.
 
     Raises
     ------
     BusplanError
         Others, or one twice.
     """
+    known = model_names(profile)
+    if timing_models is None:
+        return known
     found = items(timing_models, name="timing_models")
-    if sorted(map(str, found)) not in (["paper"], ["standard"], sorted(BOTH_MODELS)):
-        raise BusplanError(f"timing_models {found!r}: expected 'paper', 'standard' or both, in a list")
+    if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(known):
+        raise BusplanError(
+            f"timing_models {found!r}: expected {listed([*map(repr, known)], 'or')}, each once, in a list"
+        )
     return tuple(found)
 
 

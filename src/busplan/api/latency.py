@@ -4,15 +4,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.analysis import latency as analysis
-from busplan.analysis.latency import BOTH_MODELS, Transaction
+from busplan.analysis.latency import Transaction
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
 from busplan.report import documents
 from busplan.report.latency import latency_lines
 from busplan.report.lines import Line, plural
 from busplan.report.text import to_json
+from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -49,7 +48,7 @@ def latency(
     profile: ProfileLike,
     *,
     payloads_bytes: Iterable[int] | None = None,
-    timing_models: Iterable[TimingModelName] = BOTH_MODELS,
+    timing_models: Iterable[str] | None = None,
 ) -> LatencyAnswer:
     """Show every phase of one read and one write of the farthest node.
 
@@ -60,7 +59,8 @@ def latency(
     payloads_bytes
         Payloads of both read and write [bytes], shape (n,); without them the profile's own of each.
     timing_models
-        "paper" for the paper's equations as published, "standard" for the standard's clock and packets, in this order.
+        Names of timing models, in this order; without them all of the kind of bus. IEEE 1394 has "paper" for the
+        paper's equations as published, and "standard" for the standard's clock and packets.
 
     Returns
     -------
@@ -88,6 +88,6 @@ def latency(
     found = analysis.latency(
         network,
         payloads_bytes=sizes and [whole(size, name="payloads_bytes") for size in sizes],
-        timing_models=checked_models(timing_models),
+        timing_models=checked_models(timing_models, network),
     )
     return LatencyAnswer(network, found.transactions)

@@ -5,15 +5,15 @@ from typing import Literal
 
 from busplan.analysis.planning import options as analysis
 from busplan.analysis.planning.best_values import MAX_CIRCLES
-from busplan.analysis.planning.cures import Value
 from busplan.analysis.planning.options import Impossible, Option, Plan
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
+from busplan.buses.bus import Value
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
 from busplan.report.lines import Line
 from busplan.report.plan import plan_document, plan_lines
 from busplan.report.text import to_json
+from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)

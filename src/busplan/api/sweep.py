@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.network import bus_of
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Block, Column
@@ -14,13 +14,13 @@ from busplan.analysis.sweep.circles import MAX_CIRCLES, all_columns, require_cir
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
-from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.profile.kinds import words_of
 from busplan.report.lines import Line
 from busplan.report.sweep.rows import json_footer, json_header, json_rows
 from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
 from busplan.report.text import csv_cell
+from busplan.sections.profile import Profile
 
 MOST_POINTS: Final = 2_000_000
 """Points that are kept in memory: about half a gigabyte. The command line writes any number of them in flat memory."""
@@ -51,7 +51,7 @@ class SweepAnswer(Answer):
 
     profile: Profile
     grid: Grid
-    timing_models: tuple[TimingModelName, ...]
+    timing_models: tuple[str, ...]
     columns: tuple[str, ...]
     blocks: tuple[Block, ...]
 
@@ -89,7 +89,7 @@ class SweepAnswer(Answer):
 
     @property
     def _tally(self) -> Tally:
-        tally = Tally(self.timing_models)
+        tally = Tally(bus_of(self.profile), self.timing_models)
         for block in self.blocks:
             tally.add(block)
         return tally
@@ -112,7 +112,7 @@ def sweep(
     profile: ProfileLike,
     *,
     vary: Mapping[str, str | Iterable[Any]],
-    timing_models: Iterable[TimingModelName] = BOTH_MODELS,
+    timing_models: Iterable[str] | None = None,
     with_circle: bool = False,
     force: bool = False,
 ) -> SweepAnswer:
@@ -124,9 +124,10 @@ def sweep(
         The network: a `Profile`, a path or a shipped name.
     vary
         Values by dotted key, in the key's unit: a list, range or array of shape (n,), or the command line's text as
-        "250:8000:250". "bus.gap_count" also takes "optimal". The last key changes fastest.
+        "250:8000:250". Words that a key takes, as "optimal", may be among them. The last key changes fastest.
     timing_models
-        "paper" for the paper's equations as published, "standard" for the standard's clock and packets, in this order.
+        Names of timing models, in this order; without them all of the kind of bus. IEEE 1394 has "paper" for the
+        paper's equations as published, and "standard" for the standard's clock and packets.
     with_circle
         Also run the circle test of every point, one after the other, and add its columns (errors in mm, margins).
     force
@@ -157,14 +158,15 @@ def sweep(
     >>> answer["limited_by"].tolist(), len(answer)
     (['time', 'time', 'time'], 3)
     """
-    network, models = load_profile(profile), checked_models(timing_models)
+    network = load_profile(profile)
+    models = checked_models(timing_models, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
     grid = checked_grid(
         network,
-        {key: _values(key, given) for key, given in vary.items()},
+        {key: _values(network, key, given) for key, given in vary.items()},
         with_circle=with_circle,
         option="vary",
         circle_option="with_circle=True",
@@ -178,14 +180,19 @@ def sweep(
     if with_circle:
         _require_circles(network, grid, force=force)
         blocks = (with_circles(network, block, timing_models=models, run=_run_here) for block in blocks)
-    return SweepAnswer(network, grid, models, all_columns(grid, with_circle=with_circle), tuple(blocks))
+    return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=with_circle), tuple(blocks))
 
 
-def _values(key: str, given: str | Iterable[Any]) -> Values:
+def _values(profile: Profile, key: str, given: str | Iterable[Any]) -> Values:
+    words = words_of(profile.bus.kind, key)
     if isinstance(given, str):
-        return parse_values(given, name=f"vary {key}={given}")
+        return parse_values(given, name=f"vary {key}={given}", words=words)
     name = f"vary {key}"
-    return stepped(given, name=name) if isinstance(given, range) else listed(items(given, name=name), name=name)
+    return (
+        stepped(given, name=name)
+        if isinstance(given, range)
+        else listed(items(given, name=name), name=name, words=words)
+    )
 
 
 def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:

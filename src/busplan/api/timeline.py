@@ -7,13 +7,12 @@ from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule, totals, zoom
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
-from busplan.buses.ieee1394.timing import TimingModelName, TransactionKind
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
 from busplan.report.lines import Line
 from busplan.report.text import to_json
 from busplan.report.timeline.documents import timeline_document
 from busplan.report.timeline.terminal import timeline_lines
+from busplan.sections.profile import Profile
 
 _COLUMNS: Final = 80
 """Width of the drawing."""
@@ -66,10 +65,10 @@ class TimelineAnswer(Answer):
 def timeline(
     profile: ProfileLike,
     *,
-    timing_model: TimingModelName | None = None,
+    timing_model: str | None = None,
     from_us: float | None = None,
     to_us: float | None = None,
-    transaction: tuple[TransactionKind, int] | None = None,
+    transaction: tuple[str, int] | None = None,
 ) -> TimelineAnswer:
     """Show one communication cycle as events, node by node.
 
@@ -78,7 +77,7 @@ def timeline(
     profile
         The network: a `Profile`, a path or a shipped name.
     timing_model
-        "paper" or "standard"; without it the profile's own, which decides.
+        Name of a timing model, as "standard"; without it the profile's own, which decides.
     from_us, to_us
         Start and end of the window, counted from the start of the cycle [us]; without them the cycle's own.
     transaction
@@ -105,8 +104,9 @@ def timeline(
     >>> [(one.kind, round(one.duration_us, 3)) for one in answer.events][:3]
     [('arbitration', 2.388), ('request_data', 0.768), ('acknowledge', 0.367)]
     """
-    model = None if timing_model is None else checked_models([timing_model])[0]
-    plan = schedule(load_profile(profile), model=model)
+    network = load_profile(profile)
+    model = None if timing_model is None else checked_models([timing_model], network)[0]
+    plan = schedule(network, model=model)
     window = zoom(
         plan,
         from_us=None if from_us is None else finite(from_us, name="from_us"),
@@ -116,8 +116,8 @@ def timeline(
     return TimelineAnswer(*window)
 
 
-def _one(transaction: object) -> tuple[TransactionKind, int]:
+def _one(transaction: object) -> tuple[str, int]:
     match transaction:
-        case ("read" | "write" as kind, node):
+        case (str() as kind, node):
             return kind, whole(node, name="transaction")
     raise BusplanError(f'transaction {transaction!r}: expected one of one node, as ("read", 1)')

@@ -6,11 +6,20 @@ from typing import Annotated, Literal
 import typer
 
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, NodesOption, ProfileArgument, bus_changes
+from busplan.cli.options import (
+    NO_CHANGES,
+    Changes,
+    FormatOption,
+    ProfileArgument,
+    load_changed,
+    takes_bus_options,
+    timing_model,
+)
 from busplan.cli.output import emit, emit_text, say
 from busplan.errors import BusplanError
 
 
+@takes_bus_options
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -30,9 +39,10 @@ def calibrate_command(
         ),
     ] = None,
     timing: Annotated[
-        Literal["paper", "standard"] | None,
+        str | None,
         typer.Option(
             "--timing",
+            metavar="MODEL",
             help="Timing model that says what the packets take.  [default: the profile's bus.timing_model]",
             show_default=False,
         ),
@@ -45,8 +55,7 @@ def calibrate_command(
             "through these medians instead of least squares.",
         ),
     ] = False,
-    nodes: NodesOption = None,
-    gap_count: GapCountOption = None,
+    changes: Changes = NO_CHANGES,
     apply: Annotated[
         bool,
         typer.Option(
@@ -75,17 +84,17 @@ def calibrate_command(
         require_own_file(profile)
     from busplan.analysis.calibration.calibrate import calibrate
     from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
-    from busplan.profile.shipped import load, locate_measurements
-    from busplan.profile.toml import override, read_bytes
+    from busplan.profile.shipped import locate_measurements
+    from busplan.profile.toml import read_bytes
     from busplan.report import calibration as report
 
-    bench = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    bench = load_changed(profile, changes)
     path, name, shipped = locate_measurements(measurements)
     result = calibrate(
         bench,
         parse_measurements(read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES), name=name),
         source=name,
-        timing_model=timing,
+        timing_model=None if timing is None else timing_model(timing, bench),
         form=form,
         robust=robust,
         # The shipped example holds published figures: what is computed from them is derived.

@@ -1,25 +1,25 @@
 """`busplan capacity`."""
 
 from busplan.cli.options import (
-    BUS_OPTIONS,
+    NO_CHANGES,
+    Changes,
     FormatOption,
-    GapCountOption,
-    NodesOption,
     PeriodsOption,
     ProfileArgument,
     TimingOption,
-    bus_changes,
+    load_changed,
     periods_us,
+    takes_bus_options,
     timing_models,
 )
 from busplan.cli.output import emit, emit_text
 
 
+@takes_bus_options
 def capacity_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
-    nodes: NodesOption = None,
-    gap_count: GapCountOption = None,
+    changes: Changes = NO_CHANGES,
     timing: TimingOption = "both",
     format_: FormatOption = "table",
 ) -> None:
@@ -32,14 +32,12 @@ def capacity_command(
     """
     from busplan.analysis.capacity.figures import capacity
     from busplan.analysis.capacity.verdict import verdicts
-    from busplan.profile.shipped import load
-    from busplan.profile.toml import override
 
-    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    plan = load_changed(profile, changes)
     result = capacity(
         plan,
         periods_us=periods_us(period, plan),
-        timing_models=timing_models(timing),
+        timing_models=timing_models(timing, plan),
     )
     if format_ == "table":
         from busplan.report.capacity import capacity_lines

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from busplan.cli.options import TimingOption, complete_profile, timing_models
+from busplan.cli.options import ALL_MODELS, TimingOption, complete_profile, timing_models
 from busplan.cli.output import PlanFailsError, emit, emit_text, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from busplan.analysis.circle.roundness import CircleFigures, Progress
     from busplan.analysis.comparison.difference import Difference
-    from busplan.profile.model import Profile
+    from busplan.sections.profile import Profile
 
 
 def diff_command(
@@ -76,14 +76,19 @@ def diff_command(
     one, other = load_each((a, b), lambda argument: load_revision(argument).profile)
     with progress_bar("circle tests") as progress:
         test = _circle(progress) if circle else None
-        found = difference(one, other, timing_models=timing_models(timing), circle=test)
+        found = difference(one, other, timing_models=_models(timing, one, other), circle=test)
     _emit(found, (a, b), format_=format_)
     regressions = found.regressions(tolerance=allowed / 100)
     if fail_on_regression and regressions:
         from busplan.report.diff import regression_words
 
-        say(regression_words(regressions, tolerance=allowed))
+        say(regression_words(found, regressions, tolerance=allowed))
         raise PlanFailsError
+
+
+def _models(timing: str, one: "Profile", other: "Profile") -> "tuple[str, ...] | None":
+    """Timing models that both profiles have; None for all, also where the two kinds of bus have none in common."""
+    return None if timing == ALL_MODELS or one.bus.kind != other.bus.kind else timing_models(timing, one)
 
 
 def _tolerance(percent: float | None, *, wanted: bool) -> float:

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from busplan.cli.options import (
-    BUS_OPTIONS,
-    GapCountOption,
-    NodesOption,
+    ALL_MODELS,
+    NO_CHANGES,
+    Changes,
     PeriodsOption,
     ProfileArgument,
-    bus_changes,
+    load_changed,
     periods_us,
+    takes_bus_options,
     timing_models,
 )
 from busplan.cli.output import emit, emit_text
@@ -21,20 +22,24 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from busplan.analysis.derivation.explain import Explanation
-    from busplan.buses.ieee1394.timing import TransactionKind
-    from busplan.profile.model import Profile
+    from busplan.sections.profile import Profile
 
 ExplainFormat = Literal["text", "json", "markdown"]
 
 
 def complete_figure(incomplete: str) -> list[str]:
     """Figures that begin as typed, for the shell's completion."""
-    from busplan.analysis.quantities import FIGURES
+    from busplan.analysis.register import figures_of
+    from busplan.buses import kind_named, kind_names
 
-    names = (name for command, keys in FIGURES.items() for key in keys for name in (key, f"{command}.{key}"))
+    registers = (figures_of(kind_named(kind)) for kind in kind_names())
+    names = (
+        name for one in registers for command, keys in one.items() for key in keys for name in (key, f"{command}.{key}")
+    )
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
+@takes_bus_options
 def explain_command(
     profile: ProfileArgument,
     figure: Annotated[
@@ -47,20 +52,24 @@ def explain_command(
         ),
     ] = None,
     period: PeriodsOption = None,
-    nodes: NodesOption = None,
-    gap_count: GapCountOption = None,
+    changes: Changes = NO_CHANGES,
     timing: Annotated[
-        Literal["paper", "standard", "both"] | None,
+        str | None,
         typer.Option(
             "--timing",
+            metavar="MODEL|both",
             help="Timing model; a circle test has only the one that decides.  "
             "[default: the profile's bus.timing_model]",
             show_default=False,
         ),
     ] = None,
     transaction: Annotated[
-        Literal["read", "write", "both"] | None,
-        typer.Option("--transaction", help="Which transaction, for a figure of latency.  [default: both]"),
+        str | None,
+        typer.Option(
+            "--transaction",
+            metavar="NAME|both",
+            help="Which transaction, for a figure of latency, as read or write.  [default: both]",
+        ),
     ] = None,
     format_: Annotated[
         ExplainFormat, typer.Option("--format", help="Form of the document on standard output.")
@@ -74,10 +83,7 @@ def explain_command(
 
     Example: busplan explain paper-4ms required_us
     """
-    from busplan.profile.shipped import load
-    from busplan.profile.toml import override
-
-    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    plan = load_changed(profile, changes)
     if figure is None:
         _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
         _list(plan, format_)
@@ -90,17 +96,22 @@ def explain_command(
             plan,
             figure,
             periods_us=periods_us(period, plan),
-            timing_models=None if timing is None else timing_models(timing),
-            transactions=_transactions(transaction),
+            timing_models=None if timing is None else timing_models(timing, plan),
+            transactions=_transactions(transaction, plan),
             progress=progress,
         )
     _write(found, format_)
 
 
-def _transactions(asked: "Literal['read', 'write', 'both'] | None") -> "Sequence[TransactionKind] | None":
+def _transactions(asked: str | None, profile: "Profile") -> "Sequence[str] | None":
     if asked is None:
         return None
-    return ("read", "write") if asked == "both" else (asked,)
+    from busplan.analysis.derivation.latency import latency_names
+
+    known = latency_names(profile)
+    if asked not in (*known, ALL_MODELS):
+        raise BusplanError(f"--transaction {asked}: expected {', '.join(known)} or both")
+    return known if asked == ALL_MODELS else (asked,)
 
 
 def _refuse_without_figure(options: "dict[str, object]") -> None:
@@ -117,11 +128,11 @@ def _list(plan: "Profile", format_: ExplainFormat) -> None:
 
     found = assumptions(plan)
     if format_ == "text":
-        emit(report.figure_lines(plan.name, found))
+        emit(report.figure_lines(plan, found))
     elif format_ == "json":
-        emit_text(text.to_json(report.figure_document(plan.name, found)))
+        emit_text(text.to_json(report.figure_document(plan, found)))
     else:
-        emit_text(report.figure_markdown(plan.name, found))
+        emit_text(report.figure_markdown(plan, found))
 
 
 def _write(found: "Explanation", format_: ExplainFormat) -> None:

@@ -5,19 +5,20 @@ from typing import Annotated
 import typer
 
 from busplan.cli.options import (
-    BUS_OPTIONS,
+    NO_CHANGES,
+    Changes,
     FormatOption,
-    GapCountOption,
-    NodesOption,
     ProfileArgument,
     TimingOption,
-    bus_changes,
+    load_changed,
     parse_sizes,
+    takes_bus_options,
     timing_models,
 )
 from busplan.cli.output import emit, emit_text
 
 
+@takes_bus_options
 def latency_command(
     profile: ProfileArgument,
     payload: Annotated[
@@ -30,8 +31,7 @@ def latency_command(
             show_default=False,
         ),
     ] = None,
-    nodes: NodesOption = None,
-    gap_count: GapCountOption = None,
+    changes: Changes = NO_CHANGES,
     timing: TimingOption = "both",
     format_: FormatOption = "table",
 ) -> None:
@@ -43,14 +43,12 @@ def latency_command(
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
     from busplan.analysis.latency import latency
-    from busplan.profile.shipped import load
-    from busplan.profile.toml import override
 
-    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    plan = load_changed(profile, changes)
     result = latency(
         plan,
         payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
-        timing_models=timing_models(timing),
+        timing_models=timing_models(timing, plan),
     )
     if format_ == "table":
         from busplan.report.latency import latency_lines

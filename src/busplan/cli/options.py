@@ -1,7 +1,10 @@
 """Arguments and options that several commands share, and how their values are read."""
 
 import re
+from collections.abc import Callable
 from decimal import Decimal
+from functools import wraps
+from inspect import Parameter, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
@@ -12,10 +15,9 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from busplan.profile.model import Profile
+    from busplan.sections.profile import Profile
 
 Form = TypeVar("Form", bound=str)
-Timing = Literal["paper", "standard", "both"]
 Format = Literal["table", "json", "csv"]
 
 _TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
@@ -69,10 +71,12 @@ GapCountOption = Annotated[
     ),
 ]
 TimingOption = Annotated[
-    Timing,
+    str,
     typer.Option(
         "--timing",
-        help="Timing model to report: the paper's equations as published, the standard's clock and packets, or both.",
+        metavar="MODEL|both",
+        help="Timing model to report, or both. IEEE 1394 has paper, the paper's equations as published, and standard, "
+        "the standard's clock and packets.",
     ),
 ]
 FormatOption = Annotated[Format, typer.Option("--format", help="Form of the document on standard output.")]
@@ -89,8 +93,57 @@ def bus_changes(*, nodes: int | None, gap_count: str | None) -> dict[str, object
     return changes
 
 
+ALL_MODELS: Final = "both"
+"""What --timing takes for all timing models."""
 BUS_OPTIONS: Final = {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"}
 """What the profile's keys are called on the command line."""
+
+
+Changes = dict[str, object]
+"""New values of a profile by dotted key."""
+NO_CHANGES: Final[Changes] = {}
+
+
+def takes_bus_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command --nodes and --gap-count in the place of its parameter `changes`, which gets what they change.
+
+    Parameters
+    ----------
+    command
+        A command with a parameter `changes`.
+    """
+    options = {"nodes": NodesOption, "gap_count": GapCountOption}
+    own = signature(command)
+    parameters: list[Parameter] = []
+    for one in own.parameters.values():
+        if one.name == "changes":
+            kinds = options.items()
+            parameters += [Parameter(name, one.kind, default=None, annotation=option) for name, option in kinds]
+        else:
+            parameters.append(one)
+
+    @wraps(command)
+    def with_changes(*arguments: Any, nodes: int | None, gap_count: str | None, **others: Any) -> None:
+        command(*arguments, changes=bus_changes(nodes=nodes, gap_count=gap_count), **others)
+
+    with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    kept = {name: one for name, one in command.__annotations__.items() if name != "changes"}
+    with_changes.__annotations__ = {**kept, **options}
+    return with_changes
+
+
+def load_changed(argument: str, changes: Changes) -> "Profile":
+    """Read a profile and put the values of options into it.
+
+    Raises
+    ------
+    BusplanError
+        No profile, or a value that its schema refuses.
+    """
+    from busplan.profile.shipped import load
+    from busplan.profile.toml import override
+
+    return override(load(argument).profile, changes, origin=BUS_OPTIONS)
 
 
 def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | None:
@@ -146,9 +199,38 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
     return sizes
 
 
-def timing_models(timing: Timing) -> tuple[Literal["paper", "standard"], ...]:
-    """Timing models that --timing asks for."""
-    return ("paper", "standard") if timing == "both" else (timing,)
+def timing_models(timing: str, profile: "Profile") -> tuple[str, ...]:
+    """Timing models that --timing asks for.
+
+    Raises
+    ------
+    BusplanError
+        A model that the profile's kind of bus has not.
+    """
+    return known_models(profile) if timing == ALL_MODELS else (timing_model(timing, profile),)
+
+
+def timing_model(timing: str, profile: "Profile") -> str:
+    """The one timing model that --timing asks for.
+
+    Raises
+    ------
+    BusplanError
+        The profile's kind of bus has no such model.
+    """
+    known = known_models(profile)
+    if timing not in known:
+        raise BusplanError(
+            f"--timing {timing}: no timing model of bus.kind {profile.bus.kind}; there are {', '.join(known)}"
+        )
+    return timing
+
+
+def known_models(profile: "Profile") -> tuple[str, ...]:
+    """Names of the timing models of a profile's kind of bus."""
+    from busplan.analysis.network import model_names
+
+    return model_names(profile)
 
 
 def plot_format(path: Path) -> str:

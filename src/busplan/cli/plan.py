@@ -12,10 +12,10 @@ from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.planning.cures import Value
     from busplan.analysis.planning.options import Plan
-    from busplan.profile.model import Profile
+    from busplan.buses.bus import Value
     from busplan.profile.toml import LoadedProfile
+    from busplan.sections.profile import Profile
 
 _MAX_AXES = 1_000_000
 
@@ -190,7 +190,7 @@ def _apply(loaded: "LoadedProfile", result: "Plan", *, path: Path) -> None:
         key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
     }
     write_file(path, edited_file(content, values, name=str(path)), overwrite=True)
-    say(f"changed {path}: {settings(changes)}")
+    say(f"changed {path}: {settings(loaded.profile, changes)}")
 
 
 def _emit(result: "Plan", *, format_: str, with_circle: bool) -> None:

@@ -15,8 +15,8 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.profile.model import Profile
     from busplan.report.page.content import Page
+    from busplan.sections.profile import Profile
 
 ReportFormat = Literal["html", "markdown"]
 

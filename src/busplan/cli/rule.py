@@ -10,9 +10,9 @@ from busplan.errors import BusplanError
 
 def complete_code(incomplete: str) -> list[str]:
     """Codes of rules that begin as typed, for the shell's completion."""
-    from busplan.rules.registry import RULES
+    from busplan.rules.registry import all_rules
 
-    return [code for code in RULES if code.startswith(incomplete)]
+    return [code for code in all_rules() if code.startswith(incomplete)]
 
 
 def rule_command(
@@ -32,11 +32,12 @@ def rule_command(
     """
     from busplan.report import documents, text
     from busplan.report.rules import rule_page, rule_rows, rule_table
-    from busplan.rules.registry import RULES
+    from busplan.rules.registry import all_rules
 
-    if code is not None and code.upper() not in RULES:
-        raise BusplanError(f"{code}: no such rule; there are {', '.join(RULES)}")
-    chosen = list(RULES.values()) if code is None else [RULES[code.upper()]]
+    rules = all_rules()
+    if code is not None and code.upper() not in rules:
+        raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")
+    chosen = list(rules.values()) if code is None else [rules[code.upper()]]
     if format_ == "json":
         emit_text(text.to_json(documents.document("rule", rules=rule_rows(chosen))))
     else:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.profile.model import Profile
+    from busplan.sections.profile import Profile
 
 Progress = Callable[[int, int], None]
 

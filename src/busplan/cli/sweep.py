@@ -10,6 +10,7 @@ from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
+    from busplan.sections.profile import Profile
 
 SweepFormat = Literal["table", "csv", "json", "jsonl", "npz"]
 _ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".npz": "npz"}
@@ -25,8 +26,9 @@ def sweep_command(
             "--vary",
             metavar="KEY=VALUES",
             help="A key of the profile in numbers, and its values in the profile's unit: 250,500,1000 or a range "
-            "A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). bus.gap_count also takes "
-            "optimal. Given several times, every combination is computed; the last key changes fastest.  [required]",
+            "A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). Words that the key takes, "
+            "as optimal, may be among the values. Given several times, every combination is computed; the last key "
+            "changes fastest.  [required]",
             show_default=False,
         ),
     ] = None,
@@ -120,25 +122,25 @@ def sweep_command(
     # Every command pays for what stands at the top of this module.
     from busplan.cli.vary import parse_axes
 
-    axes = parse_axes(vary or [])
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.sweep.grid import checked_grid
     from busplan.cli.sweep_run import SweepJob, available_processors, run_sweep
     from busplan.profile.shipped import load
 
     loaded = load(profile).profile
+    axes = parse_axes(vary or [], kind=loaded.bus.kind)
     grid = checked_grid(loaded, axes, with_circle=circle)
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
     drawn = figure or _DEFAULT_FIGURE
-    _require_number(grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
+    _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
     run_sweep(
         SweepJob(
             profile=loaded,
             grid=grid,
-            timing_models=timing_models(timing),
-            columns=_columns(columns, grid, circle=circle, short=wanted == "table", sort_by=sort_by),
+            timing_models=timing_models(timing, loaded),
+            columns=_columns(loaded, columns, grid, circle=circle, short=wanted == "table", sort_by=sort_by),
             format_=wanted,
             output=output,
             top=top or _DEFAULT_TOP,
@@ -169,23 +171,25 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
             raise BusplanError(f"{option}: goes with {needed}")
 
 
-def _require_number(grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
+def _require_number(profile: "Profile", grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
     """Refuse a column that is not there or not in numbers, where only a number will do."""
-    from busplan.analysis.sweep.blocks import WORD_FIGURES
+    from busplan.analysis.sweep.blocks import word_figures
     from busplan.analysis.sweep.circles import all_columns
 
-    words = {*WORD_FIGURES, *(key for key, axis in grid.axes.items() if axis.has_words)}
-    numbers = [name for name in all_columns(grid, with_circle=circle) if name not in words]
+    words = {*word_figures(profile), *(key for key, axis in grid.axes.items() if axis.has_words)}
+    numbers = [name for name in all_columns(profile, grid, with_circle=circle) if name not in words]
     for option, name in asked.items():
         if name is not None and name not in numbers:
             raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
 
 
-def _columns(asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str) -> tuple[str, ...]:
+def _columns(
+    profile: "Profile", asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str
+) -> tuple[str, ...]:
     """Columns to write: the varied keys and timing_model, then those asked for, or all, or a table's main ones."""
     from busplan.analysis.sweep.circles import all_columns
 
-    known = all_columns(grid, with_circle=circle)
+    known = all_columns(profile, grid, with_circle=circle)
     front = (*grid.axes, "timing_model")
     if asked is not None:
         chosen = tuple(name.strip() for name in asked.split(","))

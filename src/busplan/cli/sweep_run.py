@@ -15,12 +15,11 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.analysis.sweep.grid import Grid
-    from busplan.buses.ieee1394.timing import TimingModelName
     from busplan.cli.npz import NpzColumns
     from busplan.cli.sweep import SweepFormat
-    from busplan.profile.model import Profile
     from busplan.report.sweep.figure import FigureData
     from busplan.report.sweep.top import Tally
+    from busplan.sections.profile import Profile
 
 _CIRCLES_AT_ONCE: Final = 4
 """Points that each process tests between two looks at Ctrl-C."""
@@ -31,7 +30,7 @@ class SweepJob(NamedTuple):
 
     profile: "Profile"
     grid: "Grid"
-    timing_models: "tuple[TimingModelName, ...]"
+    timing_models: tuple[str, ...]
     columns: tuple[str, ...]
     format_: "SweepFormat"
     output: Path | None
@@ -72,12 +71,13 @@ def run_sweep(job: SweepJob) -> None:
     StoppedError
         Ctrl-C; what was written is valid, and says that it is partial.
     """
+    from busplan.analysis.network import bus_of
     from busplan.report.sweep.top import Tally
 
     drawing = _drawing(job)
     if job.jobs is not None:
         _require_circles(job)
-    tally, expected = Tally(job.timing_models), job.grid.points
+    tally, expected = Tally(bus_of(job.profile), job.timing_models), job.grid.points
     with ExitStack() as stack:
         with ctrl_c_noted() as stopped:
             # Opened before the work: a path that cannot be written is said at once.

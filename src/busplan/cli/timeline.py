@@ -8,22 +8,23 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.options import (
-    BUS_OPTIONS,
-    GapCountOption,
-    NodesOption,
+    NO_CHANGES,
+    Changes,
     ProfileArgument,
-    bus_changes,
     form_of_file,
+    load_changed,
     output_option,
     periods_us,
+    takes_bus_options,
     time_us,
+    timing_model,
 )
 from busplan.cli.output import emit, emit_text, say, write_file
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.timeline.schedule import Schedule
-    from busplan.buses.ieee1394.timing import TransactionKind
+    from busplan.sections.profile import Profile
 
 TimelineFormat = Literal["table", "json", "csv", "mermaid", "svg", "png"]
 
@@ -36,9 +37,10 @@ _SUFFIXES: Final[dict[str, TimelineFormat]] = {
     ".png": "png",
 }
 _PIPE_COLUMNS: Final = 80
-_TRANSACTION: Final = re.compile(r"\s*(?P<kind>read|write)\s*:\s*(?P<node>[0-9]{1,9})\s*")
+_TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
+@takes_bus_options
 def timeline_command(
     profile: ProfileArgument,
     from_: Annotated[
@@ -80,12 +82,12 @@ def timeline_command(
             show_default=False,
         ),
     ] = None,
-    nodes: NodesOption = None,
-    gap_count: GapCountOption = None,
+    changes: Changes = NO_CHANGES,
     timing: Annotated[
-        Literal["paper", "standard"] | None,
+        str | None,
         typer.Option(
             "--timing",
+            metavar="MODEL",
             help="Timing model: the paper's equations as published, or the standard's clock and packets. "
             "A cycle has one.  [default: the profile's bus.timing_model]",
             show_default=False,
@@ -119,15 +121,20 @@ def timeline_command(
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
     from busplan.analysis.timeline.schedule import schedule, zoom
-    from busplan.profile.shipped import load
     from busplan.profile.toml import override
 
-    plan = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    plan = load_changed(profile, changes)
     asked_us = periods_us([period], plan) if period is not None else None
     if asked_us is not None:
         plan = override(plan, {"cycle.period_us": asked_us[0]})
-    one = None if transaction is None else _transaction(transaction, nodes=plan.bus.nodes)
-    shown = zoom(schedule(plan, model=timing), from_us=from_us, to_us=to_us, transaction=one)
+    one = None if transaction is None else _transaction(transaction, plan)
+    model = None if timing is None else timing_model(timing, plan)
+    shown = zoom(
+        schedule(plan, model=model),
+        from_us=from_us,
+        to_us=to_us,
+        transaction=one,
+    )
     _write(shown, chosen, output)
 
 
@@ -143,13 +150,18 @@ def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineForm
     return chosen
 
 
-def _transaction(text: str, *, nodes: int) -> "tuple[TransactionKind, int]":
-    match = _TRANSACTION.fullmatch(text)
-    if match is None or not 1 <= int(match["node"]) <= nodes:
-        raise BusplanError(
-            f"--transaction {text}: expected read or write and a node from 1 to {nodes}, as read:1 or write:{nodes}"
+def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
+    from busplan.analysis.network import bus_of
+
+    match, nodes = _TRANSACTION.fullmatch(text), plan.bus.nodes
+    kinds = [one.key for one in bus_of(plan).stretch_kinds]
+    if match is None or match["kind"] not in kinds or not 1 <= int(match["node"]) <= nodes:
+        expected = (
+            f"{' or '.join(kinds)} and a node from 1 to {nodes}" if kinds else "none: this bus has no transactions"
         )
-    return ("read" if match["kind"] == "read" else "write"), int(match["node"])
+        example = f", as {kinds[0]}:1 or {kinds[-1]}:{nodes}" if kinds else ""
+        raise BusplanError(f"--transaction {text}: expected {expected}{example}")
+    return match["kind"], int(match["node"])
 
 
 def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> None:

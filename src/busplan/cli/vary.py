@@ -8,8 +8,15 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Values
 
 
-def parse_axes(texts: list[str]) -> dict[str, "Values"]:
+def parse_axes(texts: list[str], *, kind: str) -> dict[str, "Values"]:
     """Read every --vary, in their order.
+
+    Parameters
+    ----------
+    texts
+        The options' values.
+    kind
+        Kind of bus, which knows words that stand in the place of a number.
 
     Raises
     ------
@@ -19,6 +26,7 @@ def parse_axes(texts: list[str]) -> dict[str, "Values"]:
     if not texts:
         raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")
     from busplan.analysis.sweep.axis_values import parse_values
+    from busplan.profile.kinds import words_of
 
     axes: dict[str, Values] = {}
     for text in texts:
@@ -27,5 +35,5 @@ def parse_axes(texts: list[str]) -> dict[str, "Values"]:
             raise BusplanError(f"--vary {text}: expected KEY=VALUES, as bus.nodes=1:62 or cycle.period_us=250,500,1000")
         if key in axes:
             raise BusplanError(f"--vary {text}: {key} is varied already; give all its values at once")
-        axes[key] = parse_values(spec, name=f"--vary {text}")
+        axes[key] = parse_values(spec, name=f"--vary {text}", words=words_of(kind, key))
     return axes

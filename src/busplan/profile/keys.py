@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 
 class KeyValue(NamedTuple):

@@ -2,20 +2,19 @@
 
 from collections.abc import Iterator
 from difflib import get_close_matches
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
-from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.document import Document
-from busplan.profile.model import Profile
+from busplan.profile.kinds import kind_of, may_be_of_a_kind, models_of, profile_model
 from busplan.profile.positions import KeyPath, Place
 
-_EXECUTION: Final[KeyPath] = ("node", "execution")
-"""The one union of tables: in pydantic's locations its tag follows this path."""
-
+_TAG: Final = "kind"
+"""The key that chooses the member of every union of tables."""
 _MOST_SHOWN: Final = 50
 _WRONG_TYPE: Final = {
     "int_type": "a whole number",
@@ -40,7 +39,7 @@ _OUT_OF_RANGE: Final = {
 }
 
 
-class Finding(NamedTuple):
+class KeyFinding(NamedTuple):
     """One problem: where in the data, and what."""
 
     path: KeyPath
@@ -66,7 +65,7 @@ def _quoted(part: str) -> str:
     return '"' + "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in escaped) + '"'
 
 
-def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:
+def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
     """Translate a validation error.
 
     Parameters
@@ -78,34 +77,67 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:
 
     Yields
     ------
-    Finding
+    KeyFinding
         One for each problem, in pydantic's order.
     """
+    model = profile_model(kind_of(data))
     for details in error.errors(include_url=False):
-        path = _path(details)
+        path = _path(details["loc"], model)
         if details["type"] == "busplan":
             for problem in details["ctx"]["problems"]:
-                yield Finding(_parsed(problem.key) if problem.key else path, problem.message, problem.kind)
+                yield KeyFinding(_parsed(problem.key) if problem.key else path, problem.message, problem.kind)
         elif details["type"] == "missing":
-            yield Finding(path, _missing(path, data), "missing-key", shows_value=False)
+            yield KeyFinding(path, _missing(path, data), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
-            yield Finding(path, _unknown(path, data), "unknown-key", shows_value=False)
+            if kind_of(data) is not None or not may_be_of_a_kind(path):
+                yield KeyFinding(path, _unknown(path, data), "unknown-key", shows_value=False)
         elif details["type"] == "union_tag_not_found":
-            message = 'missing key; expected kind = "table" or kind = "linear"'
-            yield Finding((*path, "kind"), message, "missing-key", shows_value=False)
+            key, tags = _tags(path, data)
+            message = f"missing key; expected {' or '.join(f'{key} = {_text(tag)}' for tag in tags)}"
+            yield KeyFinding((*path, key), message, "missing-key", shows_value=False)
         elif details["type"] == "union_tag_invalid":
-            yield Finding((*path, "kind"), 'expected "table" or "linear"', "out-of-range")
+            key, tags = _tags(path, data)
+            yield KeyFinding((*path, key), f"expected {' or '.join(map(_text, tags))}", "out-of-range")
         else:
             kind: ProblemKind = "wrong-type" if details["type"] in _WRONG_TYPE else "out-of-range"
-            yield Finding(path, _expected(details), kind)
+            yield KeyFinding(path, _expected(details), kind)
+    yield from _unknown_kind(data)
 
 
-def _path(details: ErrorDetails) -> KeyPath:
-    location = details["loc"]
-    size = len(_EXECUTION)
-    if location[:size] == _EXECUTION and len(location) > size:
-        return (*_EXECUTION, *location[size + 1 :])
-    return location
+def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
+    """The kind of bus, where it is a text and none that is known: it says which other keys there are."""
+    bus = data.get("bus")
+    if kind_of(data) is None and isinstance(bus, dict) and isinstance(bus.get("kind"), str):
+        yield KeyFinding(("bus", "kind"), f"expected {' or '.join(map(_text, kind_names()))}", "out-of-range")
+
+
+def _text(word: str) -> str:
+    return f'"{word}"'
+
+
+def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> KeyPath:
+    """The keys of a location of pydantic's, which has the tag of each union among them."""
+    path: list[int | str] = []
+    members = [model]
+    for part in location:
+        if len(members) > 1 and any(part in _tag(one) for one in members):
+            members = [one for one in members if part in _tag(one)]
+            continue
+        path.append(part)
+        field = members[0].model_fields.get(str(part)) if members else None
+        members = models_of(field.annotation) if field is not None else []
+    return tuple(path)
+
+
+def _tag(model: type[BaseModel]) -> tuple[Any, ...]:
+    """What the key of a union's member says that it is this one."""
+    return get_args(model.model_fields[_TAG].annotation) if _TAG in model.model_fields else ()
+
+
+def _tags(path: KeyPath, data: dict[str, Any]) -> tuple[str, list[str]]:
+    """The key that chooses the member of a union, and its words."""
+    field = _section(path, data).model_fields[str(path[-1])]
+    return _TAG, [str(tag) for one in models_of(field.annotation) for tag in _tag(one)]
 
 
 def _parsed(key: str) -> KeyPath:
@@ -128,15 +160,13 @@ def _expected(details: ErrorDetails) -> str:
 
 def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
     """The model of the table that holds `path`."""
-    if path[:-1] == _EXECUTION:
-        execution = data["node"].get("execution", {})
-        return LinearExecution if execution.get("kind") == "linear" else TableExecution
-    section: type[BaseModel] = Profile
+    section: type[BaseModel] = profile_model(kind_of(data))
+    table: Any = data
     for part in path[:-1]:
-        annotation = section.model_fields[str(part)].annotation
-        if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
-            raise TypeError(f"{part} is no section")  # only if a section of a new kind joins the profile
-        section = annotation
+        table = table.get(part, {}) if isinstance(table, dict) else {}
+        members = models_of(section.model_fields[str(part)].annotation)
+        wanted = table.get(_TAG) if isinstance(table, dict) else None
+        section = next((one for one in members if len(members) > 1 and wanted in _tag(one)), members[-1])
     return section
 
 
@@ -157,12 +187,21 @@ def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
     return f"unknown key; known here: {', '.join(known)}"
 
 
-def refusal(error: ValidationError, data: dict[str, Any], document: Document) -> PlacedError:
-    """Make the error for a document: every problem at its place, in the order of places."""
-    placed = sorted(
-        ((_place(document, found.path), found) for found in findings(error, data)), key=lambda pair: pair[0].key_start
-    )
-    problems = tuple(_problem(document, place, found) for place, found in placed[:_MOST_SHOWN])
+def refusal(error: ValidationError | None, data: dict[str, Any], document: Document) -> PlacedError:
+    """Make the error for a document: every problem at its place, in the order of places.
+
+    Parameters
+    ----------
+    error
+        What pydantic raised for `data`; None where all is well but for the kind of bus.
+    data
+        The data that was checked.
+    document
+        Where it stands.
+    """
+    found = _unknown_kind(data) if error is None else findings(error, data)
+    placed = sorted(((_place(document, one.path), one) for one in found), key=lambda pair: pair[0].key_start)
+    problems = tuple(_problem(document, place, one) for place, one in placed[:_MOST_SHOWN])
     return PlacedError(document.name, problems, hidden=max(0, len(placed) - _MOST_SHOWN))
 
 
@@ -175,7 +214,7 @@ def _place(document: Document, path: KeyPath) -> Place:
     return Place(0, 0, 0, 0)
 
 
-def _problem(document: Document, place: Place, found: Finding) -> PlacedProblem:
+def _problem(document: Document, place: Place, found: KeyFinding) -> PlacedProblem:
     # A table that is spread over the file has no value to show.
     has_value = found.shows_value and place.value_start != place.key_start
     written = document.text[place.value_start : place.value_end] if has_value or _is_element(found) else ""
@@ -185,7 +224,7 @@ def _problem(document: Document, place: Place, found: Finding) -> PlacedProblem:
     return PlacedProblem(line, column, found.kind, f"{subject}: {found.message}", found.key)
 
 
-def _is_element(found: Finding) -> bool:
+def _is_element(found: KeyFinding) -> bool:
     return found.shows_value and isinstance(found.path[-1], int)
 
 
@@ -195,11 +234,11 @@ def _shortened(written: str, limit: int = 40) -> str:
 
 
 def refused_changes(
-    error: ValidationError, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
+    error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:
     """Make the error for changes of a profile: each problem with the option or key that asked for it."""
     messages = []
-    for found in findings(error, data):
+    for found in _unknown_kind(data) if error is None else findings(error, data):
         value = f" {changes[found.key]}" if found.key in changes else ""
         messages.append(f"{origin.get(found.key, found.key)}{value}: {found.message}")
     return BusplanError(*messages)

@@ -2,7 +2,10 @@
 
 from typing import Any, Final
 
-from busplan.profile.model import Profile
+from pydantic.json_schema import models_json_schema
+
+from busplan.buses import kind_names
+from busplan.profile.kinds import profile_model
 
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
@@ -13,11 +16,25 @@ def profile_schema() -> dict[str, Any]:
     Returns
     -------
     dict
-        The schema, its dialect named first.
+        The schema, its dialect named first. Where there are several kinds of bus, `bus.kind` chooses among theirs.
 
     Examples
     --------
     >>> profile_schema()["required"][:2]
     ['schema_version', 'name']
     """
-    return {"$schema": _DIALECT, **Profile.model_json_schema(mode="validation")}
+    kinds = {kind: profile_model(kind) for kind in kind_names()}
+    if len(kinds) == 1:
+        (model,) = kinds.values()
+        return {"$schema": _DIALECT, **model.model_json_schema(mode="validation")}
+    references, definitions = models_json_schema([(model, "validation") for model in kinds.values()])
+    # A condition names the key that is wrong; a union of all kinds would say that none of them fits.
+    chosen = [
+        {"if": _has_kind({"const": kind}), "then": references[model, "validation"]} for kind, model in kinds.items()
+    ]
+    return {"$schema": _DIALECT, "type": "object", **_has_kind({"enum": list(kinds)}), "allOf": chosen, **definitions}
+
+
+def _has_kind(allowed: dict[str, Any]) -> dict[str, Any]:
+    bus = {"type": "object", "properties": {"kind": allowed}, "required": ["kind"]}
+    return {"properties": {"bus": bus}, "required": ["bus"]}

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.profile.document import Document, Lines
-from busplan.profile.model import Profile
+from busplan.profile.kinds import kind_of, profile_model
+from busplan.sections.profile import Profile
 
 MAX_FILE_BYTES: Final = 100_000
 """A profile is a page of text. More is some other file, and reading it whole would only delay saying so."""
@@ -107,12 +108,16 @@ def validate(document: Document) -> Profile:
         No TOML, or no profile; one message for every problem of the file, in the order of their places.
     """
     data = document.data()
+    kind, problem = kind_of(data), None
     try:
-        return Profile.model_validate(data)
+        found = profile_model(kind).model_validate(data)
     except ValidationError as error:
-        from busplan.profile.problems import refusal  # only a faulty profile pays for its errors
+        problem = error
+    if kind is not None and problem is None:
+        return found
+    from busplan.profile.problems import refusal  # only a faulty profile pays for its errors
 
-        raise refusal(error, data, document) from None
+    raise refusal(problem, data, document)
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
@@ -143,9 +148,12 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
             if not isinstance(table, dict):
                 raise BusplanError(f"{key}: no such key; {name} is a value, not a section")
         table[last] = value
+    kind, problem = kind_of(data), None
     try:
-        return Profile.model_validate(data)
+        if kind is not None:
+            return profile_model(kind).model_validate(data)
     except ValidationError as error:
-        from busplan.profile.problems import refused_changes  # as above
+        problem = error
+    from busplan.profile.problems import refused_changes  # as above
 
-        raise refused_changes(error, data, changes, origin or {}) from None
+    raise refused_changes(problem, data, changes, origin or {})

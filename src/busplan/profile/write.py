@@ -2,7 +2,7 @@
 
 import tomli_w
 
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 
 def profile_text(profile: Profile) -> str:

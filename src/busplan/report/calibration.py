@@ -4,10 +4,12 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from busplan.analysis.calibration.calibrate import OUTLIER_DEVIATIONS, Calibration, PayloadFit
-from busplan.profile.bus import LinearExecution, TableExecution
+from busplan.analysis.capacity.cycle import cycle_of
+from busplan.analysis.network import bus_of, network_of
 from busplan.profile.layout import written
 from busplan.report.documents import Document, Row, document
 from busplan.report.lines import BLANK, Line, plural, table, us
+from busplan.sections.execution import LinearExecution, TableExecution
 
 SECTION: Final = "node.execution"
 _MOST_LINES: Final = 10
@@ -64,11 +66,12 @@ def _way(result: Calibration) -> str:
             "T_exec = T_lant - 2 (T1+T2), both as measured; the timing model is not used, and stands beside it to show "
             "what it leaves unexplained."
         )
-    bus = result.profile.bus
-    where = f"{plural(bus.hops(bus.nodes), 'hop')}, gap count {bus.gap_count_for(bus.nodes)}"
+    network = network_of(result.profile)
+    bus = bus_of(result.profile)
+    where = ", ".join((bus.payloads(network).carrier, *bus.setup_words(network)))
     return (
         f"T_exec = T_lant - (T1+T2) - (T4+T5), eq (3): both halves by the {result.timing_model} timing model for "
-        f"{bus.speed}, {where}."
+        f"{where}."
     )
 
 
@@ -167,15 +170,15 @@ def calibration_rows(result: Calibration) -> list[Row]:
 
 def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> Document:
     """Answer of `busplan calibrate`."""
-    bus = result.profile.bus
+    bus, cycle = bus_of(result.profile), cycle_of(result.profile, model=result.timing_model)
+    figures = cycle.figures()
     return document(
         "calibrate",
         profile=result.profile.name,
         source=source,
         timing_model=result.timing_model,
-        nodes=bus.nodes,
-        hops=bus.hops(bus.nodes),
-        gap_count=bus.gap_count_for(bus.nodes),
+        nodes=cycle.network.nodes,
+        **{key: figures[key] for key in bus.facts},
         way=result.way,
         form=result.execution.kind,
         method=result.method,

@@ -1,66 +1,30 @@
 """`busplan diff`: for people, for a pull request, and as plain data."""
 
-from collections.abc import Iterator, Sequence
-from typing import Final
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Final
 
-from busplan.analysis.comparison.difference import CircleSide, Difference, Figure, Judgement
-from busplan.analysis.latency import BOTH_MODELS
-from busplan.profile.model import Profile
+from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, Difference, Judgement
+from busplan.analysis.network import bus_of, model_names
 from busplan.report import markdown
-from busplan.report.capacity import CAPACITY_ROWS
 from busplan.report.changes import CHANGE_HEADINGS, change_document, change_rows
 from busplan.report.documents import Document, document
-from busplan.report.lines import BLANK, GridRow, Line, count, plural, printable, table, us, yes
+from busplan.report.lines import BLANK, Line, figure_row, plural, printable, table
 from busplan.report.words import period
+from busplan.sections.profile import Profile
 
 Arguments = tuple[str, str]
 """A and B as they were typed."""
 
 
-def _um(value_mm: float) -> str:
-    return us(value_mm * 1e3)
-
-
-def _two(value: float) -> str:
-    return f"{value:.2f}"
-
-
-_OWN_ROWS: Final = (
-    GridRow("timing that decides", "", "timing_model", str),
-    GridRow("fits, as that decides", "", "verdict_fits", yes),
-    GridRow("period T_s", "us", "period_us", us),
-    GridRow("nodes N", "nodes", "nodes", count),
-    GridRow("axes", "axes", "axes", count),
-    GridRow("hops", "1", "hops", count),
-    GridRow("gap count", "1", "gap_count", count),
-    GridRow("gap count is safe", "", "gap_count_safe", yes),
-    GridRow("read T_lant + T_sum", "us", "read_latency_with_gaps_us", us),
-    GridRow("write T_lant + T_sum", "us", "write_latency_with_gaps_us", us),
-    GridRow("largest term", "", "binding_term", str),
-    GridRow("passed", "", "passed", yes),
-    GridRow("stable", "", "stable", yes),
-    GridRow("phase margin", "deg", "phase_margin_deg", _two),
-    GridRow("gain margin", "dB", "gain_margin_db", _two),
-    GridRow("mean contour error", "um", "mean_contour_error_mm", _um),
-    GridRow("largest contour error", "um", "max_contour_error_mm", _um),
-    GridRow("circular deviation G", "um", "circular_deviation_mm", _um),
-    GridRow("servo values", "", "servo_grade", str),
-)
-_ROWS: Final = {row.key: row for row in (*CAPACITY_ROWS, *_OWN_ROWS)}
 _HEADINGS: Final = ("figure", "of", "unit", "A", "B", "B - A", "relative", "B is")
 _WORDS: Final = 3
 """Columns of words, in front of those of figures."""
 
 _FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
-_LOUD: Final[dict[str, dict[Judgement, str]]] = {
-    "gap_count_safe": {
-        "worse": "B has an unsafe gap count where A has a safe one",
-        "better": "B has a safe gap count where A has an unsafe one",
-    },
-    "passed": {"worse": "B does not pass the circle where A does", "better": "B passes the circle where A does not"},
+_PASSES: Final[dict[Judgement, str]] = {
+    "worse": "B does not pass the circle where A does",
+    "better": "B passes the circle where A does not",
 }
-"""Figures that speak for themselves, beside whether it fits."""
-_TOLD: Final = {"verdict_fits", "fits", *_LOUD}
 _MOST_NAMED: Final = 4
 """Figures that a headline names."""
 _MOST_KEYS: Final = 20
@@ -98,7 +62,7 @@ def diff_markdown(found: Difference, *, arguments: Arguments) -> str:
         told = [one for one in found.figures if one.judgement != "neutral" or None not in (one.a, one.b)]
         changed = [one for one in told if one.judgement != "same"]
         lines += [*markdown.table(_HEADINGS, map(_markdown_cells, changed), left=_WORDS), ""] if changed else []
-        same = len(_named([one for one in told if one.judgement == "same"]))
+        same = len(_named([one for one in told if one.judgement == "same"], found))
         lines += [f"{plural(same, 'figure')} {'is' if same == 1 else 'are'} the same."] if same else []
         lines += [part for note in _notes(found) for part in ("", markdown.escaped(note.text))]
     return "\n".join((*lines, ""))
@@ -122,10 +86,10 @@ def diff_document(found: Difference, *, arguments: Arguments) -> Document:
     )
 
 
-def regression_words(regressions: Sequence[Figure], *, tolerance: float) -> str:
+def regression_words(found: Difference, regressions: Sequence[ComparedFigure], *, tolerance: float) -> str:
     """Say which figures fail a gate."""
     by = f" by more than {tolerance:.12g} %" if tolerance else ""
-    names = _named(regressions)
+    names = _named(regressions, found)
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}"
 
 
@@ -134,7 +98,10 @@ def _headline(found: Difference) -> Line:
         return Line("A and B are the same profile: every key has the same value.")
     worse, better = found.judged("worse"), found.judged("better")
     if worse or better:
-        verdicts = [*_loud(worse), *_counted("worse", worse), *_loud(better), *_counted("better", better)]
+        verdicts = [
+            *(*_loud(found, worse), *_counted(found, "worse", worse)),
+            *(*_loud(found, better), *_counted(found, "better", better)),
+        ]
         return Line(f"{'; '.join(verdicts)}.", "bad" if worse else "good")
     differ = f"{plural(len(found.keys), 'key')} {'differs' if len(found.keys) == 1 else 'differ'}"
     if found.judged("neutral"):
@@ -142,32 +109,46 @@ def _headline(found: Difference) -> Line:
     return Line(f"B is neither better nor worse: {differ}, and no figure.")
 
 
-def _loud(figures: Sequence[Figure]) -> Iterator[str]:
-    judged = {one.measure.key: one.judgement for one in figures}
-    models = " and ".join(one.part for one in figures if one.measure.key == "fits")
+def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
+    """Figures that speak for themselves, beside whether it fits."""
+    loud: dict[str, dict[Judgement, str]] = {}
+    for bus in (bus_of(found.a), bus_of(found.b)):
+        if bus.safety_figure is not None:
+            loud[bus.safety_figure.key] = {
+                "worse": f"B has an unsafe {bus.safety} where A has a safe one",
+                "better": f"B has a safe {bus.safety} where A has an unsafe one",
+            }
+    return {**loud, "passed": _PASSES}
+
+
+def _loud(found: Difference, figures: Sequence[ComparedFigure]) -> Iterator[str]:
+    judged = {one.figure.key: one.judgement for one in figures}
+    models = " and ".join(one.part for one in figures if one.figure.key == "fits")
     if "verdict_fits" in judged:
         yield f"{_FITS[judged['verdict_fits']]} ({f'{models} timing' if models else 'each by the timing that decides'})"
     elif models:
         yield f"{_FITS[judged['fits']]} ({models} timing, which does not change the verdict)"
-    for key, words in _LOUD.items():
+    for key, words in _loud_figures(found).items():
         if key in judged:
             yield words[judged[key]]
 
 
-def _counted(judgement: Judgement, figures: Sequence[Figure]) -> Iterator[str]:
-    names = _named([one for one in figures if one.measure.key not in _TOLD])
+def _counted(found: Difference, judgement: Judgement, figures: Sequence[ComparedFigure]) -> Iterator[str]:
+    told = {"verdict_fits", "fits", *_loud_figures(found)}
+    names = _named([one for one in figures if one.figure.key not in told], found)
     if names:
         hidden = len(names) - _MOST_NAMED
         more = f" and {hidden} more" if hidden > 0 else ""
         yield f"B is {judgement} in {plural(len(names), 'figure')}: {', '.join(names[:_MOST_NAMED])}{more}"
 
 
-def _named(figures: Sequence[Figure]) -> list[str]:
-    """Names of figures, each once, with the timing model where that is not both."""
+def _named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
+    """Names of figures, each once, with the timing model where that is not all of them."""
+    models = {*model_names(found.a), *model_names(found.b)}
     parts: dict[str, list[str]] = {}
     for one in figures:
-        parts.setdefault(_ROWS[one.measure.key].label, []).append(one.part)
-    return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in BOTH_MODELS else label for label, of in parts.items()]
+        parts.setdefault(one.figure.label, []).append(one.part)
+    return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
 
 
 def _sides(found: Difference, arguments: Arguments) -> Iterator[str]:
@@ -199,25 +180,25 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Line]:
         yield Line(f"The {words} {text}.", "warning" if "assumed" in (a, b) else "plain")
 
 
-def _cells(figure: Figure) -> tuple[str, ...]:
-    row = _ROWS[figure.measure.key]
-    a, b = ("-" if value is None else row.write(value) for value in (figure.a, figure.b))
-    return (row.label.strip(), figure.part, row.unit, a, b, *_changes(figure, row), figure.judgement)
+def _cells(one: ComparedFigure) -> tuple[str, ...]:
+    row = figure_row(one.figure)
+    a, b = ("-" if value is None else row.write(value) for value in (one.a, one.b))
+    return (row.label, one.part, row.unit, a, b, *_changes(one, row.write), one.judgement)
 
 
-def _changes(figure: Figure, row: GridRow) -> tuple[str, str]:
+def _changes(one: ComparedFigure, write: Callable[[Any], str]) -> tuple[str, str]:
     """Write the difference and the share that it is; what is but rounding is none."""
-    if figure.difference is None or figure.judgement == "same":
+    if one.difference is None or one.judgement == "same":
         return "-", "-"
-    share = figure.relative_difference
-    size = row.write(abs(figure.difference))
-    return f"{'-' if figure.difference < 0 else '+'}{size}", "-" if share is None else f"{share:+.1%}"
+    share = one.relative_difference
+    size = write(abs(one.difference))
+    return f"{'-' if one.difference < 0 else '+'}{size}", "-" if share is None else f"{share:+.1%}"
 
 
-def _markdown_cells(figure: Figure) -> tuple[str, ...]:
+def _markdown_cells(one: ComparedFigure) -> tuple[str, ...]:
     # Nothing here is a profile's text: labels, figures and words of ours, none of them markup.
-    *cells, judgement = _cells(figure)
-    return (*cells, f"**{judgement}**" if figure.judgement == "worse" else judgement)
+    *cells, judgement = _cells(one)
+    return (*cells, f"**{judgement}**" if one.judgement == "worse" else judgement)
 
 
 def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> Document:
@@ -229,14 +210,14 @@ def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -
     }
 
 
-def _figure_document(figure: Figure) -> Document:
+def _figure_document(one: ComparedFigure) -> Document:
     return {
-        "part": figure.part,
-        "figure": figure.measure.key,
-        "better": figure.measure.better,
-        "a": figure.a,
-        "b": figure.b,
-        "difference": figure.difference,
-        "relative_difference": figure.relative_difference,
-        "judgement": figure.judgement,
+        "part": one.part,
+        "figure": one.figure.key,
+        "better": one.figure.better,
+        "a": one.a,
+        "b": one.b,
+        "difference": one.difference,
+        "relative_difference": one.relative_difference,
+        "judgement": one.judgement,
     }

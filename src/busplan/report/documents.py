@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.latency import LatencyResult, Transaction
-from busplan.profile.model import Profile
+from busplan.analysis.network import bus_of
 from busplan.report.words import verdict_lines, warnings
+from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleTest
-    from busplan.analysis.paper import PaperSection
+    from busplan.buses.published import PaperSection
 
 JSON_SCHEMA: Final = 1
 
@@ -47,8 +48,8 @@ def latency_rows(result: LatencyResult) -> list[Row]:
 
 def _transaction_row(transaction: Transaction) -> Row:
     row = transaction._asdict()
-    phases = row.pop("phases")._asdict()
-    return {**row, **{key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}}
+    figures = row.pop("figures")
+    return {**row, **{key: int(value) if key.endswith("_bytes") else value for key, value in figures.items()}}
 
 
 def latency_document(result: LatencyResult) -> Document:
@@ -67,7 +68,7 @@ def capacity_rows(result: Capacity) -> list[Row]:
 
 
 def _figures_row(figures: CapacityFigures) -> Row:
-    return {**figures._asdict(), "exceeded": list(figures.exceeded)}
+    return {**figures.by_key(), "exceeded": list(figures.exceeded)}
 
 
 def capacity_document(result: Capacity, verdicts: tuple[Verdict, ...]) -> Document:
@@ -87,7 +88,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> Document:
         "timing_model": verdict.deciding.timing_model,
         "fits": verdict.deciding.fits,
         "models_agree": verdict.models_agree,
-        "gap_count_safe": verdict.deciding.gap_count_safe,
+        **safety_row(verdict.deciding, result.profile),
         "cheapest_change": change
         and {
             "changes": change.changes,
@@ -98,6 +99,12 @@ def _verdict(verdict: Verdict, result: Capacity) -> Document:
         "warnings": warnings(result.profile, nodes=verdict.deciding.nodes, most=verdict.deciding.max_nodes),
         "text": " ".join(line.text for line in verdict_lines(verdict, result.profile)),
     }
+
+
+def safety_row(figures: CapacityFigures, profile: Profile) -> Row:
+    """Whether the bus is set safely, under the name that its kind has for it."""
+    safety = bus_of(profile).safety_figure
+    return {} if safety is None else {safety.key: figures.safe}
 
 
 def profile_rows(profiles: Sequence[Profile]) -> list[Row]:
@@ -135,7 +142,7 @@ def circle_document(test: "CircleTest", *, with_contributions: bool) -> Document
     results = []
     for result in test.results:
         row = result._asdict()
-        row["failures"] = [failure._asdict() for failure in result.failures]
+        row["failures"] = [failure.document() for failure in result.failures]
         row["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
         ranked = row.pop("contributions")
         if with_contributions:

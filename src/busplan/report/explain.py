@@ -8,24 +8,27 @@ from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
 from busplan.analysis.derivation.formulas import formula_of
 from busplan.analysis.derivation.trace import Input, short
-from busplan.analysis.quantities import FIGURES, Command, Figure
-from busplan.buses.ieee1394.constants import CONSTANTS
+from busplan.analysis.network import bus_of
+from busplan.analysis.register import Command, figures_of
+from busplan.buses.bus import Bus
+from busplan.buses.figure import Figure
 from busplan.report import markdown
 from busplan.report.documents import Document, Row, capacity_document, document
 from busplan.report.lines import BLANK, Line, table
 from busplan.report.words import period
+from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 
 _INPUT_HEADINGS: Final = ("symbol", "name", "value", "unit", "grade", "source")
 _FIGURE_HEADINGS: Final = ("command", "figure", "eq", "unit", "what it is")
 
 
-def figure_rows() -> list[Row]:
+def figure_rows(bus: Bus) -> list[Row]:
     """One row a figure that can be explained."""
     return [
         {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
         | {"reference": one.reference, "meaning": one.meaning}
-        for command, one in _all_figures()
+        for command, one in _all_figures(bus)
     ]
 
 
@@ -42,32 +45,32 @@ def equation_rows() -> list[Row]:
     ]
 
 
-def constant_rows() -> list[Row]:
+def constant_rows(bus: Bus) -> list[Row]:
     """One row a constant: its value, unit, grade and source."""
     return [
         {"name": name, "value": float(one), "unit": one.unit}
         | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
-        for name, one in CONSTANTS.items()
+        for name, one in bus.constants.items()
     ]
 
 
-def figure_document(profile: str, assumptions: Sequence[Input]) -> Document:
+def figure_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
     """Answer of `busplan explain PROFILE` as JSON: what the profile's figures rest on, and the whole registry."""
     return document(
         "explain",
-        profile=profile,
+        profile=profile.name,
         assumptions=[one._asdict() for one in assumptions],
-        figures=figure_rows(),
+        figures=figure_rows(bus_of(profile)),
         equations=equation_rows(),
-        constants=constant_rows(),
+        constants=constant_rows(bus_of(profile)),
     )
 
 
-def figure_lines(profile: str, assumptions: Sequence[Input]) -> list[Line]:
+def figure_lines(profile: Profile, assumptions: Sequence[Input]) -> list[Line]:
     """Answer of `busplan explain PROFILE` for people: what its figures rest on, and all that can be explained."""
-    rows = ([command, one.key, one.reference, one.unit, one.meaning] for command, one in _all_figures())
+    rows = ([command, one.key, one.reference, one.unit, one.meaning] for command, one in _all_figures(bus_of(profile)))
     return [
-        Line(f"What the figures of {profile} rest on, the least well known first", "heading"),
+        Line(f"What the figures of {profile.name} rest on, the least well known first", "heading"),
         *table(_INPUT_HEADINGS[1:], (_row(one)[1:] for one in assumptions), left=5),
         BLANK,
         Line("Figures to explain", "heading"),
@@ -75,16 +78,16 @@ def figure_lines(profile: str, assumptions: Sequence[Input]) -> list[Line]:
     ]
 
 
-def figure_markdown(profile: str, assumptions: Sequence[Input]) -> str:
+def figure_markdown(profile: Profile, assumptions: Sequence[Input]) -> str:
     """Answer of `busplan explain PROFILE` as Markdown."""
     rows = (
         [command, markdown.code(one.key), one.reference, one.unit, markdown.escaped(one.meaning)]
-        for command, one in _all_figures()
+        for command, one in _all_figures(bus_of(profile))
     )
     inputs = ((markdown.code(name), *map(markdown.escaped, others)) for _, name, *others in map(_row, assumptions))
     return _text(
         [
-            f"What the figures of {markdown.code(profile)} rest on, the least well known first:",
+            f"What the figures of {markdown.code(profile.name)} rest on, the least well known first:",
             "",
             *markdown.table(_INPUT_HEADINGS[1:], inputs, left=5),
             "",
@@ -156,8 +159,8 @@ def explain_markdown(explanation: Explanation) -> str:
     return _text(lines[:-1])
 
 
-def _all_figures() -> Iterator[tuple[Command, Figure]]:
-    yield from ((command, one) for command, figures in FIGURES.items() for one in figures.values())
+def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
+    yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())
 
 
 def _derivation(one: Derivation) -> Document:

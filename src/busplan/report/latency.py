@@ -1,62 +1,64 @@
 """`busplan latency` for people."""
 
 from collections.abc import Sequence
-from typing import Final
+from itertools import groupby
 
-from busplan.analysis.latency import LatencyResult, Transaction
-from busplan.analysis.quantities import FIGURES
-from busplan.buses.ieee1394.constants import MAX_HOPS
-from busplan.profile.model import Profile
-from busplan.report.lines import BLANK, GridRow, Line, count, grid, plural, us
+from busplan.analysis.latency import LatencyResult, Transaction, with_payload
+from busplan.analysis.network import bus_of, network_of
+from busplan.buses.bus import Bus
+from busplan.report.lines import BLANK, GridRow, Line, figure_row, grid
 from busplan.report.words import execution_line, warnings
+from busplan.sections.profile import Profile
 
-LATENCY_ROWS: Final = (
-    GridRow("request packet, bytes", "", "request_bytes", count),
-    GridRow("response packet, bytes", "", "response_bytes", count),
-    GridRow("arbitration, each", "", "arbitration_us", us),
-    GridRow("data, request", "", "request_data_us", us),
-    GridRow("data, response", "", "response_data_us", us),
-    GridRow("acknowledge, each", "", "acknowledge_us", us),
-    GridRow("request T_req", "", "request_us", us),
-    GridRow("response T_resp", "", "response_us", us),
-    GridRow("T1+T2", "", "request_and_acknowledge_us", us),
-    GridRow("execution T_exec = T3", "", "execution_us", us),
-    GridRow("T4+T5", "", "response_and_acknowledge_us", us),
-    GridRow("latency T_lant", "", "latency_us", us),
-    GridRow("subaction gap", "", "subaction_gap_us", us),
-    GridRow("arbitration reset gap", "", "arbitration_reset_gap_us", us),
-    GridRow("gaps T_sum", "", "gaps_us", us),
-    GridRow("T_lant + T_sum", "", "latency_with_gaps_us", us),
-)
+
+def latency_table_rows(bus: Bus) -> tuple[GridRow, ...]:
+    """Rows of the table: each phase of a transaction, all of them in us."""
+    setup = {figure.key for figure in (*bus.setup_figures, *bus.latency_figures[:_HEAD])}
+    own = (figure for figure in bus.latency_figures if figure.label and figure.key not in setup)
+    return tuple(figure_row(figure)._replace(unit="") for figure in own)
+
+
+_HEAD = 4
+"""Figures that say which transaction it is: timing model, transaction, payload and nodes."""
 
 
 def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
-    """Phases of each transaction, read and write and the models side by side; one table for each payload."""
-    models = len({one.timing_model for one in result.transactions})
-    size = 2 * models
+    """Phases of each transaction, the models side by side; one table for each payload."""
+    bus = bus_of(profile)
+    rows = latency_table_rows(bus)
     lines: list[Line] = []
-    for at in range(0, len(result.transactions), size):
-        lines.extend((*_grid(result.transactions[at : at + size]), BLANK))
-    first = result.transactions[0]
-    lines.append(
-        Line(
-            f"{result.profile}: farthest of {plural(first.nodes, 'node')}, {plural(first.hops, 'hop')}, "
-            f"gap count {first.gap_count}."
-        )
-    )
+    for _, group in groupby(_numbered(result.transactions), key=lambda pair: pair[0]):
+        lines.extend((*grid("phase, us", [_column(one) for _, one in group], rows), BLANK))
+    network = network_of(profile)
+    lines.append(Line(f"{result.profile}: {bus.latency_subject(network)}."))
     lines.extend(execution_line(profile))
-    over = sorted(
-        {one.payload_bytes for one in result.transactions if one.payload_bytes > profile.bus.max_payload_bytes}
-    )
-    if over:
-        limit = f"{profile.bus.max_payload_bytes} bytes of {profile.bus.speed}"
-        lines.append(Line(f"Warning: over the {limit}: {', '.join(map(str, over))}.", "warning"))
-    if first.hops > MAX_HOPS:
-        lines.append(Line(f"Warning: {first.hops} hops are over the {MAX_HOPS:g} of one bus.", "warning"))
-    lines.extend(Line(warning, "warning") for warning in warnings(profile, nodes=first.nodes, most=0))
+    lines.extend(Line(f"Warning: {words}.", "warning") for words in _over(result, profile))
+    lines.extend(Line(warning, "warning") for warning in warnings(profile, nodes=network.nodes, most=0))
     return lines
 
 
-def _grid(transactions: Sequence[Transaction]) -> list[Line]:
-    columns = [(f"{one.transaction} {one.payload_bytes} B\n{one.timing_model}", one.phases) for one in transactions]
-    return grid("phase, us", columns, LATENCY_ROWS, figures=FIGURES["latency"])
+def _numbered(transactions: Sequence[Transaction]) -> list[tuple[int, Transaction]]:
+    """Each transaction with the number of its table: one that is there already begins a new one."""
+    found: list[tuple[int, Transaction]] = []
+    seen: set[tuple[str, str]] = set()
+    number = 0
+    for one in transactions:
+        key = (one.timing_model, one.transaction)
+        if key in seen:
+            number, seen = number + 1, set()
+        seen.add(key)
+        found.append((number, one))
+    return found
+
+
+def _column(one: Transaction) -> tuple[str, object]:
+    payload = "" if one.payload_bytes is None else f" {one.payload_bytes} B"
+    return f"{one.transaction}{payload}\n{one.timing_model}", one.phases
+
+
+def _over(result: LatencyResult, profile: Profile) -> list[str]:
+    """The limits of the bus that the profile breaks with each of the payloads."""
+    sizes = sorted({one.payload_bytes for one in result.transactions if one.payload_bytes is not None})
+    networks = [network_of(with_payload(profile, size)) for size in sizes] or [network_of(profile)]
+    broken = (limit.words(network) for network in networks for limit in bus_of(profile).broken(network))
+    return list(dict.fromkeys(broken))

@@ -3,10 +3,10 @@
 The layout is ours because a piped report must not pay for loading a renderer; colours are left to who prints.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 
-from busplan.analysis.quantities import Figure
+from busplan.buses.figure import Figure
 
 Tone = Literal["good", "bad", "warning", "heading", "plain", "table"]
 """How a line is meant; "table" and "heading" lines keep their columns, the others may be wrapped."""
@@ -23,12 +23,14 @@ BLANK = Line("")
 
 
 class GridRow(NamedTuple):
-    """One row of figures: how it is called, and how its values are written. Where they come from, the registry says."""
+    """One row of figures: how it is called, and how its values are written."""
 
     label: str
     unit: str
     key: str
     write: Callable[[Any], str]
+    reference: str = ""
+    """Numbers of its equations, or where else it comes from."""
 
 
 def us(value: float) -> str:
@@ -55,6 +57,48 @@ def percent(value: float) -> str:
 def yes(value: object) -> str:
     """Write a truth."""
     return "yes" if value else "no"
+
+
+def um(value_mm: float) -> str:
+    """Write a length in mm as micrometres.
+
+    Examples
+    --------
+    >>> um(0.0036)
+    '3.600'
+    """
+    return us(value_mm * 1e3)
+
+
+def writer(figure: Figure) -> Callable[[Any], str]:
+    """How the values of a figure are written in a table."""
+    match figure.sort:
+        case "truth":
+            return yes
+        case "count":
+            return count
+        case "word":
+            return str
+        case "words":
+            return ", ".join
+        case "number":
+            units = {"%": percent, "um": um, "us": us}
+            decimals = figure.decimals
+            return units.get(figure.column or figure.unit, lambda value: f"{value:.{decimals}f}")
+
+
+def figure_row(figure: Figure, *, level: int = 0) -> GridRow:
+    """The row of a figure.
+
+    Parameters
+    ----------
+    figure
+        One with a label.
+    level
+        1 for a part of the row above it.
+    """
+    unit = figure.column or figure.unit
+    return GridRow("  " * level + figure.label, unit, figure.key, writer(figure), figure.reference)
 
 
 def plural(number: int, noun: str) -> str:
@@ -106,13 +150,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) 
     ]
 
 
-def grid(
-    first_heading: str,
-    columns: Sequence[tuple[str, object]],
-    rows: Sequence[GridRow],
-    *,
-    figures: Mapping[str, Figure],
-) -> list[Line]:
+def grid(first_heading: str, columns: Sequence[tuple[str, object]], rows: Sequence[GridRow]) -> list[Line]:
     """Lay out figures: rows down, one column of values for each object, units where a row has one."""
     has_units = any(row.unit for row in rows)
     words = [first_heading, "eq", "unit"] if has_units else [first_heading, "eq"]
@@ -120,7 +158,7 @@ def grid(
         [*words, *(heading for heading, _ in columns)],
         (
             [
-                *(row.label, figures[row.key].reference, row.unit)[: len(words)],
+                *(row.label, row.reference, row.unit)[: len(words)],
                 *(row.write(getattr(owner, row.key)) for _, owner in columns),
             ]
             for row in rows

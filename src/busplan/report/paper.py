@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from busplan.analysis.paper import Comparison, PaperSection
+from busplan.buses.published import Comparison, PaperSection
 from busplan.report.lines import BLANK, Line, table
 
 

@@ -2,12 +2,14 @@
 
 from typing import Any, Final
 
-from busplan.analysis.planning.cures import Value
+from busplan.analysis.network import bus_of
+from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
-from busplan.profile.model import Profile
+from busplan.buses.bus import Value
 from busplan.report.documents import Document, Row, document
 from busplan.report.lines import BLANK, Line, plural, table, us
-from busplan.report.words import MEANING, period, warnings
+from busplan.report.words import period, warnings
+from busplan.sections.profile import Profile
 
 
 def plan_lines(plan: Plan, *, with_circle: bool) -> list[Line]:
@@ -24,16 +26,18 @@ def plan_lines(plan: Plan, *, with_circle: bool) -> list[Line]:
     return lines
 
 
-def settings(changes: dict[str, Value]) -> str:
+def settings(profile: Profile, changes: dict[str, Value]) -> str:
     """Write changes as a profile has them.
 
     Examples
     --------
-    >>> settings({"bus.nodes": 20, "bus.max_hops": 16})
-    'bus.nodes = 20, bus.max_hops = 16 (rewired as a tree)'
+    >>> from busplan.profile.shipped import load
+    >>> settings(load("paper-4ms").profile, {"bus.nodes": 20, "bus.speed": "S400"})
+    'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'
     """
     # A number of nodes is what was asked for, never what a second bus would leave.
-    meaning = {key: f" ({MEANING[key]})" for key in changes if key in MEANING and key != "bus.nodes"}
+    meanings = bus_of(profile).change_meanings
+    meaning = {key: f" ({meanings[key]})" for key in changes if key in meanings and key != "bus.nodes"}
     return ", ".join(f"{key} = {_value(value)}{meaning.get(key, '')}" for key, value in changes.items())
 
 
@@ -43,21 +47,28 @@ def goal_words(profile: Profile) -> str:
     return f"{profile.name} with {plural(nodes, 'node')} ({plural(nodes * profile.node.axes, 'axis')})"
 
 
+_MODELS: Final = {1: "", 2: " both timing models"}
+
+
 def _headline(plan: Plan, *, with_circle: bool) -> Line:
     option, circle = plan.recommended, " and passes the circle" if with_circle else ""
     subject = f"{goal_words(plan.goal)} at {period(plan.goal.cycle.period_us)}"
+    models = _MODELS.get(len(bus_of(plan.goal).timing_models), " all timing models")
     if option is None:
         why = _why_none(plan)
+        bus = bus_of(plan.goal)
+        safe = "" if bus.safety_figure is None else f" with a safe {bus.safety}"
         return Line(
-            f"{subject}: NO PLAN. Of gap count, slice ratio, period, speed and wiring, no change of what is left open "
-            f"fits both timing models with a safe gap count{circle}{why}.",
+            f"{subject}: NO PLAN. Of {listed(changeable(plan.goal), 'and')}, no change of what is left open "
+            f"fits{models}{safe}{circle}{why}.",
             "bad",
         )
-    spare = min(option.deciding.margin_us, option.other.margin_us)
-    result = f"fits both timing models with {us(spare)} us to spare in the tighter one{circle}"
+    spare = min(one.margin_us for one in (option.deciding, *option.others))
+    tighter = " in the tighter one" if option.others else ""
+    result = f"fits{models} with {us(spare)} us to spare{tighter}{circle}"
     if not option.changes:
         return Line(f"{subject}: nothing to change; it {result}.", "good")
-    return Line(f"{subject}: set {settings(option.changes)}; then it {result}.", "good")
+    return Line(f"{subject}: set {settings(plan.goal, option.changes)}; then it {result}.", "good")
 
 
 def _why_none(plan: Plan) -> str:
@@ -79,22 +90,20 @@ def _warnings(plan: Plan) -> list[str]:
 
 
 _SHORT: Final = {
-    "bus.gap_count": "gap count {}",
-    "bus.max_hops": "tree of {} hops",
     "bus.nodes": "{} nodes",
-    "bus.speed": "speed {}",
     "cycle.slice_ratio": "ratio {}",
     "payload.read_bytes": "read {} bytes",
     "payload.write_bytes": "write {} bytes",
 }
 
 
-def _short(changes: dict[str, Value]) -> str:
+def _short(profile: Profile, changes: dict[str, Value]) -> str:
+    words = {**_SHORT, **bus_of(profile).change_words}
     payloads = {value for key, value in changes.items() if key.startswith("payload.")}
     if len(changes) == 2 and len(payloads) == 1 and all(key.startswith("payload.") for key in changes):  # noqa: PLR2004
         return f"payload {payloads.pop()} bytes"
     parts = (
-        period(float(value)) if key == "cycle.period_us" else _SHORT[key].format(_value(value))
+        period(float(value)) if key == "cycle.period_us" else words.get(key, f"{key} = {{}}").format(_value(value))
         for key, value in changes.items()
     )
     return ", ".join(parts) or "-"
@@ -106,7 +115,7 @@ def _value(value: Value) -> str:
 
 def _table(options: tuple[Option, ...]) -> list[Line]:
     first = options[0]
-    models = (first.deciding.timing_model, first.other.timing_model)
+    models = [one.timing_model for one in (first.deciding, *first.others)]
     return table(
         [
             "",
@@ -129,12 +138,11 @@ def _cells(option: Option) -> list[str]:
     return [
         "*" * option.recommended + "?" * (not option.proven),
         option.title,
-        _short(option.changes),
+        _short(option.profile, option.changes),
         option.deciding.binding_term,
         option.bounded_by or "-",
         circle,
-        us(option.deciding.margin_us),
-        us(option.other.margin_us),
+        *(us(one.margin_us) for one in (option.deciding, *option.others)),
         str(option.deciding.max_nodes),
         str(option.deciding.max_axes),
     ]
@@ -146,16 +154,17 @@ def plan_rows(plan: Plan) -> list[Row]:
 
 
 def _row(plan: Plan, option: Option) -> Row:
-    one, other, profile = option.deciding, option.other, option.profile
+    one, profile = option.deciding, option.profile
+    others = option.others
     return {
         "title": option.title,
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
         "timing_model": one.timing_model,
         "fits": one.fits,
-        "fits_other_model": other.fits,
+        "fits_other_model": all(other.fits for other in others) if others else None,
         "margin_us": one.margin_us,
-        "margin_other_model_us": other.margin_us,
+        "margin_other_model_us": min((other.margin_us for other in others), default=None),
         "binding_term": one.binding_term,
         "bounded_by": option.bounded_by,
         "proven": option.proven,
@@ -168,8 +177,7 @@ def _row(plan: Plan, option: Option) -> Row:
         "limited_by": one.limited_by,
         "period_us": one.period_us,
         "slice_ratio": profile.cycle.slice_ratio,
-        "gap_count": one.gap_count,
-        "gap_count_safe": one.gap_count_safe,
+        **{key: getattr(one, key) for key in bus_of(profile).planned_figures},
         "read_bytes": profile.payload.read_bytes,
         "write_bytes": profile.payload.write_bytes,
     }

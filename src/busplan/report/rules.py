@@ -4,8 +4,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any, Final
 
+from busplan.buses.rule import Rule
 from busplan.report.lines import table
-from busplan.rules.finding import Rule
 from busplan.rules.registry import NEVER_SUPPRESSED
 
 _WIDTH: Final = 88

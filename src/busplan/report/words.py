@@ -1,22 +1,14 @@
 """Verdicts in words that a person can act on."""
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterator, Mapping
 
-from busplan.analysis.capacity.cycle import TERM_KEYS, Limit
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
-from busplan.buses.ieee1394.constants import MAX_HOPS, MAX_NODES, REFERENCE_CABLE_M, safe_gap_count
-from busplan.profile.bus import Ieee1394Bus
-from busplan.profile.model import Profile
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.cures import changeable, listed
 from busplan.report.lines import Line, plural, us
-
-MEANING: Final = {
-    "bus.max_hops": "rewired as a tree",
-    "bus.nodes": "the others on a second bus",
-    "bus.speed": "if all nodes can",
-}
-"""What a change means on the machine, where its key does not say so."""
+from busplan.sections.profile import Profile
 
 
 def period(value_us: float) -> str:
@@ -49,11 +41,11 @@ def verdict_lines(verdict: Verdict, profile: Profile) -> Iterator[Line]:
 
 def binding_us(figures: CapacityFigures) -> float:
     """Size of the largest term [us]."""
-    return float(getattr(figures, TERM_KEYS[figures.binding_term]))
+    return max(float(term.us) for term in figures.terms)
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
-    """What to beware of, whatever the verdict: gap count, cable, hops.
+    """What to beware of, whatever the verdict.
 
     Parameters
     ----------
@@ -64,27 +56,7 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
     most
         Largest number of nodes that the report speaks of [1].
     """
-    bus = profile.bus
-    found = []
-    for number in (nodes, most):
-        hops = bus.hops(number)
-        if number and bus.gap_count_for(number) < safe_gap_count(hops):
-            found.append(
-                f"Warning: gap count {bus.gap_count_for(number)} is unsafe for {plural(hops, 'hop')} "
-                f"({plural(number, 'node')}); the smallest safe one is {safe_gap_count(hops)}{_table_limit(bus)}."
-            )
-            break
-    if not bus.cable_is_standard:
-        found.append(
-            f"Warning: cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
-            "gap-count table holds for."
-        )
-    return found
-
-
-def _table_limit(bus: Ieee1394Bus) -> str:
-    """What a safe gap count is safe for, where the cables are longer."""
-    return "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
+    return bus_of(profile).warnings(network_of(profile), nodes=[number for number in (nodes, most) if number])
 
 
 def execution_line(profile: Profile) -> Iterator[Line]:
@@ -112,28 +84,21 @@ def _headline(verdict: Verdict, profile: Profile) -> Line:
 def story(figures: CapacityFigures, profile: Profile) -> str:
     """Say of one set of figures whether it fits, and by how much or why not."""
     if figures.fits:
-        safe = "" if figures.gap_count_safe else ", but only with an unsafe gap count"
+        safe = "" if figures.safe else f", but only with an unsafe {bus_of(profile).safety}"
         return (
             f"fits, {us(figures.margin_us)} us to spare, {figures.utilisation:.1%} of "
             f"{us(figures.available_us)} us used{safe}"
         )
-    reasons = ", and ".join(_reason(limit, figures, profile) for limit in figures.exceeded)
+    reasons = ", and ".join(_reason(key, figures, profile) for key in figures.exceeded)
     return f"does not fit, {reasons}"
 
 
-def _reason(limit: Limit, figures: CapacityFigures, profile: Profile) -> str:
-    match limit:
-        case "time":
-            needed = f"{us(figures.required_us)} us needed of {us(figures.available_us)} us"
-            return f"{us(-figures.margin_us)} us short, {needed}"
-        case "payload":
-            payload = max(profile.payload.read_bytes, profile.payload.write_bytes)
-            limit_bytes = profile.bus.max_payload_bytes
-            return f"a payload of {payload} bytes is over the {limit_bytes} bytes of {profile.bus.speed}"
-        case "nodes":
-            return f"{figures.nodes} nodes are over the {MAX_NODES:g} of one bus"
-        case "hops":
-            return f"{figures.hops} hops are over the {MAX_HOPS:g} of one bus"
+def _reason(key: str, figures: CapacityFigures, profile: Profile) -> str:
+    limit = bus_of(profile).limit(key)
+    if limit is not None:
+        return limit.words(network_of(profile))
+    needed = f"{us(figures.required_us)} us needed of {us(figures.available_us)} us"
+    return f"{us(-figures.margin_us)} us short, {needed}"
 
 
 def _carries(verdict: Verdict) -> str:
@@ -155,15 +120,9 @@ def _nodes(nodes: int, axes: int) -> str:
 def _advice(verdict: Verdict, profile: Profile) -> Line:
     change, figures = verdict.change, verdict.deciding
     if change is None:
-        if not verdict.all_well:
-            if all(one.fits for one in verdict.all_figures):
-                return Line("No gap count is known to be safe for cables of this length.", "bad")
-            return Line("No change of gap count, slice ratio, period, speed or wiring alone makes it fit.", "bad")
-        if figures.limited_by == "time":
-            return Line("No change of gap count, slice ratio or period alone carries more nodes.")
-        limit = f"{MAX_HOPS:g} hops" if figures.limited_by == "hops" else f"{MAX_NODES:g} nodes"
-        return Line(f"No setting carries more nodes: {limit} are the standard's limit.")
-    settings = ", ".join(_setting(key, value) for key, value in change.changes.items())
+        return _no_advice(verdict, profile)
+    meanings = bus_of(profile).change_meanings
+    settings = ", ".join(_setting(key, value, meanings) for key, value in change.changes.items())
     spare = f"{us(change.figures.margin_us)} us to spare"
     if verdict.all_well:
         more = plural(change.nodes - figures.max_nodes, "more node")
@@ -174,6 +133,20 @@ def _advice(verdict: Verdict, profile: Profile) -> Line:
     return Line(f"Cheapest way to {purpose} ({models}): {settings}, which leaves {spare}.")
 
 
-def _setting(key: str, value: object) -> str:
-    meaning = f" ({MEANING[key]})" if key in MEANING else ""
+def _no_advice(verdict: Verdict, profile: Profile) -> Line:
+    """Say that there is no change to advise, and why."""
+    bus, figures = bus_of(profile), verdict.deciding
+    if not verdict.all_well:
+        if all(one.fits for one in verdict.all_figures):
+            return Line(bus.no_safe_setting, "bad")
+        return Line(f"No change of {listed(changeable(profile), 'or')} alone makes it fit.", "bad")
+    if figures.limited_by == TIME:
+        return Line(f"No change of {listed(changeable(profile, structure=False), 'or')} alone carries more nodes.")
+    limit = bus.limit(figures.limited_by)
+    most = "" if limit is None else f"{limit.most(network_of(profile)):g} {limit.key}"
+    return Line(f"No setting carries more nodes: {most} are the standard's limit.")
+
+
+def _setting(key: str, value: object, meanings: Mapping[str, str]) -> str:
+    meaning = f" ({meanings[key]})" if key in meanings else ""
     return f"{key} = {value}{meaning}"

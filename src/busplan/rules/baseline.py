@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping
 from sys import float_info
 from typing import Any, Final
 
+from busplan.buses.rule import RuleProblem
 from busplan.errors import BusplanError
-from busplan.rules.finding import Problem, Subject
+from busplan.rules.finding import Subject
 
 _SCHEMA: Final = 1
 _ROUNDING: Final = 1e-9
@@ -23,12 +24,12 @@ def figures_of(subject: Subject) -> dict[str, float]:
     """The figures that no profile may lose, by name."""
     return {
         f"{one.timing_model}.{name}": getattr(one, name)
-        for one in sorted((subject.deciding, subject.other), key=lambda one: one.timing_model)
+        for one in sorted((subject.deciding, *subject.others), key=lambda one: one.timing_model)
         for name in ("max_axes", "margin_us")
     }
 
 
-def regressions(now: Recorded, before: Recorded) -> Iterator[Problem]:
+def regressions(now: Recorded, before: Recorded) -> Iterator[RuleProblem]:
     """What a profile has lost against its record."""
     for name, value in now.items():
         if name not in before:
@@ -37,7 +38,7 @@ def regressions(now: Recorded, before: Recorded) -> Iterator[Problem]:
         if lost > _ROUNDING * max(abs(before[name]), 1.0):
             model, figure = name.split(".")
             key = "bus.nodes" if figure == "max_axes" else "cycle.period_us"
-            yield Problem(
+            yield RuleProblem(
                 key,
                 f"{figure} under the {model} timing fell to {value:.12g} from the {before[name]:.12g} of the baseline",
             )

@@ -6,14 +6,15 @@ They share one run of the test, made only for profiles that say something of ser
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
-from busplan.rules.finding import Problem, Rule, Subject
+from busplan.rules.finding import Subject
+from busplan.sections.profile import Profile
 
 _NAMED: Final = ("circle", "servo", "delivery", "cycle")
 
 
-def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
+def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     """Run the circle test of a profile: the code of each rule that is broken, with its problem.
 
     A cycle that does not fit has its own rule, and no circle.
@@ -27,7 +28,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
         result = circle_test(subject.profile).results[0]
     except BusplanError as error:
         for message in error.problems:
-            yield "BP203", Problem(_key_of(message, subject.profile), message)
+            yield "BP203", RuleProblem(_key_of(message, subject.profile), message)
         return
     first = to_attack(result)
     attack = (
@@ -42,7 +43,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, Problem]]:
         cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else ""
         if failure.name in CONTOUR_MEASURES:
             cure = attack
-        yield "BP202" if stability else "BP201", Problem(key, f"{failure.text}{cure}")
+        yield "BP202" if stability else "BP201", RuleProblem(key, f"{failure.text}{cure}")
 
 
 def _key_of(message: str, profile: Profile) -> str:
@@ -54,7 +55,7 @@ def _key_of(message: str, profile: Profile) -> str:
     return "servo" if "servo" in profile.model_fields_set else "circle"
 
 
-def answered(subject: Subject, problems: Sequence[tuple[str, Problem]]) -> set[str]:
+def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
     """Codes of the rules that have an answer: none without a test, one alone where the test could not be run."""
     if subject.profile.asks_for_circle and not subject.deciding.fits:
         return set()

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Final
 
+from busplan.buses.rule import Rule
 from busplan.errors import ProblemKind
-from busplan.rules.finding import Rule
 
 BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
     "syntax": Rule(

@@ -1,23 +1,15 @@
 """What a rule says, and what it says it of."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
-from busplan.analysis.capacity.cycle import cycle, fits_in
+from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.latency import BOTH_MODELS
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.toml import LoadedProfile
-
-Severity = Literal["error", "warning"]
-
-
-class Problem(NamedTuple):
-    """One thing that a rule found: the dotted key that causes it, and what is wrong."""
-
-    key: str
-    message: str
+from busplan.analysis.network import model_names, network_of
+from busplan.analysis.planning.cures import Change, change_for_room, change_to_fit, changeable, listed
+from busplan.buses.rule import Severity
+from busplan.profile.toml import LoadedProfile, override
 
 
 class Finding(NamedTuple):
@@ -45,32 +37,37 @@ class Subject:
         return figures(self.profile, model=self.profile.bus.timing_model)
 
     @cached_property
-    def other(self) -> CapacityFigures:
-        """Capacity under the other timing model."""
-        return figures(self.profile, model=self._other_model)
+    def others(self) -> tuple[CapacityFigures, ...]:
+        """Capacity under the other timing models."""
+        return tuple(figures(self.profile, model=model) for model in self._other_models)
 
     @property
-    def other_overruns(self) -> bool:
-        """Whether the cycle does not fit under the other timing model, which takes no figures to tell."""
-        now = cycle(self.profile, model=self._other_model, nodes=self.profile.bus.nodes)
-        available_us = self.profile.cycle.slice_ratio * self.profile.cycle.period_us
-        return not fits_in(now.required_us, available_us=available_us)
+    def others_overrun(self) -> bool:
+        """Whether the cycle does not fit under another timing model, which takes no figures to tell."""
+        given_us = available_us(network_of(self.profile))
+        return any(
+            not fits_in(cycle_of(self.profile, model=model).required_us, available_us=given_us)
+            for model in self._other_models
+        )
 
     @property
-    def _other_model(self) -> TimingModelName:
-        (model,) = (model for model in BOTH_MODELS if model != self.profile.bus.timing_model)
-        return model
+    def _other_models(self) -> tuple[str, ...]:
+        return tuple(model for model in model_names(self.profile) if model != self.profile.bus.timing_model)
 
+    def after(self, changes: Mapping[str, object]) -> CapacityFigures:
+        """Capacity under the timing model that decides, with other values by dotted key."""
+        return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
-class Rule(NamedTuple):
-    """One rule of the gate."""
+    def cure(self, *models: str) -> str:
+        """The cheapest change after which these timing models fit, in words."""
+        return self._words(change_to_fit(self.profile, models=models))
 
-    code: str
-    name: str
-    severity: Severity
-    summary: str
-    """What is wrong, in one line."""
-    explanation: str
-    """Why it matters and how to mend it."""
-    check: Callable[[Subject], Iterator[Problem]] | None = None
-    """Looks at a profile that could be read; None for what is found in another way."""
+    def room(self, nodes: int, *, utilisation: float = 1.0) -> str:
+        """The cheapest change that makes room for some nodes under the model that decides, in words."""
+        model = self.deciding.timing_model
+        return self._words(change_for_room(self.profile, model=model, nodes=nodes, utilisation=utilisation))
+
+    def _words(self, change: Change | None) -> str:
+        if change is None:
+            return f"no change of {listed(changeable(self.profile, structure=False), 'or')} alone is a cure"
+        return "cheapest cure: " + ", ".join(f"{key} = {value}" for key, value in change.changes.items())

@@ -1,17 +1,18 @@
 """The gate itself: one document in, its findings out."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, NamedTuple
 
+from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.profile.collect import Source
 from busplan.profile.document import Document
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
-from busplan.rules import bus, circle
+from busplan.rules import circle
 from busplan.rules.baseline import Recorded, figures_of, regressions
 from busplan.rules.file import BY_KIND
-from busplan.rules.finding import Finding, Problem, Rule, Subject
-from busplan.rules.registry import BASELINE, RULES
+from busplan.rules.finding import Finding, Subject
+from busplan.rules.registry import BASELINE, all_rules, cycle_rules
 from busplan.rules.suppression import suppress
 
 Status = Literal["ok", "findings", "error"]
@@ -101,11 +102,12 @@ def check_document(
         # Not to be suppressed: nothing else of the file has been checked.
         return _result(document, None, list(_of_file(error)), {})
     subject = Subject(LoadedProfile(profile, document))
-    found = list(_bus_findings(subject))
-    ran = {rule.code for rule in bus.RULES}
+    own = cycle_rules(profile.bus.kind)
+    found = list(_findings(subject, own))
+    ran = {rule.code for rule in own}
     if with_circle:
         problems = list(circle.circle_problems(subject))
-        found += [_placed(subject, RULES[code], problem) for code, problem in problems]
+        found += [_placed(subject, all_rules()[code], problem) for code, problem in problems]
         ran |= circle.answered(subject, problems)
     if baseline is not None:
         lost = regressions(figures_of(subject), baseline)
@@ -115,8 +117,8 @@ def check_document(
     return _result(document, profile.name, suppress(found, document, ran=ran), figures)
 
 
-def _bus_findings(subject: Subject) -> Iterator[Finding]:
-    for rule in bus.RULES:
+def _findings(subject: Subject, rules: Iterable[Rule]) -> Iterator[Finding]:
+    for rule in rules:
         if rule.check is not None:
             for problem in rule.check(subject):
                 yield _placed(subject, rule, problem)
@@ -137,7 +139,7 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
         yield Finding(rule.code, rule.name, rule.severity, one.message + more, one.key, one.line, one.column)
 
 
-def _placed(subject: Subject, rule: Rule, problem: Problem) -> Finding:
+def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Put a problem at the line of its key, or of the table that should have it."""
     places, path = subject.document.places, tuple(problem.key.split("."))
     while path and path not in places:

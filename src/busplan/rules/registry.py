@@ -1,12 +1,14 @@
 """All rules of the gate by code. Codes are stable: one that is dropped is never used again."""
 
 from collections.abc import Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import Final
 
+from busplan.buses import kind_named, kind_names
+from busplan.buses.rule import Rule
 from busplan.rules import bus, circle
 from busplan.rules.file import BY_KIND
-from busplan.rules.finding import Rule
 
 BASELINE: Final = Rule(
     "BP301",
@@ -39,16 +41,20 @@ NEVER_SUPPRESSED: Final = frozenset(
 )
 """Codes of what must be mended: a file that cannot be read further, and suppressions themselves."""
 
-RULES: Final[Mapping[str, Rule]] = MappingProxyType(
-    {
-        rule.code: rule
-        for rule in (
-            *BY_KIND.values(),
-            *bus.RULES,
-            *circle.RULES,
-            BASELINE,
-            SUPPRESSION_WITHOUT_REASON,
-            SUPPRESSION_WITHOUT_EFFECT,
-        )
-    }
-)
+
+def all_rules() -> Mapping[str, Rule]:
+    """Every rule by its code, those of every kind of bus among them, in the order of the codes."""
+    return _by_code(kind_names())
+
+
+@cache
+def _by_code(kinds: tuple[str, ...]) -> Mapping[str, Rule]:
+    own = (rule for kind in kinds for rule in kind_named(kind).rules)
+    others = (*BY_KIND.values(), BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT)
+    found = (*bus.RULES, *own, *circle.RULES, *others)
+    return MappingProxyType({rule.code: rule for rule in sorted(found, key=lambda rule: rule.code)})
+
+
+def cycle_rules(kind: str) -> tuple[Rule, ...]:
+    """Rules that look at a profile of a kind of bus, in the order of their codes."""
+    return tuple(sorted((*bus.RULES, *kind_named(kind).rules), key=lambda rule: rule.code))

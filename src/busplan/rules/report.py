@@ -4,7 +4,8 @@ from functools import cached_property
 from hashlib import sha256
 from typing import NamedTuple
 
-from busplan.rules.finding import Finding, Severity
+from busplan.buses.rule import Severity
+from busplan.rules.finding import Finding
 from busplan.rules.gate import FileResult
 
 

@@ -4,9 +4,10 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
+from busplan.buses.rule import Rule
 from busplan.profile.document import Document
-from busplan.rules.finding import Finding, Rule
-from busplan.rules.registry import NEVER_SUPPRESSED, RULES, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON
+from busplan.rules.finding import Finding
+from busplan.rules.registry import NEVER_SUPPRESSED, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON, all_rules
 
 MARK: Final = "busplan:"
 _ADDRESSED: Final = re.compile(r"#\s*busplan:")
@@ -66,7 +67,7 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
         for code in one.codes:
             hit = [finding for finding in left if finding.code == code and finding.line == one.of_line]
             left = [finding for finding in left if finding not in hit]
-            if code not in RULES:
+            if code not in all_rules():
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
             elif code in NEVER_SUPPRESSED:
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code} cannot be suppressed, it must be mended"))

@@ -6,11 +6,12 @@ from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
 from busplan.analysis.calibration.execution_fit import METHODS, Form, Groups, Method, fit_execution, middles, theil_sen
-from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases, TimingModelName, transaction
+from busplan.analysis.network import bus_of, network_of
+from busplan.buses.bus import Halves
 from busplan.errors import BusplanError
-from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.measurements import Measurement
-from busplan.profile.model import Profile
+from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.profile import Profile
 
 Way = Literal["timing-model", "measured-halves"]
 """Where the two halves come from that are taken off a latency."""
@@ -75,7 +76,7 @@ class Calibration(NamedTuple):
 
     profile: Profile
     """The profile as it was on the bench."""
-    timing_model: TimingModelName
+    timing_model: str
     way: Way
     method: Method
     execution: LinearExecution | TableExecution
@@ -95,7 +96,7 @@ def calibrate(
     measurements: Sequence[Measurement],
     *,
     source: str,
-    timing_model: TimingModelName | None = None,
+    timing_model: str | None = None,
     form: Form | None = None,
     robust: bool = False,
     grade: Literal["measured", "derived"] = "measured",
@@ -142,7 +143,7 @@ def calibrate(
     Kendall's tau", JASA 63 (1968). B. Iglewicz, D. Hoaglin, "How to Detect and Handle Outliers" (1993).
     """
     model = timing_model or profile.bus.timing_model
-    halves = _packet_phases(profile, measurements, model)
+    halves = _packets(profile, measurements, model)
     way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
     raw = [(one, _packets_us(one, halves)) for one in measurements]
     _require_possible(profile, raw, source=source, way=way, model=model)
@@ -167,21 +168,14 @@ def calibrate(
     )
 
 
-_Halves = Mapping[tuple[str, int], Phases]
+_Halves = Mapping[tuple[str, int], Halves]
 
 
-def _packet_phases(profile: Profile, measurements: Sequence[Measurement], model: TimingModelName) -> _Halves:
-    """Phases of every transaction and payload that was measured, without any execution."""
-    bus = profile.bus
+def _packets(profile: Profile, measurements: Sequence[Measurement], model: str) -> _Halves:
+    """What the packets take of every transaction and payload that was measured."""
+    bus, network = bus_of(profile), network_of(profile)
     return {
-        (kind, size): transaction(
-            kind,
-            model=TIMING_MODELS[model],
-            link=bus.link(bus.nodes),
-            payload_bytes=size,
-            overhead_bytes=profile.payload.overhead_bytes,
-            execution_us=0.0,
-        )
+        (kind, size): bus.halves(network, model=model, kind=kind, payload_bytes=size)
         for kind, size in dict.fromkeys((one.transaction, one.payload_bytes) for one in measurements)
     }
 
@@ -194,13 +188,14 @@ def _packets_us(one: Measurement, halves: _Halves) -> float:
 
 
 def _require_possible(
-    profile: Profile, raw: Sequence[tuple[Measurement, float]], *, source: str, way: Way, model: TimingModelName
+    profile: Profile, raw: Sequence[tuple[Measurement, float]], *, source: str, way: Way, model: str
 ) -> None:
     """Refuse what cannot have been measured on this bus, all of it at once."""
-    limit = profile.bus.max_payload_bytes
+    payloads = bus_of(profile).payloads(network_of(profile))
+    limit = payloads.most_bytes
     needed = "twice its T1 + T2 is" if way == "measured-halves" else f"the packets alone take in the {model} model"
     problems = [
-        f"{source}:{one.line}: payload {one.payload_bytes} bytes is over the {limit} bytes of {profile.bus.speed}"
+        f"{source}:{one.line}: payload {one.payload_bytes} bytes is over the {limit} bytes of {payloads.carrier}"
         for one, _ in raw
         if one.payload_bytes > limit
     ]

@@ -6,7 +6,7 @@ from statistics import fmean, linear_regression, median
 from typing import Final, Literal
 
 from busplan.errors import BusplanError
-from busplan.profile.bus import LinearExecution, TableExecution
+from busplan.sections.execution import LinearExecution, TableExecution
 
 Form = Literal["table", "linear"]
 Method = Literal["mean", "median", "least squares", "Theil-Sen"]

@@ -1,57 +1,69 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
-from busplan.analysis.capacity.cycle import Cycle, Limit, Term, available_us, broken_limits, cycle, fits_in
+from busplan.analysis.capacity.cycle import TIME, available_us, broken_limits, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes
-from busplan.analysis.latency import BOTH_MODELS
-from busplan.buses.ieee1394 import equations
-from busplan.buses.ieee1394.constants import gap_count_by_hops
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
+from busplan.analysis.network import bus_of, model_names, network_of
+from busplan.buses import kind_named
+from busplan.buses.bus import BusCycle, Term
+from busplan.buses.time_slice import required_time_slice_us, time_slice_us
+from busplan.elementwise import Number, choose, larger
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 
 class CapacityFigures(NamedTuple):
-    """Capacity at one period under one timing model; what each figure is stands in `busplan.analysis.quantities`."""
+    """Capacity at one period under one timing model; what each figure is stands in the register of its bus.
 
-    timing_model: TimingModelName
+    The figures that only its kind of bus has, and the terms, are attributes like all others.
+    """
+
+    kind: str
+    """The kind of bus."""
+    timing_model: str
     period_us: float
     nodes: int
     axes: int
-    hops: int
-    gap_count: int
-    safe_gap_count: int
-    gap_count_safe: bool
     available_us: float
     required_us: float
     time_slice_us: float
     required_time_slice_us: float
-    read_latency_us: float
-    write_latency_us: float
-    gaps_us: float
-    subaction_gap_us: float
-    arbitration_reset_gap_us: float
-    sync_us: float
-    nonperiodic_us: float
-    cycle_arbitration_us: float
-    cycle_data_us: float
-    cycle_acknowledge_us: float
-    cycle_execution_us: float
-    cycle_gaps_us: float
-    binding_term: Term
+    terms: tuple[Term, ...]
+    """The parts of `required_us`, in the order of the wire."""
     utilisation: float
     margin_us: float
-    nodes_eq11: float
+    binding_term: str
+    """Name of the largest term."""
     max_nodes: int
     max_axes: int
-    limited_by: Limit
+    limited_by: str
+    """Key of the limit that keeps `max_nodes` from being more."""
     min_period_us: float
     min_slice_ratio: float
-    exceeded: tuple[Limit, ...]
+    exceeded: tuple[str, ...]
+    """Keys of the limits that are broken."""
     fits: bool
+    safe: bool
+    """Whether the bus is set so that it works reliably, beside fitting."""
+    own: Mapping[str, Any]
+    """Figures that only this kind of bus has."""
+
+    def __getattr__(self, key: str) -> Any:
+        # Only what is no field comes here.
+        if not key.startswith("_"):
+            if key in self.own:
+                return self.own[key]
+            for term in self.terms:
+                if term.key == key:
+                    return term.us
+        raise AttributeError(f"a bus of kind {self.kind} has no figure {key!r}")
+
+    def by_key(self) -> dict[str, Any]:
+        """The figures of the document by key, in its order."""
+        return {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).capacity_figures}
 
 
 class Capacity(NamedTuple):
@@ -70,7 +82,7 @@ def capacity(
     profile: Profile,
     *,
     periods_us: Sequence[float] | None = None,
-    timing_models: Sequence[TimingModelName] = BOTH_MODELS,
+    timing_models: Sequence[str] | None = None,
 ) -> Capacity:
     """Tell whether the cycle fits its period, and how many nodes would.
 
@@ -81,7 +93,7 @@ def capacity(
     periods_us
         Communication periods T_s [us]; without them the profile's own.
     timing_models
-        Which timing models, in this order.
+        Which timing models, in this order; without them all of the kind of bus.
 
     Returns
     -------
@@ -98,95 +110,69 @@ def capacity(
     Paper, equations (1), (2), (11).
     """
     periods = [profile.cycle.period_us] if periods_us is None else periods_us
+    models = model_names(profile) if timing_models is None else timing_models
     variants = [
         override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
     ]
     return Capacity(
         profile,
-        tuple(tuple(figures(variant, model=model) for model in timing_models) for variant in variants),
+        tuple(tuple(figures(variant, model=model) for model in models) for variant in variants),
     )
 
 
-def figures(profile: Profile, *, model: TimingModelName) -> CapacityFigures:
+def figures(profile: Profile, *, model: str) -> CapacityFigures:
     """Compute all figures of a profile at its own period under one timing model."""
-    now = cycle(profile, model=model, nodes=profile.bus.nodes)
-    numbers = numeric_figures(profile, now)
-    terms_us = now.terms_us()
+    network = network_of(profile)
+    bus = bus_of(profile)
+    cycle = bus.cycle(network, model=model)
+    numbers, own = numeric_figures(cycle), dict(cycle.figures())
     max_nodes, limited_by = largest_nodes(profile, model=model)
-    fits_time = fits_in(now.required_us, available_us=available_us(profile))
-    exceeded = broken_limits(profile) + (() if fits_time else ("time",))
+    late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
+    exceeded = (*broken_limits(profile), *((TIME,) if late else ()))
     return CapacityFigures(
+        kind=bus.kind,
         timing_model=model,
         **numbers,
-        binding_term=max(terms_us, key=lambda term: terms_us[term]),
+        terms=cycle.terms,
+        binding_term=max(cycle.terms, key=lambda term: term.us).name,
         max_nodes=max_nodes,
         max_axes=profile.node.axes * max_nodes,
         limited_by=limited_by,
         exceeded=exceeded,
         fits=not exceeded,
+        safe=bus.is_safe(network),
+        own=own,
     )
 
 
-def numeric_figures(profile: Profile, now: Cycle) -> dict[str, Any]:
-    """Figures that follow from a cycle by operators alone.
+def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
+    """Figures of every kind of bus that follow from a cycle by operators alone.
 
     Parameters
     ----------
-    profile
-        The network. Its keys may hold arrays that broadcast (see `sweep`), and so may the cycle's.
-    now
-        The cycle of its own number of nodes.
+    cycle
+        The cycle of the network's own number of nodes. Its numbers may be of any sort.
 
     Returns
     -------
     dict
-        By the names of `CapacityFigures`; all but words, `max_nodes`, `max_axes` and `fits`.
+        By the names of `CapacityFigures`.
     """
-    bus, period_us, nodes = profile.bus, profile.cycle.period_us, now.nodes
-    hops, gap_count = bus.hops(nodes), bus.gap_count_for(nodes)
-    safe = gap_count_by_hops(hops)
-    given_us, required_us, terms_us = available_us(profile), now.required_us, now.terms_us()
+    network = cycle.network
+    period_us, ratio, nodes = network.period_us, network.slice_ratio, network.nodes
+    given_us, required_us = available_us(network), cycle.required_us
     spare_us = given_us - required_us
-    fits = fits_in(required_us, available_us=given_us)
     return {
         "period_us": period_us,
         "nodes": nodes,
-        "axes": profile.node.axes * nodes,
-        "hops": hops,
-        "gap_count": gap_count,
-        "safe_gap_count": safe,
-        "gap_count_safe": gap_count >= safe,
+        "axes": network.axes,
         "available_us": given_us,
         "required_us": required_us,
-        "time_slice_us": equations.time_slice_us(period_us, slice_ratio=profile.cycle.slice_ratio, nodes=nodes),
-        "required_time_slice_us": equations.required_time_slice_us(
-            now.reads_us,
-            writes_us=now.writes_us,
-            nonperiodic_us=now.nonperiodic_us,
-            sync_us=now.sync_us,
-            nodes=nodes,
-        ),
-        "read_latency_us": now.read.latency_us,
-        "write_latency_us": now.write.latency_us,
-        "gaps_us": now.read.gaps_us,
-        "subaction_gap_us": now.read.subaction_gap_us,
-        "arbitration_reset_gap_us": now.read.arbitration_reset_gap_us,
-        "sync_us": now.sync_us,
-        "nonperiodic_us": now.nonperiodic_us,
-        "cycle_arbitration_us": terms_us["arbitration"],
-        "cycle_data_us": terms_us["data"],
-        "cycle_acknowledge_us": terms_us["acknowledge"],
-        "cycle_execution_us": terms_us["execution"],
-        "cycle_gaps_us": terms_us["gaps"],
+        "time_slice_us": time_slice_us(period_us, slice_ratio=ratio, nodes=nodes),
+        "required_time_slice_us": required_time_slice_us(required_us, nodes=nodes),
         "utilisation": required_us / given_us,
         # What fits by rounding alone has no margin, and no negative one either.
-        "margin_us": spare_us - fits * (spare_us < 0) * spare_us,
-        "nodes_eq11": equations.published_nodes(
-            given_us,
-            sync_us=now.sync_us,
-            latency_us=(now.read.latency_us + now.write.latency_us) / 2,
-            gaps_us=now.read.gaps_us,
-        ),
-        "min_period_us": required_us / profile.cycle.slice_ratio,
+        "margin_us": choose(fits_in(required_us, available_us=given_us), larger(spare_us, 0.0), spare_us),
+        "min_period_us": required_us / ratio,
         "min_slice_ratio": required_us / period_us,
     }

@@ -1,28 +1,26 @@
 """The largest number of nodes that a bus carries, and what keeps it from being larger."""
 
-from bisect import bisect_left
-from math import floor
+from math import inf
 from typing import NamedTuple
 
-from busplan.analysis.capacity.cycle import Limit, available_us, cycle, fits_in, limits_broken
-from busplan.buses.ieee1394.constants import MAX_HOPS, MAX_NODES
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.bus import Ieee1394Bus
-from busplan.profile.model import Profile
+from busplan.analysis.capacity.cycle import limits_with_time
+from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial
+from busplan.analysis.network import network_of
+from busplan.buses.bus import Limit
+from busplan.buses.network import Network
+from busplan.elementwise import Number, choose, larger
+from busplan.sections.profile import Profile
 
 
-def most_nodes(bus: Ieee1394Bus) -> tuple[int, Limit]:
-    """Nodes that the standard allows on a bus, whatever the time, and the limit that says so."""
-    return (int(min(MAX_NODES, MAX_HOPS)), "hops") if bus.max_hops is None else (int(MAX_NODES), "nodes")
+class MostNodes(NamedTuple):
+    """A largest number of nodes, and the place of its limit among `limits_with_time`; arrays broadcast."""
+
+    nodes: Number
+    limit: Number
 
 
-def largest_nodes(profile: Profile, *, model: TimingModelName) -> tuple[int, Limit]:
+def largest_nodes(profile: Profile, *, model: str) -> tuple[int, str]:
     """Find the largest number of nodes that fits the profile's period, and what keeps it from being larger.
-
-    Required time is c0 + c1 N + c2 N^2: in a chain each packet crosses N hops, and there are N transactions of
-    each kind; in a tree the hops stay, and c2 is zero. The root is the answer but for rounding, which the test of
-    its neighbours takes out. An "optimal" gap count in a chain grows with N by the table, and the required time with
-    both; there the at most 16 rows are halved until one is left.
 
     Parameters
     ----------
@@ -34,59 +32,66 @@ def largest_nodes(profile: Profile, *, model: TimingModelName) -> tuple[int, Lim
     Returns
     -------
     tuple
-        Number of nodes [1], and the limit.
+        Number of nodes [1], and the key of the limit.
 
     References
     ----------
     Paper, equations (1)-(11), with (11) solved for N.
     """
-    bus = profile.bus
-    is_chain = bus.max_hops is None
-    if limits_broken(profile)["payload"]:
-        return 0, "payload"
-    if not is_chain and bus.hops(1) > MAX_HOPS:
-        return 0, "hops"
-    most, structural = most_nodes(bus)
-    given_us = available_us(profile)
-
-    def fits(nodes: int) -> bool:
-        return fits_in(cycle(profile, model=model, nodes=nodes).required_us, available_us=given_us)
-
-    if is_chain and bus.gap_count == "optimal":
-        answer = bisect_left(range(1, most + 1), x=True, key=lambda nodes: not fits(nodes))
-    else:
-        answer = min(most, floor(required_by_nodes(profile, model=model).nodes(given_us)) + 1)
-        while answer and not fits(answer):
-            answer -= 1
-    return answer, structural if answer == most else "time"
+    network = network_of(profile)
+    most = most_nodes(network, model=model)
+    return int(most.nodes), limits_with_time(network, model=model)[int(most.limit)].key
 
 
-class RequiredByNodes(NamedTuple):
-    """Required time over the number of nodes, c0 + c1 N + c2 N^2, with a gap count that is fixed."""
+def most_nodes(network: Network, *, model: str) -> MostNodes:
+    """Find the largest number of nodes within every limit; of equal answers the first limit gives its name.
 
-    c0_us: float
-    c1_us: float
-    c2_us: float
+    Each limit is asked alone, and asks the cycle itself: once, with a polynomial in the place of the number of nodes.
+    One that is no polynomial is searched by halves, below what the others allow.
 
-    def nodes(self, available_us: float) -> float:
-        """Largest real N whose cycle fits, but for rounding; 0 when there is none. Arrays broadcast."""
-        spare_us = available_us - self.c0_us
-        spare_us = spare_us * (spare_us > 0)
-        # The form without cancellation: c2 may be zero, c1 is not. The power is an operator, and a root for arrays too.
-        root: float = (self.c1_us * self.c1_us + 4 * self.c2_us * spare_us) ** 0.5
-        return 2 * spare_us / (self.c1_us + root)
+    Parameters
+    ----------
+    network
+        Its own number of nodes plays no part. Its numbers may be arrays.
+    model
+        Timing model.
+    """
+    limits = limits_with_time(network, model=model)
+    closed = [_in_closed_form(limit, network) for limit in limits]
+    ceiling = int(min(_greatest(one) for one in closed if one is not None))
+    nodes: Number = None
+    place: Number = 0
+    for index, (limit, found) in enumerate(zip(limits, closed, strict=True)):
+        most = _by_halves(limit, network, ceiling) if found is None else found
+        if nodes is None:
+            nodes = most
+        else:
+            less = most < nodes
+            nodes, place = choose(less, most, nodes), choose(less, index, place)
+    return MostNodes(nodes, place)
 
 
-def required_by_nodes(profile: Profile, *, model: TimingModelName) -> RequiredByNodes:
-    """Required time as a polynomial of the number of nodes; arrays broadcast."""
-    # One and two nodes, and the cycle of none, give the three coefficients through the equations themselves.
-    one, two = (cycle(profile, model=model, nodes=nodes) for nodes in (1, 2))
-    latencies_one = one.read.latency_with_gaps_us + one.write.latency_with_gaps_us
-    latencies_two = two.read.latency_with_gaps_us + two.write.latency_with_gaps_us
-    sync_per_node_us = two.sync_us - one.sync_us
-    c2 = latencies_two - latencies_one
-    return RequiredByNodes(
-        c0_us=one.nonperiodic_us + one.sync_us - sync_per_node_us,
-        c1_us=latencies_one - c2 + sync_per_node_us,
-        c2_us=c2,
-    )
+def _in_closed_form(limit: Limit, network: Network) -> Number | None:
+    """The most nodes within one limit, infinite where they play no part; None where there is no closed form."""
+    try:
+        value = limit.value(network.with_nodes(NODES))
+        if isinstance(value, Polynomial):
+            return value.largest_within(limit.most(network))
+        return choose(value > limit.most(network), 0.0, inf)
+    except NoPolynomialError:
+        return None
+
+
+def _by_halves(limit: Limit, network: Network, ceiling: int) -> Number:
+    """The most nodes within one limit, whose value never falls with the nodes."""
+    low: Number = 0
+    high: Number = ceiling
+    for _ in range(ceiling.bit_length()):
+        middle = larger((low + high + 1) // 2, 1)
+        over = limit.is_broken(network.with_nodes(middle))
+        low, high = choose(over, low, middle), choose(over, middle - 1, high)
+    return low
+
+
+def _greatest(number: Number) -> float:
+    return float(number.max()) if hasattr(number, "max") else float(number)

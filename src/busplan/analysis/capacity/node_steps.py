@@ -3,22 +3,21 @@
 from bisect import bisect_right
 from typing import NamedTuple
 
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, Limit, cycle
+from busplan.analysis.capacity.cycle import FIT_ROUNDING, cycle_of
 from busplan.analysis.capacity.node_limit import largest_nodes
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
+from busplan.sections.profile import Profile
 
 
 class NodeSteps(NamedTuple):
     """The steps of the largest number of nodes over the period, under one timing model."""
 
-    timing_model: TimingModelName
+    timing_model: str
     axes_per_node: int
     from_us: tuple[float, ...]
     """Smallest period that 1, 2, ... nodes fit in; none where no period helps."""
-    limited_by: Limit
+    limited_by: str
     """What keeps it from going on."""
 
     def max_axes(self, period_us: float) -> int:
@@ -26,7 +25,7 @@ class NodeSteps(NamedTuple):
         return self.axes_per_node * bisect_right(self.from_us, period_us * (1 + FIT_ROUNDING))
 
 
-def node_steps(profile: Profile, *, model: TimingModelName) -> NodeSteps:
+def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     """Find the period from which on each number of nodes fits.
 
     Parameters
@@ -45,5 +44,5 @@ def node_steps(profile: Profile, *, model: TimingModelName) -> NodeSteps:
     """
     most, limit = largest_nodes(override(profile, {"cycle.period_us": MAX_TIME_US}), model=model)
     ratio = profile.cycle.slice_ratio
-    from_us = (cycle(profile, model=model, nodes=nodes).required_us / ratio for nodes in range(1, most + 1))
+    from_us = (cycle_of(profile, model=model, nodes=nodes).required_us / ratio for nodes in range(1, most + 1))
     return NodeSteps(model, profile.node.axes, tuple(from_us), limit)

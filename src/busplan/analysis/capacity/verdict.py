@@ -16,7 +16,7 @@ class Verdict(NamedTuple):
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
     change: Change | None
-    """The cheapest change: one after which every model that was asked for fits, with a safe gap count; or, where all
+    """The cheapest change: one after which every model that was asked for fits, and the bus is safe; or, where all
     is well already, one that carries more nodes under the deciding model."""
 
     @property
@@ -31,8 +31,8 @@ class Verdict(NamedTuple):
 
     @property
     def all_well(self) -> bool:
-        """Whether every model fits and the gap count is safe."""
-        return all(one.fits for one in self.all_figures) and self.deciding.gap_count_safe
+        """Whether every model fits and the bus is set safely."""
+        return all(one.fits for one in self.all_figures) and self.deciding.safe
 
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:

@@ -3,7 +3,7 @@
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.roundness import Progress, circle_test
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 _PARTS = 1000
 """Parts of one test that progress counts."""

@@ -1,15 +1,13 @@
 """What a circle test does not hold: the bus, stability, the turn, margins and tolerances, each in words."""
 
 from math import inf
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
-from busplan.buses.ieee1394.constants import MAX_HOPS, MAX_NODES
-from busplan.profile.model import Profile
+from busplan.analysis.network import bus_of, network_of
+from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
-
-if TYPE_CHECKING:
-    from busplan.analysis.capacity.cycle import Limit
 
 CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 """Measures of roundness that have a tolerance, in the order in which they are looked at."""
@@ -17,9 +15,6 @@ LEAST_ARC_DEG: Final = 270.0
 """Arc that the circular deviation G needs: the least-squares centre of a shorter one follows its errors."""
 _FAILURES: Final[dict[str, str]] = {
     "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
-    "hops": "{value:.0f} hops are over the {limit:.0f} of one bus",
-    "nodes": "{value:.0f} nodes are over the {limit:.0f} of one bus",
-    "payload_bytes": "a payload of {value:.0f} bytes is over the limit of {limit:.0f} bytes",
     "stability": "the position loop is unstable",
     "circle_not_followed": "the table did not follow the circle (not the whole turn, or an error above the radius): "
     "it went {value:.0f} deg of {limit:.0f} deg round the centre",
@@ -39,10 +34,18 @@ class Failure(NamedTuple):
     name: str
     value: float | None
     limit: float | None
+    said: str = ""
+    """What a broken limit of the bus says of itself."""
+
+    def document(self) -> dict[str, Any]:
+        """As the JSON document has it."""
+        return {"name": self.name, "value": self.value, "limit": self.limit}
 
     @property
     def text(self) -> str:
         """What does not hold, and by how much."""
+        if self.said:
+            return self.said
         value, limit = self.value or 0.0, self.limit or 0.0
         return _FAILURES[self.name].format(
             value=value,
@@ -78,16 +81,16 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     capacity
         Its figures under the timing model that decides.
     """
-    payload, bus_section = profile.payload, profile.bus
-    broken: dict[Limit, Failure] = {
-        "time": Failure("required_us", capacity.required_us, capacity.available_us),
-        "hops": Failure("hops", capacity.hops, MAX_HOPS),
-        "nodes": Failure("nodes", capacity.nodes, MAX_NODES),
-        "payload": Failure(
-            "payload_bytes", max(payload.read_bytes, payload.write_bytes), bus_section.max_payload_bytes
+    network = network_of(profile)
+    broken = [one for one in bus_of(profile).limits if one.key in capacity.exceeded]
+    late = (Failure("required_us", capacity.required_us, capacity.available_us),) if TIME in capacity.exceeded else ()
+    return (
+        *(
+            Failure(one.failure or one.key, float(one.value(network)), float(one.most(network)), one.words(network))
+            for one in broken
         ),
-    }
-    return tuple(broken[limit] for limit in capacity.exceeded)
+        *late,
+    )
 
 
 def circle_failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:

@@ -18,9 +18,8 @@ from busplan.analysis.circle.failures import (
     tightest_margins,
 )
 from busplan.analysis.circle.setup import bus, loop_timing, setup
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import LoopTiming
 from busplan.servo.path import circle_setpoints
@@ -42,7 +41,7 @@ class CircleFigures(NamedTuple):
     loop: str
     delay_us: float
     """Bus delay inside the loop: the capacity result's required_us when the loop is on the host, otherwise 0."""
-    timing_model: TimingModelName
+    timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
     required_us: float

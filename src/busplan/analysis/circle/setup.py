@@ -2,7 +2,7 @@
 
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 from busplan.servo.circle import check_circle
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path

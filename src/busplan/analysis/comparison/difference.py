@@ -8,17 +8,18 @@ from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeGuard
 
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.latency import BOTH_MODELS, latency
-from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.network import bus_of, model_names
+from busplan.buses import figure as known
+from busplan.buses.bus import Bus
+from busplan.buses.figure import Figure, by_key
 from busplan.errors import BusplanError
 from busplan.profile.keys import KeyValue, dotted_keys
-from busplan.profile.model import Profile
+from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures
 
-Part = Literal["plan", "paper", "standard", "circle"]
-"""What a figure belongs to: the plan itself, its cycle under one timing model, or its circle."""
 Judgement = Literal["better", "worse", "same", "neutral"]
 Circle = Callable[[Profile], "CircleFigures"]
 """Runs the circle test of a profile."""
@@ -26,60 +27,59 @@ Circle = Callable[[Profile], "CircleFigures"]
 ROUNDING: Final = 1e-9
 """Relative difference that float rounding alone can make; a figure that differs by less is the same."""
 
-
-class Measure(NamedTuple):
-    """One figure, and in which direction it is better."""
-
-    key: str
-    better: Literal["more", "less", "neither"] = "neither"
-    scale: str | None = None
-    """The quantity that its rounding is relative to: what it is a difference of, where it is one."""
-    relative: bool = True
-    """Whether a share of it means something."""
-
-
-PLAN: Final = (
-    Measure("timing_model"),
-    Measure("verdict_fits", "more"),
-    Measure("period_us"),
-    Measure("nodes"),
-    Measure("axes"),
-    Measure("hops"),
-    Measure("gap_count", relative=False),
-    Measure("safe_gap_count", relative=False),
-    Measure("gap_count_safe", "more"),
-    Measure("available_us"),
-    Measure("time_slice_us"),
+VERDICT_FITS: Final = Figure(
+    "verdict_fits",
+    "fits",
+    known.FITS.reference,
+    "whether it fits under the timing model that decides",
+    "fits, as that decides",
+    sort="truth",
+    better="more",
 )
-"""The verdict of the model that decides, and what both models share. A longer period or one more node is a choice,
-neither good nor bad by itself."""
-CYCLE: Final = (
-    Measure("fits", "more"),
-    Measure("margin_us", "more", scale="available_us"),
-    Measure("utilisation", "less"),
-    Measure("required_us", "less"),
-    Measure("max_nodes", "more"),
-    Measure("max_axes", "more"),
-    Measure("limited_by"),
-    Measure("min_period_us", "less"),
-    Measure("read_latency_us", "less"),
-    Measure("read_latency_with_gaps_us", "less"),
-    Measure("write_latency_us", "less"),
-    Measure("write_latency_with_gaps_us", "less"),
-    Measure("binding_term"),
-)
-"""The cycle under one timing model. A truth is better when it is more: true."""
-CIRCLE: Final = (
-    Measure("passed", "more"),
-    Measure("stable", "more"),
-    Measure("phase_margin_deg", "more"),
-    Measure("gain_margin_db", "more", relative=False),
-    Measure("mean_contour_error_mm", "less", scale="radius_mm"),
-    Measure("max_contour_error_mm", "less", scale="radius_mm"),
-    Measure("circular_deviation_mm", "less", scale="radius_mm"),
-    Measure("servo_grade"),
+_CIRCLE: Final = tuple(
+    by_key(CIRCLE_FIGURES)[key]
+    for key in (
+        "passed",
+        "stable",
+        "phase_margin_deg",
+        "gain_margin_db",
+        "mean_contour_error_mm",
+        "max_contour_error_mm",
+        "circular_deviation_mm",
+        "servo_grade",
+    )
 )
 """The circle test, and how the servo values behind it are known."""
+
+
+def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
+    """The verdict of the model that decides, and what all models share.
+
+    A longer period or one more node is a choice, neither good nor bad by itself.
+    """
+    setup = by_key(figure for bus in buses for figure in bus.setup_figures)
+    return (
+        *(known.TIMING_MODEL, VERDICT_FITS, known.PERIOD, known.NODES, known.AXES),
+        *setup.values(),
+        *(known.AVAILABLE, known.TIME_SLICE),
+    )
+
+
+def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
+    """The cycle under one timing model.
+
+    A term by itself is neither good nor bad: what counts is their sum. True ranks above False.
+    """
+    own = by_key(figure for bus in buses for figure in bus.compared_figures)
+    terms = by_key(figure._replace(better="neither") for bus in buses for figure in bus.term_figures)
+    return (
+        *(known.FITS, known.MARGIN, known.UTILISATION, known.REQUIRED),
+        *terms.values(),
+        *(known.MAX_NODES, known.MAX_AXES, known.LIMITED_BY, known.MIN_PERIOD),
+        *own.values(),
+        known.BINDING_TERM._replace(label="largest term"),
+    )
+
 
 _MARGINS: Final = ("phase_margin_deg", "gain_margin_db")
 
@@ -92,11 +92,12 @@ class KeyDifference(NamedTuple):
     b: KeyValue | None
 
 
-class Figure(NamedTuple):
+class ComparedFigure(NamedTuple):
     """One figure of both profiles. What could not be computed is None."""
 
-    part: Part
-    measure: Measure
+    part: str
+    """What it belongs to: the plan itself, its cycle under the timing model of that name, or its circle."""
+    figure: Figure
     a: Any
     b: Any
     judgement: Judgement
@@ -111,7 +112,7 @@ class Figure(NamedTuple):
         if self.judgement != "worse" or self.difference is None:
             return self.judgement == "worse"
         # A share of a ratio in decibels is a number of decibels, whatever the ratio is.
-        share = 20 * log10(1 + tolerance) if self.measure.key.endswith("_db") else tolerance * abs(self.a)
+        share = 20 * log10(1 + tolerance) if self.figure.key.endswith("_db") else tolerance * abs(self.a)
         allowed: float = share * (1 + ROUNDING)
         return abs(self.difference) > allowed
 
@@ -136,15 +137,15 @@ class Difference(NamedTuple):
     a: Profile
     b: Profile
     keys: tuple[KeyDifference, ...]
-    figures: tuple[Figure, ...]
+    figures: tuple[ComparedFigure, ...]
     circles: tuple[CircleSide, CircleSide] | None
     """Those of A and B; None where no circle was asked for."""
 
-    def judged(self, judgement: Judgement) -> list[Figure]:
+    def judged(self, judgement: Judgement) -> list[ComparedFigure]:
         """The figures of one judgement, in their order."""
         return [figure for figure in self.figures if figure.judgement == judgement]
 
-    def regressions(self, *, tolerance: float = 0.0) -> list[Figure]:
+    def regressions(self, *, tolerance: float = 0.0) -> list[ComparedFigure]:
         """The figures that are worse, whatever their part.
 
         Parameters
@@ -159,7 +160,7 @@ def difference(
     a: Profile,
     b: Profile,
     *,
-    timing_models: Sequence[TimingModelName] = BOTH_MODELS,
+    timing_models: Sequence[str] | None = None,
     circle: Circle | None = None,
 ) -> Difference:
     """Compare two profiles.
@@ -169,7 +170,8 @@ def difference(
     a, b
         The profiles; B is judged against A.
     timing_models
-        Which timing models, in this order.
+        Which timing models, in this order; without them all of the kind of bus. Two kinds have none in common: what
+        decides in each is compared.
     circle
         The circle test, run when either profile asks for a circle; without it none is.
 
@@ -214,40 +216,43 @@ def _circle_side(profile: Profile, circle: Circle) -> CircleSide:
 def _figures(
     a: Profile,
     b: Profile,
-    timing_models: Sequence[TimingModelName],
+    timing_models: Sequence[str] | None,
     circles: tuple[CircleSide, CircleSide] | None,
-) -> Iterator[Figure]:
-    yield from _compared("plan", PLAN, _plan(a), _plan(b))
-    for model in timing_models:
-        yield from _compared(model, CYCLE, _cycle(a, model), _cycle(b, model))
+) -> Iterator[ComparedFigure]:
+    buses = (bus_of(a), bus_of(b))
+    yield from _compared("plan", plan_figures(*buses), _plan(a), _plan(b))
+    deciding = (("deciding", a.bus.timing_model, b.bus.timing_model),)
+    models = model_names(a) if timing_models is None else timing_models
+    pairs = tuple((model, model, model) for model in models) if buses[0] is buses[1] else deciding
+    for part, of_a, of_b in pairs:
+        yield from _compared(part, cycle_figures(*buses), _cycle(a, of_a), _cycle(b, of_b))
     if circles is not None:
         circle_a, circle_b = ({} if side.figures is None else side.figures._asdict() for side in circles)
-        yield from _compared("circle", CIRCLE, circle_a, circle_b)
+        yield from _compared("circle", _CIRCLE, circle_a, circle_b)
 
 
 def _plan(profile: Profile) -> dict[str, Any]:
     """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
     deciding = figures(profile, model=profile.bus.timing_model)
-    return deciding._asdict() | {"verdict_fits": deciding.fits}
+    return deciding.by_key() | {VERDICT_FITS.key: deciding.fits}
 
 
-def _cycle(profile: Profile, model: TimingModelName) -> dict[str, Any]:
-    """Figures of one cycle by name: those of `capacity`, and the latencies with their gaps."""
-    gaps = {
-        f"{one.transaction}_latency_with_gaps_us": one.phases.latency_with_gaps_us
-        for one in latency(profile, timing_models=[model]).transactions
-    }
-    return figures(profile, model=model)._asdict() | gaps
+def _cycle(profile: Profile, model: str) -> dict[str, Any]:
+    """Figures of one cycle by name: those of `capacity`, and others that the bus compares."""
+    found = figures(profile, model=model)
+    return found.by_key() | dict(found.own)
 
 
-def _compared(part: Part, measures: Sequence[Measure], a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Figure]:
+def _compared(
+    part: str, measures: Sequence[Figure], a: Mapping[str, Any], b: Mapping[str, Any]
+) -> Iterator[ComparedFigure]:
     for measure in measures:
         of_a, of_b = a.get(measure.key), b.get(measure.key)
         noise = 0.0 if measure.scale is None else ROUNDING * max(side.get(measure.scale, 0.0) for side in (a, b))
         change = of_b - of_a if _is_number(of_a) and _is_number(of_b) else None
-        yield Figure(
+        yield ComparedFigure(
             part=part,
-            measure=measure,
+            figure=measure,
             a=of_a,
             b=of_b,
             judgement=_judgement(measure, a, b, noise=noise),
@@ -256,7 +261,7 @@ def _compared(part: Part, measures: Sequence[Measure], a: Mapping[str, Any], b: 
         )
 
 
-def _judgement(measure: Measure, a: Mapping[str, Any], b: Mapping[str, Any], *, noise: float) -> Judgement:
+def _judgement(measure: Figure, a: Mapping[str, Any], b: Mapping[str, Any], *, noise: float) -> Judgement:
     of_a, of_b = a.get(measure.key), b.get(measure.key)
     rank_a, rank_b = _rank(measure, a), _rank(measure, b)
     if rank_a is None or rank_b is None:
@@ -269,7 +274,7 @@ def _judgement(measure: Measure, a: Mapping[str, Any], b: Mapping[str, Any], *, 
     return "better" if (rank_b > rank_a) == (measure.better == "more") else "worse"
 
 
-def _rank(measure: Measure, values: Mapping[str, Any]) -> float | None:
+def _rank(measure: Figure, values: Mapping[str, Any]) -> float | None:
     """A figure as a number that orders; None where it has no order."""
     value = values.get(measure.key)
     if measure.key == "passed":

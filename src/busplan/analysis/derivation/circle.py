@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.circle.failures import CONTOUR_MEASURES, LEAST_ARC_DEG
+from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.inputs import traced
 from busplan.analysis.derivation.simulation import SimulationNumbers
 from busplan.analysis.derivation.trace import Input, Traced, short
-from busplan.analysis.quantities import FIGURES
-from busplan.profile.model import Profile
+from busplan.buses.figure import by_key
 from busplan.sections.machine import AxisKeys
+from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
 
 Progress = Callable[[int, int], None]
@@ -49,7 +50,7 @@ def circle_figures(profile: Profile, *, with_contributions: bool = False, progre
     Returns
     -------
     dict
-        By the keys of `FIGURES["circle-test"]`.
+        By the keys of `CIRCLE_FIGURES`.
 
     Raises
     ------
@@ -60,10 +61,11 @@ def circle_figures(profile: Profile, *, with_contributions: bool = False, progre
     bus = capacity_figures(profile, model=profile.bus.timing_model)
     one = _Test(profile, test.results[0], test.runs[0], bus, tuple(_simulation_inputs(profile)))
     found: dict[str, Traced] = {}
+    known = by_key(CIRCLE_FIGURES)
     for derive in (_given, _path, _bus_figures, _loop, _contour, _verdict):
         found |= derive(one, found)
         for key in found:
-            found[key].named(key, FIGURES["circle-test"][key].symbol)
+            found[key].named(key, known[key].symbol)
     return found
 
 
@@ -228,7 +230,7 @@ def _verdict(one: _Test, found: Figures) -> Figures:
     parts = (*measures, *contour, *limits)
     said = "; ".join(failure.text for failure in result.failures) or "none"
     failures = Traced(
-        [failure._asdict() for failure in result.failures],
+        [failure.document() for failure in result.failures],
         formula="what of the bus, the loop and the tolerances does not hold",
         numbers=said,
         parts=parts,

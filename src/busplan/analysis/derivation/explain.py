@@ -10,15 +10,16 @@ from typing import Any, Final, NamedTuple
 
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.formulas import written
-from busplan.analysis.derivation.latency import latency_figures
+from busplan.analysis.derivation.latency import latency_figures, latency_names
 from busplan.analysis.derivation.trace import Input, Traced, inputs, lines
 from busplan.analysis.derivation.verdict import VERDICT_KEYS, verdict_figure
-from busplan.analysis.latency import BOTH_MODELS
-from busplan.analysis.quantities import FIGURES, HOLDERS, Command, Figure
-from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TimingModelName, TransactionKind
+from busplan.analysis.network import bus_of, model_names
+from busplan.analysis.register import HOLDERS, Command, figures_of
+from busplan.buses.bus import Bus
+from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Progress = Callable[[int, int], None]
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
@@ -60,8 +61,8 @@ class Derivation(NamedTuple):
 
     command: Command
     figure: Figure
-    timing_model: TimingModelName
-    transaction: TransactionKind | None
+    timing_model: str
+    transaction: str | None
     """Of a figure of `latency`."""
     period_us: float
     value: Any
@@ -83,7 +84,7 @@ class Explanation(NamedTuple):
     derivations: tuple[Derivation, ...]
 
 
-def figure_named(name: str) -> tuple[Command, Figure]:
+def figure_named(name: str, *, bus: Bus) -> tuple[Command, Figure]:
     """Find the figure that a name means.
 
     Parameters
@@ -91,6 +92,8 @@ def figure_named(name: str) -> tuple[Command, Figure]:
     name
         A key, as "required_us", or one with its command before it, as "circle-test.required_us". A key inside a figure,
         as "removed_mm", means that figure.
+    bus
+        The kind of bus.
 
     Raises
     ------
@@ -99,18 +102,20 @@ def figure_named(name: str) -> tuple[Command, Figure]:
 
     Examples
     --------
-    >>> figure_named("latency.gaps_us")[1].meaning
+    >>> from busplan.buses import kind_named
+    >>> figure_named("latency.gaps_us", bus=kind_named("ieee1394"))[1].meaning
     'both gaps, after each transaction'
     """
-    for command, figures in FIGURES.items():
+    register = figures_of(bus)
+    for command, figures in register.items():
         key = name.removeprefix(f"{command}.")
         if key in figures and name in (key, f"{command}.{key}"):
             return command, figures[key]
     before, _, inner = name.rpartition(".")
     held = HOLDERS.get(inner)
     if held is not None and before in ("", held[0]):
-        return held[0], FIGURES[held[0]][held[1]]
-    known = [key for figures in FIGURES.values() for key in figures]
+        return held[0], register[held[0]][held[1]]
+    known = [key for figures in register.values() for key in figures]
     close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
     hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
     raise BusplanError(f"{name or repr(name)}: no such figure{hint}? Without a figure, explain lists them all")
@@ -121,8 +126,8 @@ def explain(
     figure: str,
     *,
     periods_us: Sequence[float] | None = None,
-    timing_models: Sequence[TimingModelName] | None = None,
-    transactions: Sequence[TransactionKind] | None = None,
+    timing_models: Sequence[str] | None = None,
+    transactions: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> Explanation:
     """Derive a figure of `latency`, `capacity` or `circle-test`.
@@ -152,10 +157,10 @@ def explain(
     BusplanError
         There is no such figure, what is asked for does not go with it, or the command itself refuses.
     """
-    command, one = figure_named(figure)
+    command, one = figure_named(figure, bus=bus_of(profile))
     deciding = profile.bus.timing_model
     models = [deciding] if timing_models is None else timing_models
-    kinds: Sequence[TransactionKind | None] = (transactions or TRANSACTION_KINDS) if command == "latency" else [None]
+    kinds: Sequence[str | None] = (transactions or latency_names(profile)) if command == "latency" else [None]
     if command == "circle-test" and list(models) != [deciding]:
         raise BusplanError(f"{one.key}: a circle test has the timing model that decides and no other, {deciding}")
     if one.key in VERDICT_KEYS and timing_models is not None:
@@ -187,7 +192,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
         An execution time that nobody has graded is first.
     """
     found: dict[str, Input] = {}
-    for model in BOTH_MODELS:
+    for model in model_names(profile):
         for one in inputs(capacity_figures(profile, model=model)["fits"]):
             found.setdefault(one.name, one)
     if profile.asks_for_circle:
@@ -205,12 +210,12 @@ def _traced(
     command: Command,
     key: str,
     *,
-    model: TimingModelName,
-    kind: TransactionKind | None,
+    model: str,
+    kind: str | None,
     progress: Progress | None,
 ) -> Traced:
     if command == "latency":
-        return latency_figures(profile, model=model, kind=kind or TRANSACTION_KINDS[0])[key]
+        return latency_figures(profile, model=model, kind=kind or "")[key]
     if command == "capacity":
         return (
             verdict_figure(profile, key, model=model)
@@ -228,10 +233,10 @@ def _derivation(
     figure: Figure,
     traced: Traced,
     *,
-    model: TimingModelName,
-    kind: TransactionKind | None,
+    model: str,
+    kind: str | None,
 ) -> Derivation:
-    steps = tuple(_steps(traced, command, figure))
+    steps = tuple(_steps(profile, traced, command, figure))
     return Derivation(
         command=command,
         figure=figure,
@@ -244,9 +249,9 @@ def _derivation(
     )
 
 
-def _steps(traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
+def _steps(profile: Profile, traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
     for one in lines(traced):
-        known = figure if one is traced else _known(one.key, command)
+        known = figure if one is traced else _known(profile, one.key, command)
         yield Step(
             key=known.key,
             symbol=figure.symbol if one is traced else one.symbol,
@@ -258,9 +263,10 @@ def _steps(traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
         )
 
 
-def _known(key: str, command: Command) -> Figure:
+def _known(profile: Profile, key: str, command: Command) -> Figure:
     """What the registry says of a line; one that is no figure stands for itself."""
-    for figures in (FIGURES[command], *FIGURES.values()):
+    register = figures_of(bus_of(profile))
+    for figures in (register[command], *register.values()):
         if key in figures:
             return figures[key]
     return Figure(key, key, "", "")

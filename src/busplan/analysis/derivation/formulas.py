@@ -3,9 +3,19 @@
 from inspect import signature
 from typing import Final
 
-from busplan.analysis.derivation.trace import DIGITS, OPERATIONS, Input, Operand, Traced, short, value_of
-from busplan.buses.ieee1394.equations import SYMBOLS
-from busplan.sourced import Equation
+from busplan.analysis.derivation.trace import (
+    CHOSEN,
+    COMPARISON,
+    DIGITS,
+    FUNCTION,
+    OPERATIONS,
+    Input,
+    Operand,
+    Traced,
+    short,
+    value_of,
+)
+from busplan.sourced import SYMBOLS, Equation, Sourced
 
 _ATOM: Final = 4
 _MOST_DIGITS: Final = 17
@@ -62,21 +72,48 @@ def written(operand: Operand, *, in_numbers: bool) -> str:
     >>> written(delay, in_numbers=False), written(delay, in_numbers=True), delay.value
     ('0.25 (H + 1)', '0.25 * (2 + 1)', 0.75)
     """
+    operand = _unwrapped(operand)
     if isinstance(operand, Traced) and not operand.operation:
         return operand.numbers if in_numbers else operand.formula
-    if in_numbers and operand.operation == "sub" and all(_is_atom(part) for part in operand.parts):
-        return less(*(float(value_of(part)) for part in operand.parts))
+    if in_numbers and isinstance(operand, Traced) and all(_is_atom(part) for part in operand.parts):
+        values = [value_of(part) for part in operand.parts]
+        if operand.operation == "sub":
+            return less(*map(float, values))
+        if operand.operation in OPERATIONS and OPERATIONS[operand.operation].rank == COMPARISON:
+            return against(values[0], OPERATIONS[operand.operation].sign, values[1])
     return _written(operand, in_numbers=in_numbers, top=True)[0]
+
+
+def _unwrapped(operand: Operand) -> Operand:
+    """What was chosen, where it is an expression without a name."""
+    while isinstance(operand, Traced) and operand.operation == CHOSEN:
+        won = operand.parts[0]
+        if not isinstance(won, Traced) or won.symbol:
+            break
+        operand = won
+    return operand
 
 
 def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
     """Text of an operand, and how tightly it holds together."""
     if not isinstance(operand, Traced):
-        return _atom(short(value_of(operand)))
+        symbol = operand.symbol if isinstance(operand, Sourced) and not in_numbers else ""
+        return _atom(symbol or short(value_of(operand)))
     if not top and (operand.symbol or not operand.operation):
         return _atom(short(operand.value) if in_numbers or not operand.symbol else operand.symbol)
+    if operand.operation == CHOSEN:
+        won = operand.parts[0]
+        by_name = isinstance(won, Sourced) and not in_numbers
+        return _atom(won.meaning) if by_name else _written(won, in_numbers=in_numbers)
+    return _joined(operand, [_written(part, in_numbers=in_numbers) for part in operand.parts], in_numbers=in_numbers)
+
+
+def _joined(operand: Traced, parts: list[tuple[str, int]], *, in_numbers: bool) -> tuple[str, int]:
+    """Text of an operation, from those of its operands."""
     operation = OPERATIONS[operand.operation]
-    (left, left_rank), (right, right_rank) = (_written(part, in_numbers=in_numbers) for part in operand.parts)
+    if operation.rank == FUNCTION:
+        return f"{operation.sign}({', '.join(text for text, _ in parts)})", FUNCTION
+    (left, left_rank), (right, right_rank) = parts
     left = f"({left})" if left_rank < operation.rank else left
     # What is taken off, divided by or raised to must hold together more tightly than what it is taken off.
     tighter = operation.rank + (operation.sign in "-/^")

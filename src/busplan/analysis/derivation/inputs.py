@@ -3,35 +3,18 @@
 from types import MappingProxyType
 from typing import Any, Final
 
-from busplan.analysis.derivation.trace import Input, Traced
-from busplan.buses.ieee1394.constants import (
-    PACKET_OVERHEAD_BYTES,
-    PING_PER_NODE_US,
-    PING_US,
-    REFERENCE_CABLE_M,
-    SLICE_RATIO,
-)
-from busplan.buses.ieee1394.equations import SYMBOLS
-from busplan.profile.model import Profile
-
-_DEFAULTS: Final = MappingProxyType(
-    {
-        "bus.cable_length_m": REFERENCE_CABLE_M,
-        "cycle.slice_ratio": SLICE_RATIO,
-        "cycle.sync.ping_us": PING_US,
-        "cycle.sync.ping_per_node_us": PING_PER_NODE_US,
-        "payload.overhead_bytes": PACKET_OVERHEAD_BYTES,
-    }
-)
-"""Keys whose default is a figure with a source."""
+from busplan.analysis.derivation.trace import GivenTable, Input, Traced
+from busplan.analysis.network import bus_of
+from busplan.profile.kinds import cycle_keys
+from busplan.sections.base import with_unchecked
+from busplan.sections.execution import TableExecution
+from busplan.sections.profile import Profile
+from busplan.sourced import SYMBOLS
 
 _SYMBOLS: Final = MappingProxyType(
     {
         "payload.read_bytes": "P_read",
         "payload.write_bytes": "P_write",
-        "payload.overhead_bytes": "overhead",
-        "cycle.sync.ping_us": "ping",
-        "cycle.sync.ping_per_node_us": "ping_node",
         "node.axes": "axes_node",
         "node.execution.base_us": "base",
         "node.execution.per_byte_us": "per_byte",
@@ -47,7 +30,8 @@ _SYMBOLS: Final = MappingProxyType(
         "servo.drive_lag_us": "tau",
     }
 )
-"""What stands for a key in formulas, where it is no quantity of the equations."""
+"""What stands for a key in formulas, where it is no quantity of the equations and of no kind of bus alone."""
+_TABLE: Final = "node.execution.time_us"
 
 
 def given(profile: Profile, key: str) -> Input:
@@ -79,12 +63,13 @@ def given(profile: Profile, key: str) -> Input:
     value = getattr(section, name)
     grade = own_grade or "given"
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
-    default = _DEFAULTS.get(key)
+    bus = bus_of(profile)
+    default = bus.key_sources.get(key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
     # A plain number has no unit to show.
     unit = "" if unit == "1" else unit
-    symbol = _SYMBOLS.get(key) or SYMBOLS.get(name) or name
+    symbol = _SYMBOLS.get(key) or bus.key_symbols.get(key) or SYMBOLS.get(name) or name
     return Input(symbol, key, value, unit, grade, source, description)
 
 
@@ -92,3 +77,20 @@ def traced(profile: Profile, key: str) -> Traced:
     """Give a key of a profile as a number that remembers where it comes from."""
     one = given(profile, key)
     return Traced(one.value, given=one)
+
+
+def traced_profile(profile: Profile) -> Profile:
+    """The profile with numbers that remember in the place of all that its cycle may depend on; nothing is checked."""
+    found = profile
+    for key in cycle_keys(profile.bus.kind):
+        value: Any = profile
+        for part in key.split("."):
+            value = getattr(value, part, None)
+        if isinstance(value, int | float):
+            found = with_unchecked(found, key, traced(profile, key))
+    execution = profile.node.execution
+    if isinstance(execution, TableExecution):
+        table = GivenTable(execution.time_us)
+        table.given = given(profile, _TABLE)._replace(symbol="table", value=f"{len(execution.time_us)} points")
+        found = with_unchecked(found, _TABLE, table)
+    return found

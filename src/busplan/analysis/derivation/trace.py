@@ -5,11 +5,13 @@ behind. What a line of a derivation shows is therefore what was executed, and no
 """
 
 import operator
-from collections.abc import Callable, Iterator, Mapping
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import ceil
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from busplan.buses.ieee1394.constants import CONSTANTS
+from busplan.elementwise import SpecialNumber
 from busplan.sourced import Sourced
 
 
@@ -46,9 +48,12 @@ class Input(NamedTuple):
 class _Operation(NamedTuple):
     sign: str
     rank: int
-    compute: Callable[[Any, Any], Any]
+    """How tightly it holds its operands together; a function's brackets do."""
+    compute: Callable[..., Any]
 
 
+COMPARISON: Final = 0
+FUNCTION: Final = 4
 OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
     {
         "add": _Operation("+", 1, operator.add),
@@ -56,13 +61,28 @@ OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
         "mul": _Operation("*", 2, operator.mul),
         "truediv": _Operation("/", 2, operator.truediv),
         "pow": _Operation("^", 3, operator.pow),
+        "lt": _Operation("<", COMPARISON, operator.lt),
+        "le": _Operation("<=", COMPARISON, operator.le),
+        "gt": _Operation(">", COMPARISON, operator.gt),
+        "ge": _Operation(">=", COMPARISON, operator.ge),
+        "eq": _Operation("=", COMPARISON, operator.eq),
+        "larger": _Operation("max", FUNCTION, max),
+        "rounded_up": _Operation("ceil", FUNCTION, ceil),
     }
 )
+CHOSEN: Final = "chosen"
+"""The operation that is the first of its parts; the others say why."""
 Operand = Any
 """A `Traced` number, a `Sourced` one, or a plain one."""
 
 
-class Traced:
+class GivenTable(tuple[float, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
+    """Entries of a table that a profile gives, as one input of a derivation."""
+
+    given: Input
+
+
+class Traced(SpecialNumber):
     """A number, or the word that follows from numbers, with the expression it comes from.
 
     Parameters
@@ -133,23 +153,59 @@ class Traced:
     def __pow__(self, other: Operand) -> Any:
         return _computed("pow", self, other)
 
-    # Equal to what has its value, as a float is; found again by what it is, not by what it equals.
+    # Compared with anything it gives a truth that remembers; found again by what it is, not by what it equals.
     __hash__ = object.__hash__
 
-    def __eq__(self, other: object) -> bool:
-        return bool(self.value == value_of(other))
+    def __eq__(self, other: object) -> Any:
+        return _computed("eq", self, other)
 
-    def __lt__(self, other: Operand) -> bool:
-        return bool(self.value < value_of(other))
+    def __lt__(self, other: Operand) -> Any:
+        return _computed("lt", self, other)
 
-    def __le__(self, other: Operand) -> bool:
-        return bool(self.value <= value_of(other))
+    def __le__(self, other: Operand) -> Any:
+        return _computed("le", self, other)
 
-    def __gt__(self, other: Operand) -> bool:
-        return bool(self.value > value_of(other))
+    def __gt__(self, other: Operand) -> Any:
+        return _computed("gt", self, other)
 
-    def __ge__(self, other: Operand) -> bool:
-        return bool(self.value >= value_of(other))
+    def __ge__(self, other: Operand) -> Any:
+        return _computed("ge", self, other)
+
+    def __bool__(self) -> bool:
+        return bool(self.value)
+
+    def larger_of(self, one: Operand, other: Operand) -> Any:
+        """The larger of two numbers."""
+        return Traced(max(value_of(one), value_of(other)), operation="larger", parts=(one, other))
+
+    def chosen(self, condition: Operand, yes: Operand, no: Operand) -> Any:
+        """`yes` where the condition holds, else `no`."""
+        won = yes if value_of(condition) else no
+        return Traced(value_of(won), operation=CHOSEN, parts=(won, condition))
+
+    def rounded_up(self) -> Any:
+        """The next whole number."""
+        return Traced(ceil(self.value), operation="rounded_up", parts=(self,))
+
+    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Operand, ...]) -> Any:
+        """The entry of a table at this place."""
+        index = min(int(self.value), len(table) - 1)
+        return Traced(table[index], formula=words, numbers=f"entry {index + 1} of {len(table)}", parts=(self, *sources))
+
+    def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> Any:
+        """The value at this place, linear between points."""
+        index = bisect_left(places, self.value)
+        sources = tuple(Traced(one, given=one.given) for one in (values,) if isinstance(one, GivenTable))
+        if places[index] == self.value:
+            at = f"{words} at {self.symbol}", f"{words} at {short(self.value)}"
+            return Traced(values[index], formula=at[0], numbers=at[1], parts=(self, *sources))
+        x0, y0, x1, y1 = places[index - 1], values[index - 1], places[index], values[index]
+        found = y0 + (y1 - y0) * (self - x0) / (x1 - x0)
+        return Traced(found.value, operation=CHOSEN, parts=(found, *sources))
+
+    def worded(self, words: str) -> Any:
+        """Say where the number comes from."""
+        return Traced(self.value, formula=words, numbers=short(self.value), parts=(self,))
 
 
 def value_of(operand: Operand) -> Any:
@@ -159,10 +215,8 @@ def value_of(operand: Operand) -> Any:
 
 
 def _computed(name: str, left: Operand, right: Operand) -> Any:
-    """The result of an operation; a plain 0 or 1 that changes nothing, as a comparison gives it, leaves no trace."""
+    """The result of an operation; a plain 0 or 1 that changes nothing leaves no trace."""
     for one, other in ((left, right), (right, left)):
-        if _is_switch(one, 0) and name == "mul":
-            return 0.0
         if (_is_switch(one, 0) and name == "add") or (_is_switch(one, 1) and name == "mul"):
             return other
     if _is_switch(right, 0 if name == "sub" else 1) and name in ("sub", "truediv"):
@@ -208,20 +262,19 @@ def inputs(figure: Traced) -> Iterator[Input]:
     yield from found.values()
 
 
-_NAMES: Final = {id(number): name for name, number in CONSTANTS.items()}
-
-
-def constant(number: Sourced, *, symbol: str = "") -> Input:
-    """Give a sourced constant as an input; without a symbol, formulas show its value.
+def constant(number: Sourced) -> Input:
+    """Give a sourced constant as an input; without a symbol of its own, formulas show its value.
 
     Examples
     --------
-    >>> constant(CONSTANTS["DATA_END_US"])[:4]
+    >>> from busplan.buses.ieee1394.constants import DATA_END_US
+    >>> constant(DATA_END_US)[:4]
     ('0.25', 'DATA_END_US', 0.25, 'us')
     """
     value = float(number)
-    name = _NAMES.get(id(number), number.meaning)
-    return Input(symbol or short(value), name, value, number.unit, number.grade, number.source, number.meaning)
+    return Input(
+        number.symbol or short(value), number.name, value, number.unit, number.grade, number.source, number.meaning
+    )
 
 
 def _visit(one: Traced, seen: set[int]) -> Iterator[Traced]:

@@ -7,17 +7,17 @@ from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.inputs import traced
 from busplan.analysis.derivation.trace import Traced, short
-from busplan.analysis.latency import BOTH_MODELS
-from busplan.buses.ieee1394.constants import REFERENCE_CABLE_M
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.model import Profile
+from busplan.analysis.network import bus_of, model_names
+from busplan.analysis.planning.cures import changeable, listed
+from busplan.sections.profile import Profile
 
 VERDICT_KEYS: Final = ("models_agree", "cheapest_change", "warnings", "text")
 
 
-def verdict_figure(profile: Profile, key: str, *, model: TimingModelName) -> Traced:
+def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     """A figure of the verdict, which compares the models."""
-    result = capacity(profile, timing_models=(model, *(other for other in BOTH_MODELS if other != model)))
+    others = (other for other in model_names(profile) if other != model)
+    result = capacity(profile, timing_models=(model, *others))
     (verdict,) = verdicts(result)
     derived = {one.timing_model: capacity_figures(profile, model=one.timing_model) for one in result.results}
     fits = tuple(figures["fits"] for figures in derived.values())
@@ -27,21 +27,23 @@ def verdict_figure(profile: Profile, key: str, *, model: TimingModelName) -> Tra
             verdict.models_agree, formula="fits is the same under every timing model", numbers=stories, parts=fits
         )
     if key == "cheapest_change":
-        return _change(verdict, fits)
+        return _change(profile, verdict, fits)
+    bus = bus_of(profile)
+    safety = () if bus.safety_figure is None else (bus.safety_figure.key,)
     parts = {
-        "warnings": ("gap_count_safe",),
-        "text": ("fits", "margin_us", "binding_term", "max_nodes", "gap_count_safe"),
+        "warnings": safety,
+        "text": ("fits", "margin_us", "binding_term", "max_nodes", *safety),
     }[key]
     chosen = tuple(figures[part] for figures in derived.values() for part in parts)
-    cable = (traced(profile, "bus.cable_length_m"), REFERENCE_CABLE_M)
+    warned = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
     # The sentences are a reporter's; it puts them in the place of this.
-    return Traced(None, formula="what is derived above, in words", parts=(*chosen, *cable))
+    return Traced(None, formula="what is derived above, in words", parts=(*chosen, *warned))
 
 
-def _change(verdict: Verdict, fits: tuple[Traced, ...]) -> Traced:
+def _change(profile: Profile, verdict: Verdict, fits: tuple[Traced, ...]) -> Traced:
     change = verdict.change
-    purpose = "carries more nodes" if verdict.all_well else "makes every model fit with a safe gap count"
-    words = f"the first of gap count, slice ratio, period, speed and wiring that {purpose}"
+    purpose = "carries more nodes" if verdict.all_well else "makes every model fit on a bus that is set safely"
+    words = f"the first of {listed(changeable(profile), 'and')} that {purpose}"
     if change is None:
         return Traced(None, formula=words, numbers="none does", parts=fits)
     settings = ", ".join(f"{key} = {value}" for key, value in change.changes.items())

@@ -7,20 +7,19 @@ smallest period that passes the circle are scanned: neither a measured execution
 from collections.abc import Callable, Iterator, Sequence
 from decimal import Decimal
 from math import ceil
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.analysis.capacity.cycle import cycle, fits_in
+from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.analysis.latency import with_payload
+from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import RATIO_STEPS
-from busplan.buses.ieee1394.constants import QUADLET_BYTES, padded_bytes, safe_gap_count
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.bus import TableExecution
-from busplan.profile.model import Profile
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
+from busplan.sections.execution import TableExecution
+from busplan.sections.profile import Profile
 
-Bound = Literal["time", "circle", "speed", "execution", "gap table", "hops", "nodes", "payload"]
-Models = Sequence[TimingModelName]
+Models = Sequence[str]
 Circle = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 
@@ -33,7 +32,7 @@ class PeriodSearch(NamedTuple):
 
     period_us: float | None
     """None when none was found."""
-    bounded_by: Bound
+    bounded_by: str
     proven: bool
     """Whether every smaller one fails; False when the search was cut short."""
 
@@ -42,12 +41,12 @@ class Largest(NamedTuple):
     """Largest value of a setting, 0 when there is none, and what keeps it from being larger."""
 
     value: int
-    bounded_by: Bound
+    bounded_by: str
 
 
 def required_us(profile: Profile, *, models: Models) -> float:
     """What the cycle needs under the model that needs most [us]."""
-    return max(cycle(profile, model=model, nodes=profile.bus.nodes).required_us for model in models)
+    return max(float(cycle_of(profile, model=model).required_us) for model in models)
 
 
 def smallest_ratio(profile: Profile, *, models: Models) -> float:
@@ -97,32 +96,36 @@ def smallest_period(
     raise AssertionError("the numbers never end")
 
 
-def largest_payload(profile: Profile, *, model: TimingModelName) -> Largest:
-    """Largest payload of read and write alike that fits the period, in whole quadlets [bytes].
+def largest_payload(profile: Profile, *, model: str) -> Largest:
+    """Largest payload of read and write alike that fits the period, in the steps of the bus [bytes].
 
-    Every size is tried from the largest one that the speed carries and the execution table knows.
+    Every size is tried from the largest one that the bus carries and the execution table knows.
     """
-    bus, execution = profile.bus, profile.node.execution
-    smallest, most = QUADLET_BYTES, Largest(bus.max_payload_bytes, "speed")
+    network, execution = network_of(profile), profile.node.execution
+    payloads = bus_of(profile).payloads(network)
+    smallest = step = payloads.step_bytes
+    most = Largest(payloads.most_bytes, payloads.bound)
     if isinstance(execution, TableExecution):
-        smallest = max(smallest, padded_bytes(execution.payload_bytes[0]))
-        known = execution.payload_bytes[-1] // QUADLET_BYTES * QUADLET_BYTES
+        smallest = max(smallest, ceil(execution.payload_bytes[0] / step) * step)
+        known = execution.payload_bytes[-1] // step * step
         most = min(most, Largest(known, "execution"), key=lambda one: one.value)
-    available_us = profile.cycle.slice_ratio * profile.cycle.period_us
-    for size in range(most.value, smallest - 1, -QUADLET_BYTES):
-        needed_us = cycle(profile, model=model, nodes=bus.nodes, payload_bytes=size).required_us
-        if fits_in(needed_us, available_us=available_us):
+    given_us = available_us(network)
+    for size in range(most.value, smallest - 1, -step):
+        if fits_in(cycle_of(with_payload(profile, size), model=model).required_us, available_us=given_us):
             return most if size == most.value else Largest(size, "time")
     return Largest(0, "execution" if most.value < smallest else "time")
 
 
-def most_nodes(profile: Profile, *, model: TimingModelName) -> Largest:
-    """Largest number of nodes that fits the period, and that the profile's gap count is safe for."""
+def most_nodes(profile: Profile, *, model: str) -> Largest:
+    """Largest number of nodes that fits the period, and that the bus as it is set is safe for."""
     most, limit = largest_nodes(profile, model=model)
-    bus, safe = profile.bus, most
-    while safe and bus.gap_count_for(safe) < safe_gap_count(bus.hops(safe)):
-        safe -= 1
-    return Largest(safe, limit if safe == most else "gap table")
+    bus, network = bus_of(profile), network_of(profile)
+    for nodes in range(most, 0, -1):
+        unsafe = [one.key for one in bus.limits if one.is_safety and one.is_broken(network.with_nodes(nodes))]
+        if not unsafe:
+            return Largest(nodes, limit)
+        limit = unsafe[0]
+    return Largest(0, limit)
 
 
 def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:

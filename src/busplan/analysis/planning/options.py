@@ -4,14 +4,13 @@ Every option is put into the profile and computed again.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import broken_limits
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.latency import BOTH_MODELS
+from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.best_values import (
     MAX_CIRCLES,
-    Bound,
     Circle,
     largest_payload,
     most_nodes,
@@ -19,10 +18,10 @@ from busplan.analysis.planning.best_values import (
     smallest_period,
     smallest_ratio,
 )
-from busplan.analysis.planning.cures import Value, changes_to_fit
-from busplan.buses.ieee1394.constants import REFERENCE_CABLE_M, safe_gap_count
-from busplan.profile.model import Profile
+from busplan.analysis.planning.cures import changes_to_fit
+from busplan.buses.bus import Setting, Value
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Changes = dict[str, Value]
 
@@ -37,9 +36,9 @@ class Option(NamedTuple):
     """The profile with the changes and with what was asked for."""
     deciding: CapacityFigures
     """Capacity under the timing model that decides."""
-    other: CapacityFigures
-    """Capacity under the other timing model."""
-    bounded_by: Bound | None = None
+    others: tuple[CapacityFigures, ...]
+    """Capacity under the other timing models."""
+    bounded_by: str | None = None
     """What keeps the value from being better; None where there is no value to choose."""
     circle_failures: tuple[str, ...] | None = None
     """What the circle does not hold; None when it was not run."""
@@ -54,8 +53,9 @@ class Option(NamedTuple):
 
     @property
     def is_plan(self) -> bool:
-        """Whether both models fit, the gap count is safe, and the circle passes if it was run."""
-        return self.deciding.fits and self.other.fits and self.deciding.gap_count_safe and not self.circle_failures
+        """Whether it fits under every model, the bus is safe, and the circle passes if it was run."""
+        fits = self.deciding.fits and all(other.fits for other in self.others)
+        return fits and self.deciding.safe and not self.circle_failures
 
 
 class Impossible(NamedTuple):
@@ -98,10 +98,10 @@ def plan(
 ) -> Plan:
     """Find what to set.
 
-    The recommended option is the first, in the order of `advice` (nothing, gap count, slice ratio, both, period, period
-    and gap count; with them what the standard's own limits demand), after which the goal fits under both timing models
-    with a safe gap count, and passes the circle test. It changes nothing that was asked for, and never the number of
-    nodes. The other options are found under the timing model that decides.
+    The recommended option is the first, in the order of `cures` (nothing, a setting of the bus, slice ratio, both,
+    period, period and a setting; with them what the limits of the bus demand), after which the goal fits under every
+    timing model on a bus that is set safely, and passes the circle test. It changes nothing that was asked for, and
+    never the number of nodes. The other options are found under the timing model that decides.
 
     Parameters
     ----------
@@ -162,38 +162,53 @@ def _differing(profile: Profile, changes: Changes) -> Changes:
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
 
 
+_CHEAPEST: Final = ("cheapest that fits", "cheapest that meets both models")
+"""Title of the recommendation where it is none of the other options, for one timing model and for several."""
+
+
 class _Planner:
     """Makes the options of one goal."""
 
     def __init__(self, goal: Profile, *, circle: Circle | None, max_circles: int) -> None:
         self.goal = goal
         self.model = goal.bus.timing_model
+        self.models = model_names(goal)
         self.circle = circle
         self.max_circles = max_circles
 
     def options(self) -> Iterator[Option | Impossible]:
         """The best value of each setting under the model that decides."""
-        goal, bus = self.goal, self.goal.bus
+        goal = self.goal
         yield self.option("as it is", {})
-        safe = safe_gap_count(bus.hops(bus.nodes))
-        best_gap: Changes = {}
-        if bus.cable_is_standard:
-            best_gap = {"bus.gap_count": safe} if bus.gap_count_for(bus.nodes) != safe else {}
-            yield self.option("best gap count", best_gap, bounded_by="gap table")
-        else:
-            yield Impossible("best gap count", f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
+        settings = bus_of(goal).settings(network_of(goal))
+        for setting in settings:
+            title = f"best {setting.label}"
+            yield (
+                Impossible(title, setting.reason)
+                if setting.best is None
+                else self.option(title, self.best(setting), bounded_by=setting.bound)
+            )
         yield self.period("smallest period", {})
-        if best_gap:
-            yield self.period("smallest period, best gap count", best_gap)
+        for setting in settings:
+            if setting.values:
+                yield self.period(f"smallest period, best {setting.label}", self.best(setting))
         yield self.ratio("smallest slice ratio")
         yield self.payload("largest payload")
         yield self.nodes("most nodes", goal)
-        if bus.cable_is_standard and bus.gap_count != "optimal":
-            yield self.nodes("most nodes, best gap count", override(goal, {"bus.gap_count": "optimal"}))
+        for setting in settings:
+            wanted = setting.best if setting.follows is None else setting.follows
+            if setting.best is not None and wanted is not None and _differing(goal, {setting.key: wanted}):
+                title = f"most nodes, best {setting.label}"
+                yield self.nodes(title, override(goal, {setting.key: wanted}), setting=setting)
+
+    @staticmethod
+    def best(setting: Setting) -> Changes:
+        """What gives a setting its best value; nothing where it has it."""
+        return {} if setting.best is None or not setting.values else {setting.key: setting.best}
 
     def recommended(self, *, keep: set[str]) -> Option | None:
         """The cheapest change that makes a plan, of those that leave some keys alone."""
-        for change in changes_to_fit(self.goal, models=BOTH_MODELS):
+        for change in changes_to_fit(self.goal, models=self.models):
             changes = dict(change.changes)
             if keep & set(changes):
                 continue
@@ -202,7 +217,7 @@ class _Planner:
                 del changes["cycle.period_us"]
                 found = smallest_period(
                     override(self.goal, dict(changes)),
-                    models=BOTH_MODELS,
+                    models=self.models,
                     circle=self.circle,
                     max_circles=self.max_circles,
                 )
@@ -210,28 +225,28 @@ class _Planner:
                     continue
                 changes["cycle.period_us"] = found.period_us
                 bounded_by, proven = found.bounded_by, found.proven
-            option = self.option("cheapest that meets both models", changes, bounded_by=bounded_by, proven=proven)
+            option = self.option(_CHEAPEST[len(self.models) > 1], changes, bounded_by=bounded_by, proven=proven)
             if option.is_plan:
                 return option._replace(recommended=True)
         return None
 
-    def option(self, title: str, changes: Changes, *, bounded_by: Bound | None = None, proven: bool = True) -> Option:
+    def option(self, title: str, changes: Changes, *, bounded_by: str | None = None, proven: bool = True) -> Option:
         """Put changes into the goal and compute what they bring."""
         changed = override(self.goal, dict(changes))
         deciding = figures(changed, model=self.model)
-        (other,) = (model for model in BOTH_MODELS if model != self.model)
+        others = (model for model in self.models if model != self.model)
         return Option(
             title=title,
             changes=changes,
             profile=changed,
             deciding=deciding,
-            other=figures(changed, model=other),
+            others=tuple(figures(changed, model=model) for model in others),
             bounded_by=bounded_by,
             circle_failures=self.circle(changed) if self.circle and deciding.fits else None,
             proven=proven,
         )
 
-    def fitting(self, title: str, changes: Changes, *, bounded_by: Bound, proven: bool = True) -> Option | Impossible:
+    def fitting(self, title: str, changes: Changes, *, bounded_by: str, proven: bool = True) -> Option | Impossible:
         """An option, unless it still does not fit."""
         broken = broken_limits(override(self.goal, dict(changes)))
         if broken:
@@ -260,7 +275,7 @@ class _Planner:
         size, bounded_by = largest_payload(self.goal, model=self.model)
         if not size:
             reason = (
-                "the execution table holds no whole quadlets"
+                "the execution table holds no whole step of the payload"
                 if bounded_by == "execution"
                 else "not even the smallest fits"
             )
@@ -268,12 +283,13 @@ class _Planner:
         changes: Changes = {"payload.read_bytes": size, "payload.write_bytes": size}
         return self.fitting(title, changes, bounded_by=bounded_by)
 
-    def nodes(self, title: str, profile: Profile) -> Option | Impossible:
+    def nodes(self, title: str, profile: Profile, *, setting: Setting | None = None) -> Option | Impossible:
         nodes, bounded_by = most_nodes(profile, model=self.model)
         if not nodes:
             reason = "no node fits" if bounded_by == "time" else f"limited by {bounded_by}"
             return Impossible(title, reason)
         changes: Changes = {"bus.nodes": nodes}
-        if profile.bus.gap_count != self.goal.bus.gap_count:
-            changes["bus.gap_count"] = safe_gap_count(self.goal.bus.hops(nodes))
+        if setting is not None:
+            settings = bus_of(profile).settings(network_of(profile).with_nodes(nodes))
+            changes |= {one.key: one.best for one in settings if one.key == setting.key and one.best is not None}
         return self.fitting(title, changes, bounded_by=bounded_by)

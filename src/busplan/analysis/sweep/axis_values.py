@@ -1,7 +1,7 @@
 """What a key of the profile goes through in a sweep: from text, or from numbers one by one."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from decimal import Decimal, localcontext
 from math import isfinite
 from typing import Final, TypeGuard
@@ -19,10 +19,9 @@ _EXACT: Final = 2**53
 _MAX_DECIMALS: Final = 22
 """Powers of ten up to this are exact as floats."""
 _MOST_LISTED: Final = 10_000
-_WORDS: Final = ("optimal",)
 
 
-def parse_values(text: str, *, name: str) -> Values:
+def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values:
     """Read values as the command line writes them.
 
     Parameters
@@ -31,6 +30,8 @@ def parse_values(text: str, *, name: str) -> Values:
         Values between commas, a range A:B in steps of 1, A:B:STEP, A:B:*FACTOR or A:B:#COUNT.
     name
         What to call them in messages.
+    words
+        Words that may stand in the place of a number.
 
     Raises
     ------
@@ -45,18 +46,20 @@ def parse_values(text: str, *, name: str) -> Values:
     if ":" in text:
         return _range(name, text)
     parts = map(str.strip, text.split(","))
-    return listed((part if part in _WORDS else _plain(_number(name, part)) for part in parts), name=name)
+    return listed((part if part in words else _plain(_number(name, part)) for part in parts), name=name, words=words)
 
 
-def listed(values: Iterable[object], *, name: str) -> Listed:
+def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) -> Listed:
     """Take values one by one.
 
     Parameters
     ----------
     values
-        Finite numbers, and "optimal" where the profile knows it. A float that is whole may stand for a count.
+        Finite numbers or words. A float that is whole may stand for a count.
     name
         What to call them in messages.
+    words
+        Words that may be among them.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def listed(values: Iterable[object], *, name: str) -> Listed:
     """
     found: dict[int | float | str, None] = {}
     for value in values:
-        if not _is_value(value):
+        if not _is_value(value, words):
             raise BusplanError(f"{name}: {value!r} is no finite number")
         if value in found:
             raise BusplanError(f"{name}: {value} is there twice")
@@ -90,10 +93,10 @@ def stepped(values: range, *, name: str) -> Steps:
     return Steps(values.start, values.step, 1, len(values))
 
 
-def _is_value(value: object) -> TypeGuard[int | float | str]:
+def _is_value(value: object, words: Collection[str]) -> TypeGuard[int | float | str]:
     if isinstance(value, float):
         return isfinite(value)
-    return value in _WORDS if isinstance(value, str) else isinstance(value, int) and not isinstance(value, bool)
+    return value in words if isinstance(value, str) else isinstance(value, int) and not isinstance(value, bool)
 
 
 def _is_whole(number: float) -> bool:

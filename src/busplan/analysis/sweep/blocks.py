@@ -1,41 +1,38 @@
 """Capacity over a grid: the figures of `capacity` for many profiles at once, through the same functions.
 
-Those functions are operators only, so a profile whose keys hold arrays gives arrays. Each key's values lie along an
-axis of their own; what a figure does not depend on costs it nothing. Only what is no operator stands here: the whole
-number of nodes, the words, and a table's interpolation.
+Those functions are written for numbers of any sort, so a profile whose keys hold arrays gives arrays. Each key's values
+lie along an axis of their own; what a figure does not depend on costs it nothing. Only words stand here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple, get_type_hints
+from functools import cache
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.capacity.cycle import TERM_KEYS, Limit, Term, available_us, cycle, fits_in, limits_broken
-from busplan.analysis.capacity.figures import CapacityFigures, numeric_figures
-from busplan.analysis.capacity.node_limit import most_nodes, required_by_nodes
+from busplan.analysis.capacity.cycle import TIME, fits_in, limits_with_time
+from busplan.analysis.capacity.figures import numeric_figures
+from busplan.analysis.capacity.node_limit import most_nodes
+from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
-from busplan.buses.ieee1394.constants import MAX_HOPS
-from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.profile.bus import TableExecution
-from busplan.profile.model import Profile
+from busplan.buses.figure import Sort
 from busplan.sections.base import with_unchecked
+from busplan.sections.profile import Profile
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays stay in the processor's cache."""
 
-FIGURES: Final = CapacityFigures._fields
-"""Columns of a sweep behind the varied keys; `timing_model` is the first."""
-WORD_FIGURES: Final = ("timing_model", "binding_term", "limited_by", "exceeded")
-"""Those in words."""
-_TYPES: Final = get_type_hints(CapacityFigures)
-_TERMS: Final[tuple[Term, ...]] = tuple(TERM_KEYS)
-_LIMITS: Final[tuple[Limit, ...]] = ("payload", "nodes", "hops", "time")
-"""In the order of `CapacityFigures.exceeded`."""
-_EXCEEDED: Final = tuple(
-    [limit for bit, limit in enumerate(_LIMITS) if code >> bit & 1] for code in range(1 << len(_LIMITS))
-)
-_DOUBT: Final = 1e-9
-"""Share of the time by which a cycle must miss its slice for the root alone to tell: far above any rounding."""
+_TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
+
+
+def figure_names(profile: Profile) -> tuple[str, ...]:
+    """Columns of a sweep behind the varied keys; `timing_model` is the first."""
+    return tuple(figure.key for figure in bus_of(profile).capacity_figures)
+
+
+def word_figures(profile: Profile) -> tuple[str, ...]:
+    """Columns in words."""
+    return tuple(figure.key for figure in bus_of(profile).capacity_figures if figure.sort in ("word", "words"))
 
 
 class Column(NamedTuple):
@@ -79,7 +76,7 @@ def sweep(
     profile: Profile,
     grid: Grid,
     *,
-    timing_models: Sequence[TimingModelName],
+    timing_models: Sequence[str],
     chunk_points: int = CHUNK_POINTS,
 ) -> Iterator[Block]:
     """Compute all figures of `capacity` over a grid.
@@ -118,7 +115,7 @@ def _varied(values: Array) -> Column:
     return Column(np.arange(values.size, dtype=np.uint8).reshape(values.shape), tuple(values.ravel()))
 
 
-def _figures(profile: Profile, values: Mapping[str, Array], model: TimingModelName) -> dict[str, Column]:
+def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[str, Column]:
     """All figures of a chunk under one timing model."""
     for number, (key, own) in enumerate(values.items()):
         if own.dtype == object and own.size > 1:
@@ -127,9 +124,8 @@ def _figures(profile: Profile, values: Mapping[str, Array], model: TimingModelNa
                 _figures(profile, {**values, key: np.take(own, [index], axis=number)}, model)
                 for index in range(own.size)
             ]
-            return {name: _joined([part[name] for part in parts], axis=number) for name in FIGURES}
-    where = _at(profile, values)
-    return _columns(where, values, model)
+            return {name: _joined([part[name] for part in parts], axis=number) for name in figure_names(profile)}
+    return _columns(_at(profile, values), model, axes=len(values))
 
 
 def _joined(parts: list[Column], *, axis: int) -> Column:
@@ -138,58 +134,45 @@ def _joined(parts: list[Column], *, axis: int) -> Column:
 
 
 def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
-    """A profile whose keys hold arrays: never checked, for functions of operators only."""
+    """A profile whose keys hold arrays, never checked."""
     for key, own in values.items():
         profile = with_unchecked(profile, key, own.item() if own.size == 1 else own.astype(float))
-    execution = profile.node.execution
-    if isinstance(execution, TableExecution):
-        profile = with_unchecked(profile, "node.execution", _TableOfArrays(execution))
     return profile
 
 
-class _TableOfArrays:
-    """An execution table that takes arrays of payloads, all of them inside it."""
-
-    def __init__(self, table: TableExecution) -> None:
-        self._table = table
-        self._payload_bytes = np.array(table.payload_bytes, dtype=float)
-        self._time_us = np.array(table.time_us, dtype=float)
-
-    def execution_us(self, payload_bytes: Any) -> Any:
-        """Execution time T_exec with that payload, as `TableExecution.execution_us` gives it [us]."""
-        if np.ndim(payload_bytes) == 0:
-            return self._table.execution_us(payload_bytes)
-        index = np.searchsorted(self._payload_bytes, payload_bytes)
-        left = np.maximum(index - 1, 0)
-        x0, y0 = self._payload_bytes[left], self._time_us[left]
-        x1, y1 = self._payload_bytes[index], self._time_us[index]
-        return np.where(x1 == payload_bytes, y1, y0 + (y1 - y0) * (payload_bytes - x0) / np.where(x1 > x0, x1 - x0, 1))
-
-
-def _columns(where: Profile, values: Mapping[str, Array], model: TimingModelName) -> dict[str, Column]:
-    now = cycle(where, model=model, nodes=where.bus.nodes)
-    numbers = numeric_figures(where, now)
-    max_nodes, limited_by = _largest_nodes(where, values, model)
+def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
+    bus, network = bus_of(where), network_of(where)
+    cycle = bus.cycle(network, model=model)
+    numbers = {**numeric_figures(cycle), **cycle.figures(), **{term.key: term.us for term in cycle.terms}}
+    limits = limits_with_time(network, model=model)
     late = np.logical_not(fits_in(numbers["required_us"], available_us=numbers["available_us"]))
-    terms_us = [numbers[key] for key in TERM_KEYS.values()]
-    broken = limits_broken(where)
-    flags = [*(broken[limit] for limit in _LIMITS[:-1]), late]
+    flags = [late if limit.key == TIME else limit.is_broken(network) for limit in limits]
     exceeded: Any = sum(flag * np.uint8(1 << bit) for bit, flag in enumerate(flags))
-    numbers |= {"max_nodes": max_nodes, "max_axes": where.node.axes * max_nodes, "fits": np.equal(exceeded, 0)}
+    most = most_nodes(network, model=model)
+    numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
+    keys = tuple(limit.key for limit in limits)
     words = {
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
-        "binding_term": Column(_largest(terms_us), _TERMS),
-        "limited_by": Column(limited_by, _LIMITS),
-        "exceeded": Column(exceeded, _EXCEEDED),
+        "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
+        "limited_by": Column(np.asarray(most.limit, np.uint8), keys),
+        "exceeded": Column(exceeded, _combinations(keys)),
     }
-    columns = {**words, **{name: Column(_typed(name, number)) for name, number in numbers.items()}}
-    axes = len(values)
-    return {name: columns[name]._replace(values=_with_axes(columns[name].values, axes)) for name in FIGURES}
+    found = {
+        figure.key: words[figure.key] if figure.key in words else Column(_typed(numbers[figure.key], figure.sort))
+        for figure in bus.capacity_figures
+    }
+    return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
 
 
-def _typed(name: str, number: Any) -> Array:
+@cache
+def _combinations(keys: tuple[str, ...]) -> tuple[list[str], ...]:
+    """Every set of limits, by the number whose bits say which are in it."""
+    return tuple([key for bit, key in enumerate(keys) if code >> bit & 1] for code in range(1 << len(keys)))
+
+
+def _typed(number: Any, sort: Sort) -> Array:
     """Counts as whole numbers and all else as `capacity` has it, whatever it was computed in."""
-    return np.asarray(number, dtype=_TYPES[name])
+    return np.asarray(number, dtype=_TYPES[sort])
 
 
 def _with_axes(values: Any, axes: int) -> Array:
@@ -205,43 +188,3 @@ def _largest(terms: list[Any]) -> Any:
         place = np.where(np.greater(term, best), np.uint8(index), place)
         best = np.maximum(term, best)
     return place
-
-
-def _largest_nodes(where: Profile, values: Mapping[str, Array], model: TimingModelName) -> tuple[Any, Any]:
-    """`largest_nodes` for arrays: the number, and the place of its limit."""
-    bus = where.bus
-    most, structural = most_nodes(bus)
-    given_us = available_us(where)
-
-    def fits(profile: Profile, nodes: Any, given_us: Any) -> Any:
-        return fits_in(cycle(profile, model=model, nodes=nodes).required_us, available_us=given_us)
-
-    if bus.max_hops is None and isinstance(bus.gap_count, str):
-        # Required time grows with each node: those that fit are the first ones.
-        answer: Any = sum(np.asarray(fits(where, nodes, given_us)).astype(np.int64) for nodes in range(1, most + 1))
-    else:
-        required = required_by_nodes(where, model=model)
-        root = np.asarray(required.nodes(given_us))
-        near = np.rint(root)
-        off = np.abs(root - near)
-        answer = np.minimum(np.floor(root), most)
-        # First by one bound for all, which is one comparison each; what it leaves, by its own.
-        doubt = off <= _DOUBT * np.max(given_us) / np.min(required.c1_us)
-        if np.any(doubt):
-            doubt = doubt & (off * required.c1_us <= _DOUBT * given_us) & (near >= 1) & (near <= most)
-        if np.any(doubt):
-            # So close to a whole number that rounding decides: there the cycle itself tells.
-            shape = np.broadcast_shapes(doubt.shape, *(own.shape for own in values.values()))
-            mask = np.broadcast_to(doubt, shape)
-            arrays = {key: own for key, own in values.items() if own.size > 1}
-            few = _at(where, {key: np.broadcast_to(own, shape)[mask] for key, own in arrays.items()})
-            near = np.broadcast_to(near, shape)[mask]
-            answer = np.broadcast_to(answer, shape).copy()
-            answer[mask] = near - ~np.asarray(fits(few, near, available_us(few)))
-    limit = np.where(np.equal(answer, most), np.uint8(_LIMITS.index(structural)), np.uint8(_LIMITS.index("time")))
-    blocked = {"hops": bus.max_hops is not None and bus.max_hops > MAX_HOPS, "payload": limits_broken(where)["payload"]}
-    for name, flag in blocked.items():
-        if np.any(flag):
-            answer = np.where(flag, 0, answer)
-            limit = np.where(flag, np.uint8(_LIMITS.index(name)), limit)
-    return answer, limit

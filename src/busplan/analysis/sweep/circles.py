@@ -8,12 +8,12 @@ import numpy as np
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
-from busplan.analysis.sweep.blocks import FIGURES, Block, Column
+from busplan.analysis.network import model_names
+from busplan.analysis.sweep.blocks import Block, Column, figure_names
 from busplan.analysis.sweep.grid import Grid
-from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 CIRCLE_FIGURES: Final = (
     "mean_contour_error_mm",
@@ -30,9 +30,9 @@ MAX_CIRCLES: Final = 1000
 Figures = tuple[float | bool | None, ...]
 
 
-def all_columns(grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
+def all_columns(profile: Profile, grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
     """All columns of a sweep: the varied keys, the figures of `capacity`, and those of circle tests."""
-    return (*grid.axes, *FIGURES, *(CIRCLE_FIGURES if with_circle else ()))
+    return (*grid.axes, *figure_names(profile), *(CIRCLE_FIGURES if with_circle else ()))
 
 
 class CircleTask(NamedTuple):
@@ -40,12 +40,12 @@ class CircleTask(NamedTuple):
 
     profile: Profile
     changes: dict[str, object]
-    timing_models: tuple[TimingModelName, ...]
+    timing_models: tuple[str, ...]
 
 
 def run_task(task: CircleTask) -> list[Figures]:
     """Run the circle test of a point under each timing model, as if that model decided."""
-    found: dict[TimingModelName, Figures] = {}
+    found: dict[str, Figures] = {}
     on_node: Figures | None = None
     for model in task.timing_models:
         profile = override(task.profile, {**task.changes, "bus.timing_model": model})
@@ -74,7 +74,7 @@ def require_circles(profile: Profile, grid: Grid) -> None:
         variant = override(profile, changes)
         try:
             # No model carries it: it has an answer, but no circle.
-            carried = any(figures(variant, model=model).fits for model in ("paper", "standard"))
+            carried = any(figures(variant, model=model).fits for model in model_names(variant))
             _ = setup(variant) if carried else loop_timing(variant)
         except BusplanError as error:
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
@@ -85,7 +85,7 @@ def with_circles(
     profile: Profile,
     block: Block,
     *,
-    timing_models: Sequence[TimingModelName],
+    timing_models: Sequence[str],
     run: Callable[[Iterable[CircleTask]], Iterable[list[Figures]]],
 ) -> Block:
     """Add the columns of circle tests to a block.

@@ -9,31 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
+from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
+from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
 
-CAPACITY_KEYS: Final = (
-    "bus.gap_count",
-    "bus.nodes",
-    "bus.max_hops",
-    "bus.cable_length_m",
-    "cycle.period_us",
-    "cycle.slice_ratio",
-    "cycle.nonperiodic_us",
-    "cycle.sync.ping_us",
-    "cycle.sync.ping_per_node_us",
-    "payload.read_bytes",
-    "payload.write_bytes",
-    "payload.overhead_bytes",
-    "node.axes",
-    "node.execution.base_us",
-    "node.execution.per_byte_us",
-)
-"""The keys in numbers that the figures of `capacity` depend on."""
-CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance")
-"""The sections that only a circle test reads."""
 _CHECKED_EACH: Final = 100
 """Values of one key that are checked one by one; of more, the extremes: every range of the profile is an interval."""
 MAX_POINTS: Final = 10**12
@@ -41,7 +22,7 @@ MAX_POINTS: Final = 10**12
 
 
 class Listed(NamedTuple):
-    """Values one by one: numbers, and "optimal" where the profile knows it."""
+    """Values one by one: numbers, and words where the profile knows them."""
 
     values: tuple[int | float | str, ...]
 
@@ -203,7 +184,7 @@ def checked_grid(
     first: dict[str, object] = {key: values[0] for key, values in samples.items()}
     override(profile, first)
     for key in axes:
-        _require_read(key, name=f"{option} {key}", circle_option=None if with_circle else circle_option)
+        _require_read(profile, key, name=f"{option} {key}", circle_option=None if with_circle else circle_option)
     for key, values in samples.items():
         for value in values[1:]:
             override(profile, {**first, key: value})
@@ -228,8 +209,9 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
         section = ".".join(tables)
         siblings = list(table) if isinstance(table, dict) and tables else []
         close = [f"{section}.{one}" for one in get_close_matches(last, siblings, n=1, cutoff=0.7)]
-        close = close or get_close_matches(key, CAPACITY_KEYS, n=1, cutoff=0.8) * (not siblings)
-        known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(CAPACITY_KEYS)}"
+        read = cycle_keys(profile.bus.kind)
+        close = close or get_close_matches(key, read, n=1, cutoff=0.8) * (not siblings)
+        known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
         hint = f"did you mean {close[0]}?" if close else known
         raise BusplanError(f"{name}: no such key of this profile; {hint}")
     if isinstance(table[last], dict | list | tuple):
@@ -237,9 +219,9 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
         raise BusplanError(f"{name}: is a {what}; expected the key of one number")
 
 
-def _require_read(key: str, *, name: str, circle_option: str | None) -> None:
+def _require_read(profile: Profile, key: str, *, name: str, circle_option: str | None) -> None:
     """Refuse a key that nothing of what is computed depends on; without an option to ask for, a circle test is."""
-    if key in CAPACITY_KEYS:
+    if key in cycle_keys(profile.bus.kind):
         return
     section = key.partition(".")[0]
     if section not in CIRCLE_SECTIONS:

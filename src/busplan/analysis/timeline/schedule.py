@@ -1,50 +1,41 @@
 """One communication cycle as a schedule: event after event, each beginning where the one before it ends.
 
-This is the second way to the time that a cycle needs. `capacity` multiplies and adds in closed form; here every phase
-of every transaction is laid behind the other, and the last end must be the same.
+This is the second way to the time that a cycle needs. `capacity` multiplies and adds in closed form; here every event
+of the bus is laid behind the other, and the last end must be the same.
 """
 
 from collections.abc import Iterable, Iterator
 from math import fsum
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.analysis.capacity.cycle import Cycle, cycle, fits_in
+from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.buses.ieee1394.constants import MAX_NODES
-from busplan.buses.ieee1394.timing import Phases, TimingModelName, TransactionKind
+from busplan.analysis.network import bus_of, network_of
+from busplan.buses.bus import IDLE, BusEvent
 from busplan.errors import BusplanError
-from busplan.profile.model import Profile
-
-EventKind = Literal[
-    "sync",
-    "arbitration",
-    "request_data",
-    "acknowledge",
-    "execution",
-    "response_data",
-    "subaction_gap",
-    "arbitration_reset_gap",
-    "nonperiodic",
-    "idle",
-]
-Packet = Literal["request", "response"]
+from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
-"""Nodes that are still laid out one by one: far beyond the 62 of a bus, so that a plan that breaks this limit can be
+"""Nodes that are still laid out one by one: far beyond those of a bus, so that a plan that breaks this limit can be
 seen; few enough for a document."""
 
 
 class Event(NamedTuple):
     """What happens from one moment of the cycle to another."""
 
-    kind: EventKind
+    kind: str
+    """Key of its kind, as the bus has it."""
     node: int | None
     """Whose transaction it belongs to, from 1; None for what belongs to all."""
-    transaction: TransactionKind | None
-    packet: Packet | None
-    """Which of the transaction's two packets it belongs to, where it belongs to one."""
+    transaction: str | None
+    packet: str | None
+    """Which of the transaction's packets it belongs to, where it belongs to one."""
     start_us: float
     end_us: float
+    term: str
+    """Key of the term that it is a part of; empty for what is left."""
+    label: str
+    """What it is, and who is at work."""
 
     @property
     def duration_us(self) -> float:
@@ -74,7 +65,7 @@ class Schedule(NamedTuple):
     def used_us(self) -> float:
         """End of the last event that is not idle: the required time by addition [us]."""
         last = self.cycle_events[-1]
-        return last.start_us if last.kind == "idle" else last.end_us
+        return last.start_us if last.kind == IDLE.key else last.end_us
 
     @property
     def is_whole(self) -> bool:
@@ -94,19 +85,17 @@ class Schedule(NamedTuple):
 class Total(NamedTuple):
     """All events of one kind in a window."""
 
-    kind: EventKind
+    kind: str
     events: int
     total_us: float
     share: float
     """Of the window, 0..1."""
 
 
-def schedule(profile: Profile, *, model: TimingModelName | None = None) -> Schedule:
+def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     """Lay out one communication cycle, node by node.
 
-    The synchronous packet, then a read of every node, then a write of every node, then the window for non-periodic
-    data, then what is left of the slice. Every node is charged the hops of the farthest one, as in `capacity`. What
-    takes no time is no event.
+    The events of the cycle as its bus has them, then what is left of the slice. What takes no time is no event.
 
     Parameters
     ----------
@@ -133,18 +122,18 @@ def schedule(profile: Profile, *, model: TimingModelName | None = None) -> Sched
     >>> abs(plan.used_us - plan.figures.required_us) < 1e-9
     True
     """
-    nodes = profile.bus.nodes
+    nodes, bus = profile.bus.nodes, bus_of(profile)
     if nodes > MOST_NODES:
-        raise BusplanError(
-            f"bus.nodes = {nodes}: a timeline shows up to {MOST_NODES} nodes; one bus carries {MAX_NODES:g}"
-        )
+        limit = bus.limit("nodes")
+        carries = "" if limit is None else f"; one bus carries {limit.most(network_of(profile)):g}"
+        raise BusplanError(f"bus.nodes = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = profile.bus.timing_model if model is None else model
     closed = figures(profile, model=model)
-    events = list(_laid_out(_parts(cycle(profile, model=model, nodes=nodes))))
+    events = list(_laid_out(cycle_of(profile, model=model).events()))
     end_us = events[-1].end_us
     # A slice that is filled but for the rounding of floats has nothing left.
     if not fits_in(closed.available_us, available_us=end_us):
-        events.append(Event("idle", None, None, None, end_us, closed.available_us))
+        events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
     return Schedule(profile, closed, tuple(events), from_us=0.0, to_us=events[-1].end_us)
 
 
@@ -153,7 +142,7 @@ def zoom(
     *,
     from_us: float | None = None,
     to_us: float | None = None,
-    transaction: tuple[TransactionKind, int] | None = None,
+    transaction: tuple[str, int] | None = None,
 ) -> Schedule:
     """Narrow the window of a schedule; several limits all hold.
 
@@ -191,51 +180,24 @@ def zoom(
 
 def totals(plan: Schedule) -> tuple[Total, ...]:
     """Add up the events of a window by kind, in the order in which they first come."""
-    sums: dict[EventKind, list[float]] = {}
+    sums: dict[str, list[float]] = {}
     for event in plan.events:
         sums.setdefault(event.kind, []).append(event.duration_us)
     window_us = plan.to_us - plan.from_us
     return tuple(Total(kind, len(parts), fsum(parts), fsum(parts) / window_us) for kind, parts in sums.items())
 
 
-_Part = tuple[EventKind, int | None, TransactionKind | None, Packet | None, float]
-"""An event before it has its place: all of it, and how long it takes [us]."""
-
-
-def _parts(now: Cycle) -> Iterator[_Part]:
-    """A cycle in the order of its protocol."""
-    yield "sync", None, None, None, now.sync_us
-    halves: tuple[tuple[TransactionKind, Phases], ...] = (("read", now.read), ("write", now.write))
-    for kind, phases in halves:
-        for node in range(1, now.nodes + 1):
-            yield from _transaction(kind, node, phases)
-    yield "nonperiodic", None, None, None, now.nonperiodic_us
-
-
-def _transaction(kind: TransactionKind, node: int, phases: Phases) -> Iterator[_Part]:
-    """One asynchronous transaction and the gaps behind it, equations (3)-(10)."""
-    yield "arbitration", node, kind, "request", phases.arbitration_us
-    yield "request_data", node, kind, "request", phases.request_data_us
-    yield "acknowledge", node, kind, "request", phases.acknowledge_us
-    yield "execution", node, kind, None, phases.execution_us
-    yield "arbitration", node, kind, "response", phases.arbitration_us
-    yield "response_data", node, kind, "response", phases.response_data_us
-    yield "acknowledge", node, kind, "response", phases.acknowledge_us
-    yield "subaction_gap", node, kind, None, phases.subaction_gap_us
-    yield "arbitration_reset_gap", node, kind, None, phases.arbitration_reset_gap_us
-
-
-def _laid_out(parts: Iterable[_Part]) -> Iterator[Event]:
-    """Put parts one behind the other.
+def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
+    """Put events one behind the other.
 
     The sum carries what each addition loses (Neumaier), so that an error cannot grow with the number of events.
     """
     total_us = lost_us = start_us = 0.0
-    for kind, node, transaction, packet, duration_us in parts:
-        larger_us, smaller_us = max(total_us, duration_us), min(total_us, duration_us)
+    for one in parts:
+        larger_us, smaller_us = max(total_us, one.us), min(total_us, one.us)
         total_us = larger_us + smaller_us
         lost_us += (larger_us - total_us) + smaller_us
         end_us = total_us + lost_us
         if end_us > start_us:
-            yield Event(kind, node, transaction, packet, start_us, end_us)
+            yield Event(one.kind, one.node, one.transaction, one.packet, start_us, end_us, one.term, one.label)
             start_us = end_us

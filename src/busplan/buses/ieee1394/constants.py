@@ -6,12 +6,11 @@ G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Cont
 IEEE-1394 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
 
-from collections.abc import Iterator
-from itertools import pairwise
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.sourced import Sourced
+from busplan.elementwise import Number, from_table, rounded_up
+from busplan.sourced import Sourced, constants
 
 Speed = Literal["S100", "S200", "S400"]
 
@@ -23,6 +22,7 @@ BASE_RATE_MBIT_S: Final = Sourced(
     grade="published",
     source="IEEE 1394-1995; the gap tables of Linux, Apple and JHU know no packet speed",
     meaning="base rate: S100's data rate, and the clock that gaps and PHY delays are counted in",
+    symbol="C",
 )
 DATA_RATE_MBIT_S: Final = MappingProxyType(
     {
@@ -32,6 +32,7 @@ DATA_RATE_MBIT_S: Final = MappingProxyType(
             grade="published",
             source="IEEE 1394a" if speed != "S400" else "IEEE 1394a; paper, section IV-A",
             meaning=f"data rate of {speed}",
+            symbol="R",
         )
         for speed, multiple in {"S100": 1, "S200": 2, "S400": 4}.items()
     }
@@ -231,18 +232,16 @@ GAP_COUNT_TABLE_HOPS: Final = Sourced(
 )
 
 
-_GAP_COUNT_STEPS: Final = tuple(
-    (hop, more - less) for hop, (less, more) in enumerate(pairwise((*GAP_COUNT_BY_HOPS, MAX_GAP_COUNT)), start=1)
-)
+_WORDS: Final = f"the table of smallest safe gap counts at H hops; {MAX_GAP_COUNT} beyond it"
 
 
-def safe_gap_count(hops: int) -> int:
+def safe_gap_count(hops: Number) -> Number:
     """Smallest gap count that is safe for a bus of that many hops.
 
     Parameters
     ----------
     hops
-        Largest number of cable hops between two nodes, 1 or more [1].
+        Largest number of cable hops between two nodes, 1 or more [1]; of any sort.
 
     Returns
     -------
@@ -252,7 +251,7 @@ def safe_gap_count(hops: int) -> int:
     Raises
     ------
     ValueError
-        `hops` is below 1.
+        `hops` is a plain number below 1.
 
     References
     ----------
@@ -263,65 +262,31 @@ def safe_gap_count(hops: int) -> int:
     >>> safe_gap_count(1), safe_gap_count(16), safe_gap_count(40)
     (5, 43, 63)
     """
-    if hops < 1:
+    if isinstance(hops, int) and hops < 1:
         raise ValueError(f"hops must be 1 or more, got {hops}")
-    return gap_count_by_hops(hops)
+    return from_table((*GAP_COUNT_BY_HOPS, MAX_GAP_COUNT), hops - 1, words=_WORDS, sources=(GAP_COUNT_TABLE_HOPS,))
 
 
-def gap_count_by_hops(hops: int) -> int:
-    """Look the published gap count up; operators only, nothing is checked.
-
-    Parameters
-    ----------
-    hops
-        Largest number of cable hops between two nodes, 1 or more [1]; integer or integer array.
-
-    Returns
-    -------
-    int
-        Gap count; the shape of the argument.
-
-    References
-    ----------
-    The source of `GAP_COUNT_TABLE_HOPS`.
-
-    Examples
-    --------
-    >>> gap_count_by_hops(3)
-    8
-    """
-    # Each further hop of the table adds its step: a comparison is 0 or 1 for a number and for an array alike.
-    return GAP_COUNT_BY_HOPS[0] + sum((hops > hop) * step for hop, step in _GAP_COUNT_STEPS)
-
-
-def padded_bytes(payload_bytes: int) -> int:
+def padded_bytes(payload_bytes: Number) -> Number:
     """Payload filled up to whole quadlets, as it travels in a block packet [bytes].
 
     Parameters
     ----------
     payload_bytes
-        Payload [bytes].
+        Payload [bytes]; of any sort.
 
     Returns
     -------
     int
-        The next multiple of 4 [bytes]; arrays of integers broadcast.
+        The next multiple of 4 [bytes].
 
     Examples
     --------
     >>> padded_bytes(12), padded_bytes(13)
     (12, 16)
     """
-    return -(-payload_bytes // QUADLET_BYTES) * QUADLET_BYTES
+    return rounded_up(payload_bytes / QUADLET_BYTES) * QUADLET_BYTES
 
 
-def _constants() -> Iterator[tuple[str, Sourced]]:
-    for name, value in globals().items():
-        if isinstance(value, Sourced):
-            yield name, value
-        elif isinstance(value, MappingProxyType):
-            yield from ((f"{name}[{key}]", one) for key, one in value.items())
-
-
-CONSTANTS: Final = MappingProxyType(dict(_constants()))
+CONSTANTS: Final = constants(globals())
 """Every constant with a source, by its name here."""

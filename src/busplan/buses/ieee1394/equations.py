@@ -1,4 +1,4 @@
-"""Equations (1)-(15) of the paper, one function each.
+"""Equations (3)-(15) of the paper, one function each; (1) and (2) stand in `busplan.buses.time_slice`.
 
 The functions are operators only: a float in gives a float, NumPy arrays broadcast. Times are in us, rates in
 Mbit/s (which is bit/us, so that bits / rate is in us), lengths in m, sizes in bytes. Nothing is checked here:
@@ -12,9 +12,6 @@ References
 G. Gu, L. Zhu, Z. Xiong, H. Ding, "Design of a Distributed Multiaxis Motion Control System Using the IEEE-1394
 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.
 """
-
-from types import MappingProxyType
-from typing import Final
 
 from busplan.buses.ieee1394.constants import (
     ARBITRATION_GAP_TICKS,
@@ -33,17 +30,10 @@ from busplan.buses.ieee1394.constants import (
     SUBACTION_GAP_TICKS,
     SUBACTION_GAP_TICKS_PER_COUNT,
 )
-from busplan.sourced import published
+from busplan.sourced import SYMBOLS, published
 
-SYMBOLS: Final = MappingProxyType(
+SYMBOLS.update(
     {
-        "period_us": "T_s",
-        "slice_ratio": "alpha",
-        "nodes": "N",
-        "available_us": "alpha T_s",
-        "reads_us": "T_r",
-        "writes_us": "T_w",
-        "nonperiodic_us": "T_npd",
         "sync_us": "CTS",
         "request_us": "T_req",
         "response_us": "T_resp",
@@ -66,76 +56,8 @@ SYMBOLS: Final = MappingProxyType(
         **{f"t{number}_us": f"T{number}" for number in range(1, 6)},
     }
 )
-"""What stands for a quantity in the equations, by its name here. The paper's own, but for what it writes out or calls
-N and Bandwidth alike: hops H, gap count g, rate R, clock C, packet B, payload P, cable L."""
-
-
-@published(1, symbol="T_cs", section="II")
-def time_slice_us(period_us: float, *, slice_ratio: float, nodes: float) -> float:
-    """Communication time slice that the cycle gives each node.
-
-    Parameters
-    ----------
-    period_us
-        Communication period T_s [us]; float or array.
-    slice_ratio
-        Share alpha of the period that belongs to communication, 0..1 [1]; float or array.
-    nodes
-        Number of distributed nodes N, host not counted [1]; float or array.
-
-    Returns
-    -------
-    float
-        T_cs = alpha T_s / N [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `nodes` is zero.
-
-    Examples
-    --------
-    >>> time_slice_us(4000.0, slice_ratio=0.5, nodes=2)
-    1000.0
-    """
-    return slice_ratio * period_us / nodes
-
-
-@published(2, symbol="T_cs", section="III-C")
-def required_time_slice_us(
-    reads_us: float, *, writes_us: float, nonperiodic_us: float, sync_us: float, nodes: float
-) -> float:
-    """Communication time slice that each node needs.
-
-    Parameters
-    ----------
-    reads_us
-        Time of all read transactions of a cycle T_r, gaps included [us]; float or array.
-    writes_us
-        Time of all write transactions of a cycle T_w, gaps included [us]; float or array.
-    nonperiodic_us
-        Time reserved for non-periodic data T_npd [us]; float or array.
-    sync_us
-        Time of the synchronous packet CTS [us]; float or array.
-    nodes
-        Number of distributed nodes N [1]; float or array.
-
-    Returns
-    -------
-    float
-        T_cs = (T_r + T_w + T_npd + CTS) / N [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `nodes` is zero.
-
-    Examples
-    --------
-    >>> required_time_slice_us(120.0, writes_us=130.0, nonperiodic_us=49.5, sync_us=0.5, nodes=2)
-    150.0
-    """
-    return (reads_us + writes_us + nonperiodic_us + sync_us) / nodes
+# The paper's own symbols, but for what it writes out or calls N and Bandwidth alike: hops H, gap count g, rate R,
+# clock C, packet B, payload P, cable L.
 
 
 @published(3, symbol="T_lant", section="III-E")

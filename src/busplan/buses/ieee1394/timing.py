@@ -23,6 +23,7 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
+from busplan.elementwise import Number, choose
 
 TimingModelName = Literal["paper", "standard"]
 TransactionKind = Literal["read", "write"]
@@ -36,7 +37,7 @@ class PacketSizes(NamedTuple):
     response_bytes: float
 
 
-class TimingModel(NamedTuple):
+class PacketTiming(NamedTuple):
     """One reading of the equations.
 
     Parameters
@@ -76,7 +77,7 @@ class Link(NamedTuple):
 
 
 class Phases(NamedTuple):
-    """Every phase of one transaction [us]; the equation behind each stands in `busplan.analysis.quantities`."""
+    """Every phase of one transaction [us]; the equation behind each stands in `busplan.buses.ieee1394.figures`."""
 
     request_bytes: float
     response_bytes: float
@@ -97,34 +98,29 @@ class Phases(NamedTuple):
     """What the transaction takes of the cycle, T_lant + T_sum."""
 
 
-def _paper_packets(_kind: TransactionKind, payload_bytes: int, overhead_bytes: int) -> PacketSizes:
-    size = payload_bytes + overhead_bytes
-    return PacketSizes(request_bytes=size, response_bytes=size)
+def _paper_packets(_kind: TransactionKind, payload_bytes: Number, overhead_bytes: Number) -> PacketSizes:
+    return PacketSizes(request_bytes=payload_bytes + overhead_bytes, response_bytes=payload_bytes + overhead_bytes)
 
 
-def _standard_packets(kind: TransactionKind, payload_bytes: int, _overhead_bytes: int) -> PacketSizes:
-    # A comparison is 0 or 1 for a number and for an array alike, so this choice needs no branch.
-    is_quadlet = payload_bytes == QUADLET_BYTES
-    data_bytes = padded_bytes(payload_bytes)
-
-    def size(block: float, quadlet: float) -> float:
-        return block + is_quadlet * (quadlet - block)
-
+def _standard_packets(kind: TransactionKind, payload_bytes: Number, _overhead_bytes: Number) -> PacketSizes:
+    is_quadlet, data_bytes = payload_bytes == QUADLET_BYTES, padded_bytes(payload_bytes)
     if kind == "read":
         return PacketSizes(
-            request_bytes=size(BLOCK_READ_REQUEST_BYTES, QUADLET_READ_REQUEST_BYTES),
-            response_bytes=size(BLOCK_READ_RESPONSE_OVERHEAD_BYTES + data_bytes, QUADLET_READ_RESPONSE_BYTES),
+            request_bytes=choose(is_quadlet, QUADLET_READ_REQUEST_BYTES, BLOCK_READ_REQUEST_BYTES),
+            response_bytes=choose(
+                is_quadlet, QUADLET_READ_RESPONSE_BYTES, BLOCK_READ_RESPONSE_OVERHEAD_BYTES + data_bytes
+            ),
         )
     return PacketSizes(
-        request_bytes=size(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes, QUADLET_WRITE_REQUEST_BYTES),
-        response_bytes=float(WRITE_RESPONSE_BYTES),
+        request_bytes=choose(is_quadlet, QUADLET_WRITE_REQUEST_BYTES, BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes),
+        response_bytes=WRITE_RESPONSE_BYTES,
     )
 
 
-TIMING_MODELS: Final[Mapping[TimingModelName, TimingModel]] = MappingProxyType(
+TIMING_MODELS: Final[Mapping[TimingModelName, PacketTiming]] = MappingProxyType(
     {
-        "paper": TimingModel("paper", lambda data_rate_mbit_s: data_rate_mbit_s, _paper_packets),
-        "standard": TimingModel("standard", lambda _data_rate_mbit_s: BASE_RATE_MBIT_S, _standard_packets),
+        "paper": PacketTiming("paper", lambda data_rate_mbit_s: data_rate_mbit_s, _paper_packets),
+        "standard": PacketTiming("standard", lambda _data_rate_mbit_s: BASE_RATE_MBIT_S, _standard_packets),
     }
 )
 """The timing models by name, in the order reports show them."""
@@ -133,7 +129,7 @@ TIMING_MODELS: Final[Mapping[TimingModelName, TimingModel]] = MappingProxyType(
 def transaction(
     kind: TransactionKind,
     *,
-    model: TimingModel,
+    model: PacketTiming,
     link: Link,
     payload_bytes: int,
     overhead_bytes: int,

@@ -12,12 +12,11 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from busplan import __version__
-from busplan.rules.finding import Rule
-from busplan.rules.registry import RULES
+from busplan.buses.rule import Rule
+from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport, Located
 
 _SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
-_CODES: Final = list(RULES)
 
 
 def as_sarif(report: CheckReport) -> str:
@@ -28,7 +27,7 @@ def as_sarif(report: CheckReport) -> str:
             "driver": {
                 "name": "busplan",
                 "semanticVersion": __version__,
-                "rules": [_rule(rule) for rule in RULES.values()],
+                "rules": [_rule(rule) for rule in all_rules().values()],
             }
         },
         "columnKind": "unicodeCodePoints",
@@ -61,7 +60,7 @@ def _result(one: Located) -> dict[str, Any]:
     finding = one.finding
     return {
         "ruleId": finding.code,
-        "ruleIndex": _CODES.index(finding.code),
+        "ruleIndex": list(all_rules()).index(finding.code),
         "level": finding.severity,
         "message": {"text": finding.message},
         "locations": [

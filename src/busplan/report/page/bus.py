@@ -3,17 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from busplan.analysis.latency import Transaction
+from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.overview import Overview
-from busplan.analysis.quantities import FIGURES, Figure
-from busplan.buses.ieee1394.constants import MAX_NODES
-from busplan.report.capacity import CAPACITY_ROWS
-from busplan.report.latency import LATENCY_ROWS
+from busplan.buses.figure import unit_of
+from busplan.report.capacity import capacity_table_rows
+from busplan.report.latency import latency_table_rows
 from busplan.report.lines import GridRow, count, percent, plural, us, yes
 from busplan.report.page.charts.axes import axes_chart
-from busplan.report.page.charts.terms import LEFT, TERMS, terms_chart
+from busplan.report.page.charts.terms import LEFT, terms_chart
 from busplan.report.page.content import Chart, Column, Part, Row, Source, Swatch, Table, Verdict
-from busplan.report.timeline.kinds import KINDS
-from busplan.report.timeline.lanes import drawn_window, subject
+from busplan.report.timeline.kinds import kind_of
+from busplan.report.timeline.lanes import charged, drawn_window
 from busplan.report.timeline.mermaid import timeline_mermaid
 from busplan.report.timeline.svg import is_coarse, timeline_svg
 from busplan.report.words import verdict_lines
@@ -40,8 +41,8 @@ def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
     word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
     if not verdict.models_agree:
         word = "MODELS DISAGREE"
-    elif verdict.deciding.fits and not verdict.deciding.gap_count_safe:
-        word = "UNSAFE GAP COUNT"
+    elif verdict.deciding.fits and not verdict.deciding.safe:
+        word = f"UNSAFE {bus_of(answer.profile).safety.upper()}"
     own = next(index for index, one in enumerate(answer.capacity.results) if one is verdict.deciding)
     margins = (
         (f"margin, {one.timing_model}", source.figure(f"/results/{index}/margin_us", us, "us"))
@@ -66,27 +67,25 @@ def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
 def models_part(answer: Overview, sources: Sources) -> Part:
     """Both timing models side by side: the whole cycle, and one read and one write."""
     results, transactions = answer.capacity.results, answer.latency.transactions
-    decides = answer.profile.bus.timing_model
+    decides, bus = answer.profile.bus.timing_model, bus_of(answer.profile)
     cycle = _grid(
         f"The cycle; the {decides} model decides",
         (*_HEAD, *(Column(one.timing_model) for one in results)),
-        CAPACITY_ROWS,
+        capacity_table_rows(bus),
         sources["capacity"],
         [f"/results/{index}" for index in range(len(results))],
-        figures=FIGURES["capacity"],
     )
-    columns = (Column(one.timing_model, group=f"{one.transaction} {one.payload_bytes} B") for one in transactions)
+    columns = (Column(one.timing_model, group=_group(one)) for one in transactions)
     halves = _grid(
-        "One transaction of the farthest node, us",
+        f"Latency, us: {bus.latency_subject(network_of(answer.profile))}",
         (*_HEAD[:2], *columns),
-        LATENCY_ROWS,
+        latency_table_rows(bus),
         sources["latency"],
         [f"/transactions/{index}" for index in range(len(transactions))],
-        figures=FIGURES["latency"],
     )
     return Part(
         "models",
-        "Both timing models, side by side",
+        "The timing models, side by side" if len(bus.timing_models) > 1 else "The timing model",
         tables=(cycle, halves),
         commands=_ids(sources, "capacity", "latency"),
     )
@@ -98,8 +97,6 @@ def _grid(
     rows: Sequence[GridRow],
     source: Source,
     owners: Sequence[str],
-    *,
-    figures: Mapping[str, Figure],
 ) -> Table:
     """Figures of several owners side by side, rows as in the terminal."""
     words = len(columns) - len(owners)
@@ -109,11 +106,8 @@ def _grid(
         tuple(
             Row(
                 (
-                    *(row.label.strip(), figures[row.key].reference, row.unit)[:words],
-                    *(
-                        source.figure(f"{owner}/{row.key}", row.write, row.unit or figures[row.key].unit)
-                        for owner in owners
-                    ),
+                    *(row.label.strip(), row.reference, row.unit)[:words],
+                    *(source.figure(f"{owner}/{row.key}", row.write, row.unit or unit_of(row.key)) for owner in owners),
                 ),
                 level=int(row.label.startswith(" ")),
             )
@@ -122,22 +116,25 @@ def _grid(
     )
 
 
+def _group(one: Transaction) -> str:
+    return one.transaction if one.payload_bytes is None else f"{one.transaction} {one.payload_bytes} B"
+
+
 def timeline_part(answer: Overview, sources: Sources) -> Part:
     """The cycle to scale."""
     title = "The cycle to scale"
     if answer.schedule is None:
         return Part("timeline", title, lines=tuple(f"Not drawn: {why}." for why in answer.no_schedule))
     plan, source = answer.schedule, sources["timeline"]
-    caption = (
-        f"One communication cycle by the {plan.figures.timing_model} model: {subject(plan)}, every node at the "
-        "hops of the farthest."
-    )
+    caption = f"One communication cycle by the {plan.figures.timing_model} model: {charged(plan)}."
     if is_coarse(drawn_window(plan)):
         caption += " A bar is a whole transaction."
     # The table below says what more nodes take than a bus may have; drawn, they would be a page of their own.
-    drawn = answer.profile.bus.nodes <= MAX_NODES
-    charts = (Chart("wide", caption, timeline_svg(plan, inline=True), timeline_mermaid(plan)),) if drawn else ()
-    lines = () if drawn else (f"Not drawn: {answer.profile.bus.nodes} nodes are over the {MAX_NODES:g} of one bus.",)
+    network = network_of(answer.profile)
+    limit = bus_of(answer.profile).limit("nodes")
+    over = limit is not None and bool(limit.is_broken(network))
+    charts = () if over else (Chart("wide", caption, timeline_svg(plan, inline=True), timeline_mermaid(plan)),)
+    lines = (f"Not drawn: {limit.words(network)}.",) if limit is not None and over else ()
     totals = source.value("/totals")
     table = Table(
         "What takes the slice" if plan.figures.fits else "What takes the cycle",
@@ -145,14 +142,15 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
         tuple(
             Row(
                 (
-                    Swatch(one["kind"], "", KINDS[one["kind"]].label),
-                    KINDS[one["kind"]].equation,
+                    Swatch(kind.ink, "", kind.label),
+                    kind.reference,
                     source.figure(f"/totals/{index}/events", count),
                     source.figure(f"/totals/{index}/total_us", us, "us"),
                     source.figure(f"/totals/{index}/share", percent, "%"),
                 )
             )
             for index, one in enumerate(totals)
+            for kind in (kind_of(answer.profile, one["kind"]),)
         ),
     )
     return Part("timeline", title, lines, (), charts, (table,), _ids(sources, "timeline"))
@@ -170,12 +168,12 @@ def terms_part(answer: Overview, sources: Sources) -> Part:
         tuple(
             Row(
                 (
-                    Swatch(term.kind, term.letter, term.label),
-                    FIGURES["capacity"][term.key].reference,
+                    Swatch(term.ink, term.letter, term.label),
+                    term.reference,
                     *(source.figure(f"/results/{index}/{term.key}", us, "us") for index in range(len(results))),
                 )
             )
-            for term in (*TERMS, LEFT)
+            for term in (*bus_of(answer.profile).term_figures, LEFT)
         ),
     )
     return Part("terms", "Where the microseconds go", charts=(chart,), tables=(table,), commands=(source.anchor,))
@@ -187,8 +185,8 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
     nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
     chart = Chart(
         "wide",
-        "Most axes that a period carries: paper solid with a square, standard dashed with a diamond; the point is this "
-        f"profile's own {plural(axes, 'axis')}, on {plural(nodes, 'node')}.",
+        f"Most axes that a period carries{_curves(answer)}; the point is this profile's own {plural(axes, 'axis')}, on "
+        f"{plural(nodes, 'node')}.",
         axes_chart(answer.profile, answer.steps),
     )
     columns = [
@@ -213,6 +211,13 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
         "Most nodes and axes; the profile's own period in bold", (Column("period, us"), *columns), tuple(rows)
     )
     return Part("axes", "Axes against period", charts=(chart,), tables=(table,), commands=(source.anchor,))
+
+
+def _curves(answer: Overview) -> str:
+    """How the curves of the timing models are told apart."""
+    if len(answer.steps) == 1:
+        return ""
+    return f": {answer.steps[0].timing_model} solid with a square, {answer.steps[1].timing_model} dashed with a diamond"
 
 
 def _ids(sources: Sources, *names: str) -> tuple[str, ...]:

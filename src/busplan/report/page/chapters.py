@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan import __version__
+from busplan.analysis.network import bus_of
 from busplan.analysis.overview import Overview
 from busplan.report.circle import um
 from busplan.report.lines import count, percent, plural, us
@@ -56,14 +57,13 @@ def _chapter(subject: Subject, *, anchor: str) -> Chapter:
         _assumptions_part(named["explain"]),
         _commands_part(listed),
     )
-    capacity = named["capacity"]
+    capacity, bus = named["capacity"], bus_of(answer.profile)
     facts = tuple(
         (word, capacity.figure(f"/results/0/{key}", plain, unit))
         for word, key, unit in (
             ("nodes", "nodes", ""),
             ("axes", "axes", ""),
-            ("hops", "hops", ""),
-            ("gap count", "gap_count", ""),
+            *((figure.label, figure.key, "") for figure in bus.setup_figures if figure.key in bus.facts),
             ("period", "period_us", "us"),
             ("slice", "available_us", "us"),
         )
@@ -112,7 +112,7 @@ def _commands_part(listed: Sequence[Source]) -> Part:
 
 
 def _comparison(subjects: Sequence[Subject], chapters: Sequence[Chapter]) -> Table:
-    models = [one.timing_model for one in subjects[0].answer.capacity.results]
+    models = tuple(dict.fromkeys(one.timing_model for each in subjects for one in each.answer.capacity.results))
     columns = (
         Column("profile", "words"),
         Column("fits", "words"),
@@ -127,26 +127,26 @@ def _comparison(subjects: Sequence[Subject], chapters: Sequence[Chapter]) -> Tab
         Column("circle passed", "words"),
     )
     rows = tuple(
-        Row(_compared(subject, chapter, models=len(models)))
-        for subject, chapter in zip(subjects, chapters, strict=True)
+        Row(_compared(subject, chapter, models=models)) for subject, chapter in zip(subjects, chapters, strict=True)
     )
     return Table("All profiles, each under the timing model that decides", columns, rows)
 
 
-def _compared(subject: Subject, chapter: Chapter, *, models: int) -> tuple[Cell, ...]:
+def _compared(subject: Subject, chapter: Chapter, *, models: Sequence[str]) -> tuple[Cell, ...]:
     answer, (capacity, *_) = subject.answer, chapter.sources
-    own = next(index for index, one in enumerate(answer.capacity.results) if one is answer.verdict.deciding)
+    places = {one.timing_model: f"/results/{index}" for index, one in enumerate(answer.capacity.results)}
+    own = places[answer.verdict.deciding.timing_model]
     circle = next((one for one in chapter.sources if one.document["command"] == "circle-test"), None)
     measures = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
     return (
         Link(chapter.name, chapter.anchor, chapter.origin),
         capacity.figure("/verdicts/0/fits", fit_word),
         capacity.figure("/verdicts/0/models_agree", fit_word),
-        capacity.figure(f"/results/{own}/period_us", plain, "us"),
-        *(capacity.figure(f"/results/{own}/{key}", count) for key in ("nodes", "axes")),
-        capacity.figure(f"/results/{own}/utilisation", percent, "%"),
-        *(capacity.figure(f"/results/{index}/margin_us", us, "us") for index in range(models)),
-        capacity.figure(f"/results/{own}/max_axes", count),
+        capacity.figure(f"{own}/period_us", plain, "us"),
+        *(capacity.figure(f"{own}/{key}", count) for key in ("nodes", "axes")),
+        capacity.figure(f"{own}/utilisation", percent, "%"),
+        *(capacity.figure(f"{places[one]}/margin_us", us, "us") if one in places else "-" for one in models),
+        capacity.figure(f"{own}/max_axes", count),
         *(("-",) * 3 if circle is None else (circle.figure(f"/results/0/{key}", um, "um") for key in measures)),
         "not run" if circle is None else circle.figure("/results/0/passed", fit_word),
     )

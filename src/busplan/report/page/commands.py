@@ -76,7 +76,5 @@ def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool)
     if answer.circle is not None:
         document = documents.circle_document(answer.circle, with_contributions=True)
         found.append(source("circle", "the circle and its error sources", document, "--contributions", *own))
-    found.append(
-        source("explain", "what the figures rest on", figure_document(answer.profile.name, answer.assumptions))
-    )
+    found.append(source("explain", "what the figures rest on", figure_document(answer.profile, answer.assumptions)))
     return tuple(found)

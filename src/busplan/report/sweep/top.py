@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from busplan.analysis.sweep.blocks import Block
+from busplan.buses.bus import Bus
 from busplan.report.lines import BLANK, Line, plural, table, us, yes
 
 DEFAULT_COLUMNS: Final = (
@@ -25,10 +26,19 @@ CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase
 
 
 class Tally:
-    """Counts a sweep's points, and those that fit, block by block."""
+    """Counts a sweep's points, and those that fit, block by block.
 
-    def __init__(self, timing_models: Sequence[str]) -> None:
+    Parameters
+    ----------
+    bus
+        The kind of bus.
+    timing_models
+        The timing models, in the order of the rows of a point.
+    """
+
+    def __init__(self, bus: Bus, timing_models: Sequence[str]) -> None:
         self.points = 0
+        self._bus = bus
         self._models = timing_models
         self._fits = [0] * len(timing_models)
         self._unsafe = 0
@@ -45,8 +55,10 @@ class Tally:
         self.points += points
         for number, figures in enumerate(block.models):
             self._fits[number] += _share(figures["fits"].values, points)
-        # The same under every model: the gap count is the profile's.
-        self._unsafe += points - _share(block.models[0]["gap_count_safe"].values, points)
+        safety = self._bus.safety_figure
+        if safety is not None:
+            # The same under every model: how the bus is set is the profile's.
+            self._unsafe += points - _share(block.models[0][safety.key].values, points)
         if "passed" in block.models[0]:
             passed = [_share(figures["passed"].values, points) for figures in block.models]
             before = self._passed or [0] * len(passed)
@@ -59,9 +71,10 @@ class Tally:
         found = [Line(f"{name}: {self.points:,} {noun}{cut}; {self._by_model(self._fits)} fit.")]
         if self._passed is not None:
             found.append(Line(f"The circle holds every tolerance at {self._by_model(self._passed)}."))
-        if self._unsafe:
+        safety = self._bus.safety_figure
+        if self._unsafe and safety is not None:
             found.append(
-                Line(f"At {self._unsafe:,} points the gap count is unsafe for the hops (gap_count_safe).", "warning")
+                Line(f"At {self._unsafe:,} points the {self._bus.safety} is unsafe ({safety.key}).", "warning")
             )
         return found
 

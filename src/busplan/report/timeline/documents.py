@@ -1,15 +1,25 @@
 """A timeline as plain data: what `--format json` and `--format csv` write."""
 
+from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Schedule, totals
-from busplan.report.documents import Document, Row, document
-from busplan.report.timeline.kinds import KINDS
+from busplan.report.documents import Document, Row, document, safety_row
+from busplan.report.timeline.kinds import kind_of
 from busplan.report.words import warnings
 
 
 def event_rows(plan: Schedule) -> list[Row]:
     """One row an event of the window."""
     return [
-        {**event._asdict(), "duration_us": event.duration_us, "equation": KINDS[event.kind].equation}
+        {
+            "kind": event.kind,
+            "node": event.node,
+            "transaction": event.transaction,
+            "packet": event.packet,
+            "start_us": event.start_us,
+            "end_us": event.end_us,
+            "duration_us": event.duration_us,
+            "equation": kind_of(plan.profile, event.kind).reference,
+        }
         for event in plan.events
     ]
 
@@ -29,14 +39,13 @@ def timeline_document(plan: Schedule) -> Document:
         timing_model=figures.timing_model,
         period_us=figures.period_us,
         nodes=figures.nodes,
-        hops=figures.hops,
-        gap_count=figures.gap_count,
+        **{key: getattr(figures, key) for key in bus_of(plan.profile).facts},
         required_us=figures.required_us,
         available_us=figures.available_us,
         margin_us=figures.margin_us,
         exceeded=list(figures.exceeded),
         fits=figures.fits,
-        gap_count_safe=figures.gap_count_safe,
+        **safety_row(figures, plan.profile),
         warnings=warnings(plan.profile, nodes=figures.nodes, most=0),
         from_us=plan.from_us,
         to_us=plan.to_us,

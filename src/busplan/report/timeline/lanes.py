@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from busplan.analysis.timeline.schedule import Event, EventKind, Schedule
-from busplan.buses.ieee1394.timing import TransactionKind
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.timeline.schedule import Event, Schedule
 from busplan.report.lines import plural, us
-from busplan.report.timeline.kinds import event_label, event_title
+from busplan.report.timeline.kinds import event_title
 from busplan.report.words import period, story
 
 MOST_EVENT_LANES: Final = 20
@@ -23,7 +23,8 @@ class Lane(NamedTuple):
 class Stretch(NamedTuple):
     """Neighbouring events that belong together at a coarse look: one transaction of a cycle, or one bus event."""
 
-    kind: EventKind | TransactionKind
+    kind: str
+    """Of the transaction, or of the event."""
     event: Event
     """From its start to its end."""
 
@@ -37,9 +38,13 @@ def headline(plan: Schedule) -> str:
 
 def subject(plan: Schedule) -> str:
     """Say what is shown: how many nodes, and which part of the cycle."""
-    figures = plan.figures
-    bus = f"{plural(figures.nodes, 'node')}, {plural(figures.hops, 'hop')}, gap count {figures.gap_count}"
+    bus = ", ".join((plural(plan.figures.nodes, "node"), *bus_of(plan.profile).setup_words(network_of(plan.profile))))
     return f"{bus}; {us(plan.from_us)} to {us(plan.to_us)} us of the cycle"
+
+
+def charged(plan: Schedule) -> str:
+    """Say what is shown, and which way on the wire each node is charged."""
+    return f"{subject(plan)}, {bus_of(plan.profile).way_charged}"
 
 
 def overruns(plan: Schedule) -> bool:
@@ -89,8 +94,8 @@ def only_owner(plan: Schedule) -> str | None:
 
 def event_lanes(plan: Schedule) -> tuple[Lane, ...]:
     """A lane for each event; whose it is, is said where it is not the same for all."""
-    write = event_title if only_owner(plan) is None else event_label
-    return tuple(Lane(write(event), (event,)) for event in plan.events)
+    one_owner = only_owner(plan) is not None
+    return tuple(Lane(event.label if one_owner else event_title(event), (event,)) for event in plan.events)
 
 
 def stretches(events: Sequence[Event]) -> tuple[Stretch, ...]:

@@ -1,11 +1,12 @@
 """A timeline as a Mermaid gantt chart."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from busplan.analysis.timeline.schedule import Event, Schedule
-from busplan.report.timeline.kinds import STRIP, event_label
+from busplan.buses.figure import Ink
+from busplan.report.timeline.kinds import kind_of
 from busplan.report.timeline.lanes import Stretch, headline, overruns, stretches
 
 MOST_EVENTS: Final = 40
@@ -14,12 +15,7 @@ _NS_PER_US: Final = 1000
 _FINE_US: Final = 20.0
 """Window below which whole us are too coarse for the axis."""
 _PLAIN: Final = re.compile(r"[^A-Za-z0-9 .,()+/-]")
-_TAGS: Final = {
-    "execution": "active, ",
-    "subaction_gap": "done, ",
-    "arbitration_reset_gap": "done, ",
-    "idle": "done, ",
-}
+_TAGS: Final[Mapping[Ink, str]] = {"work": "active, ", "gap": "done, ", "long-gap": "done, ", "idle": "done, "}
 
 
 def timeline_mermaid(plan: Schedule) -> str:
@@ -55,13 +51,13 @@ def _body(plan: Schedule) -> Iterator[str]:
     events = plan.events
     single = len(events) <= MOST_EVENTS
     parts = (
-        [(event_label(event), event) for event in events]
+        [(event.label, event) for event in events]
         if single
-        else [(_stretch_label(one), one.event) for one in stretches(events)]
+        else [(_stretch_label(plan, one), one.event) for one in stretches(events)]
     )
     section = ""
     for label, event in parts:
-        name = _section(event, by_transaction=single)
+        name = _section(event, plan, by_transaction=single)
         if name != section:
             yield f"    section {name}"
             section = name
@@ -69,18 +65,19 @@ def _body(plan: Schedule) -> Iterator[str]:
         yield f"    {label}, {event.duration_us:.3f} us :{tag}{_ns(event.start_us)}, {_ns(event.end_us)}"
 
 
-def _section(event: Event, *, by_transaction: bool) -> str:
+def _section(event: Event, plan: Schedule, *, by_transaction: bool) -> str:
     if event.node is None:
-        return "start of the cycle" if event.kind == "sync" else "end of the cycle"
+        own = [one.start_us for one in plan.cycle_events if one.node is not None]
+        return "start of the cycle" if own and event.start_us < own[0] else "end of the cycle"
     return f"{event.transaction} of node {event.node}" if by_transaction else f"{event.transaction}s"
 
 
-def _stretch_label(one: Stretch) -> str:
-    return STRIP[one.kind].label if one.event.node is None else f"node {one.event.node}"
+def _stretch_label(plan: Schedule, one: Stretch) -> str:
+    return kind_of(plan.profile, one.kind).label if one.event.node is None else f"node {one.event.node}"
 
 
 def _tag(event: Event, plan: Schedule) -> str:
-    return _over_tag(event, plan) or _TAGS.get(event.kind, "")
+    return _over_tag(event, plan) or _TAGS.get(kind_of(plan.profile, event.kind).ink, "")
 
 
 def _over_tag(event: Event, plan: Schedule) -> str:

@@ -11,10 +11,11 @@ from matplotlib.patches import Patch
 
 from busplan.analysis.timeline.schedule import Event, Schedule, totals
 from busplan.report.lines import us
-from busplan.report.timeline.kinds import KINDS, STRIP
+from busplan.report.timeline.kinds import INKS, kind_of
 from busplan.report.timeline.lanes import (
     Lane,
     beyond,
+    charged,
     drawn_window,
     event_lanes,
     has_event_lanes,
@@ -23,7 +24,6 @@ from busplan.report.timeline.lanes import (
     overruns,
     stretches,
     strip_title,
-    subject,
 )
 
 _OVER: Final = "#b3261e"
@@ -74,6 +74,10 @@ def _lanes(window: Schedule) -> tuple[Lane, ...]:
     )
 
 
+def _colour(plan: Schedule, kind: str) -> str:
+    return INKS[kind_of(plan.profile, kind).ink].light
+
+
 def _bar(axes: Any, event: Event, *, lane: float, colour: str, height: float = 0.8) -> None:
     # Not moved to whole pixels: bars of a few pixels keep their share.
     span = (event.start_us, event.duration_us)
@@ -84,7 +88,7 @@ def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
     """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
     parts = stretches(plan.cycle_events)
     for one in parts:
-        _bar(axes, one.event, lane=0.0, colour=STRIP[one.kind].light)
+        _bar(axes, one.event, lane=0.0, colour=_colour(plan, one.kind))
     if window.from_us > 0 or window.to_us < plan.end_us:
         axes.axvspan(window.from_us, window.to_us, fill=False, linewidth=1.5)
     if overruns(plan):
@@ -92,7 +96,7 @@ def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
     axes.set_xlim(0.0, plan.end_us)
     axes.set_yticks([])
     kinds = dict.fromkeys(one.kind for one in parts)
-    handles = [Patch(color=STRIP[kind].light, label=STRIP[kind].label) for kind in kinds]
+    handles = [Patch(color=_colour(plan, kind), label=kind_of(plan.profile, kind).label) for kind in kinds]
     axes.legend(
         handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles), fontsize=8, frameon=False
     )
@@ -102,7 +106,7 @@ def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
 def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
     for number, lane in enumerate(lanes):
         for event in lane.events:
-            _bar(axes, event, lane=number, colour=KINDS[event.kind].light)
+            _bar(axes, event, lane=number, colour=_colour(window, event.kind))
     if overruns(window) and window.to_us > window.figures.available_us:
         _over(axes, window)
     axes.set_xlim(window.from_us, window.to_us)
@@ -111,7 +115,7 @@ def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
     axes.grid(visible=True, axis="x", linewidth=0.4, color="0.85")
     axes.set_axisbelow(True)
     axes.set_xlabel("time in the cycle [us]")
-    axes.set_title(f"{subject(window)}, every node at the hops of the farthest", fontsize=9, loc="left")
+    axes.set_title(charged(window), fontsize=9, loc="left")
 
 
 def _over(axes: Any, plan: Schedule) -> None:
@@ -124,8 +128,8 @@ def _over(axes: Any, plan: Schedule) -> None:
 def _legend(plan: Schedule) -> list[Patch]:
     return [
         Patch(
-            color=KINDS[one.kind].light,
-            label=f"{KINDS[one.kind].label}, {us(one.total_us)} us, {one.share * 100:.2f} %",
+            color=_colour(plan, one.kind),
+            label=f"{kind_of(plan.profile, one.kind).label}, {us(one.total_us)} us, {one.share * 100:.2f} %",
         )
         for one in totals(plan)
     ]

@@ -2,16 +2,17 @@
 
 from collections.abc import Iterable, Sequence
 from textwrap import wrap
-from typing import Final
+from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.timeline.schedule import Event, Schedule, totals
 from busplan.report.lines import us
 from busplan.report.svg import LINE, Scale, drawing, inside, markup, text_at
-from busplan.report.timeline.kinds import KINDS, STRIP, event_title
+from busplan.report.timeline.kinds import event_title, kind_of
 from busplan.report.timeline.lanes import (
     Stretch,
     beyond,
+    charged,
     drawn_window,
     event_lanes,
     has_event_lanes,
@@ -76,7 +77,7 @@ def is_coarse(window: Schedule) -> bool:
 def _above(body: Element, plan: Schedule, window: Schedule) -> int:
     """The verdict and what is shown, in words; the height below them."""
     height = _words(body, headline(plan), y=8, css="head" if plan.figures.fits else "head bad")
-    return _words(body, f"{subject(window)}, every node at the hops of the farthest", y=height, css="small")
+    return _words(body, charged(window), y=height, css="small")
 
 
 def _words(parent: Element, text: str, *, y: int, css: str) -> int:
@@ -91,11 +92,11 @@ def _words(parent: Element, text: str, *, y: int, css: str) -> int:
 def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
     """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
     parts = stretches(plan.cycle_events)
-    y = _strip_legend(body, parts, y=_words(body, strip_title(plan), y=y, css="head")) + 4
+    y = _strip_legend(body, plan, parts, y=_words(body, strip_title(plan), y=y, css="head")) + 4
     scale = Scale(0.0, plan.end_us)
     if overruns(plan):
         _over(body, plan, scale, y=y - 3, height=_BAR + 6)
-    _bars(body, plan.cycle_events, scale, y=y, height=_BAR, coarse=True)
+    _Bars(body, plan, scale).draw(plan.cycle_events, y=y, height=_BAR, coarse=True)
     if overruns(plan):
         _edge(body, plan, scale, y=y - 3, height=_BAR + 6)
     if window.from_us > 0 or window.to_us < plan.end_us:
@@ -104,16 +105,16 @@ def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
     return scale.marks(body, top=y + _BAR, bottom=y + _BAR)
 
 
-def _strip_legend(body: Element, parts: Iterable[Stretch], *, y: int) -> int:
+def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], *, y: int) -> int:
     """The colours of the strip, as many in a line as a phone shows; the height below them."""
     x = 0
-    for kind in dict.fromkeys(one.kind for one in parts):
-        label = STRIP[kind].label
-        width = 30 + 7 * len(label)
+    for key in dict.fromkeys(one.kind for one in parts):
+        kind = kind_of(plan.profile, key)
+        width = 30 + 7 * len(kind.label)
         if x + width > _PHONE:
             x, y = 0, y + LINE
-        SubElement(body, "rect", {"class": kind, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
-        text_at(body, label, x=str(x + 15), y=y + 15, css="small")
+        SubElement(body, "rect", {"class": kind.ink, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
+        text_at(body, kind.label, x=str(x + 15), y=y + 15, css="small")
         x += width
     return y + LINE
 
@@ -134,14 +135,27 @@ def _tip(label: str, event: Event) -> str:
     return f"{label}, {us(event.duration_us)} us: {us(event.start_us)} to {us(event.end_us)} us"
 
 
-def _bars(parent: Element, events: Sequence[Event], scale: Scale, *, y: int, height: int, coarse: bool = False) -> None:
-    if coarse:
+class _Bars(NamedTuple):
+    """Where bars are drawn."""
+
+    parent: Element
+    plan: Schedule
+    scale: Scale
+
+    def draw(self, events: Sequence[Event], *, y: int, height: int, coarse: bool = False) -> None:
+        """Draw events, or the transactions that they make."""
+        if not coarse:
+            for event in events:
+                self._bar(event.kind, event_title(event), event, y=y, height=height)
+            return
         for one in stretches(events):
-            owner = STRIP[one.kind].label if one.event.node is None else f"{one.kind} of node {one.event.node}"
-            scale.rect(parent, one.event, y=y, height=height, css=one.kind, title=_tip(owner, one.event))
-        return
-    for event in events:
-        scale.rect(parent, event, y=y, height=height, css=event.kind, title=_tip(event_title(event), event))
+            label = kind_of(self.plan.profile, one.kind).label
+            owner = label if one.event.node is None else f"{one.kind} of node {one.event.node}"
+            self._bar(one.kind, owner, one.event, y=y, height=height)
+
+    def _bar(self, kind: str, title: str, event: Event, *, y: int, height: int) -> None:
+        css = kind_of(self.plan.profile, kind).ink
+        self.scale.rect(self.parent, event, y=y, height=height, css=css, title=_tip(title, event))
 
 
 def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
@@ -161,7 +175,7 @@ def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int
     if over:
         _over(area, window, scale, y=y - 2, height=bottom - y + 2)
     for number, lane in enumerate(lanes):
-        _bars(area, lane.events, scale, y=y + pitch * number, height=pitch - 3, coarse=coarse)
+        _Bars(area, window, scale).draw(lane.events, y=y + pitch * number, height=pitch - 3, coarse=coarse)
     if over:
         _edge(area, window, scale, y=y - 2, height=bottom - y + 2)
     return below
@@ -184,7 +198,7 @@ def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
         SubElement(body, "rect", {"class": "track", "width": "100%", "y": str(top + LINE), "height": str(_BAR - 4)})
         if over:
             _over(body, window, scale, y=top + LINE, height=_BAR - 4)
-        _bars(body, (event,), scale, y=top + LINE, height=_BAR - 4)
+        _Bars(body, window, scale).draw((event,), y=top + LINE, height=_BAR - 4)
         if over:
             _edge(body, window, scale, y=top + LINE, height=_BAR - 4)
     return below
@@ -197,8 +211,9 @@ def _legend(body: Element, plan: Schedule, *, y: int) -> int:
     text_at(body, "share, %", x="310", y=y + 15, css="head", anchor="end")
     for one in totals(plan):
         y += LINE
-        SubElement(body, "rect", {"class": one.kind, "y": str(y + 4), "width": "12", "height": "12"})
-        text_at(body, KINDS[one.kind].label, x="20", y=y + 15)
+        kind = kind_of(plan.profile, one.kind)
+        SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
+        text_at(body, kind.label, x="20", y=y + 15)
         text_at(body, us(one.total_us), x="240", y=y + 15, anchor="end")
         text_at(body, f"{one.share * 100:.2f}", x="310", y=y + 15, anchor="end")
     return y + LINE

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.report.timeline.kinds import KINDS, STRIP
+from busplan.report.timeline.kinds import INKS
 
 DARK: Final = "@media screen and (prefers-color-scheme:dark)"
 """Where colours on black hold: paper is white."""
@@ -39,10 +39,8 @@ def stylesheet() -> str:
 
 
 def fills(scope: str) -> tuple[str, str]:
-    """Rules that colour each kind of event inside a selector, on white and on black."""
-    colours: dict[str, tuple[str, str]] = {kind: (style.light, style.dark) for kind, style in KINDS.items()}
-    colours |= {kind: (style.light, style.dark) for kind, style in STRIP.items()}
+    """Rules that colour each ink inside a selector, on white and on black."""
     light, dark = (
-        "".join(f"{scope} .{kind}{{fill:{pair[side]}}}\n" for kind, pair in colours.items()) for side in (0, 1)
+        "".join(f"{scope} .{ink}{{fill:{colours[side]}}}\n" for ink, colours in INKS.items()) for side in (0, 1)
     )
     return light, dark

@@ -3,13 +3,16 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
+from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Event, Schedule, totals
+from busplan.buses.bus import IDLE
 from busplan.report.lines import BLANK, Line, table, us
 from busplan.report.scale import ticks
-from busplan.report.timeline.kinds import KINDS, STRIP
+from busplan.report.timeline.kinds import kind_of
 from busplan.report.timeline.lanes import (
     Lane,
     beyond,
+    charged,
     drawn_window,
     event_lanes,
     has_event_lanes,
@@ -19,7 +22,6 @@ from busplan.report.timeline.lanes import (
     overruns,
     stretches,
     strip_title,
-    subject,
 )
 from busplan.report.words import warnings
 
@@ -43,8 +45,8 @@ def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
     width = max(width, NARROWEST)
     window, figures = drawn_window(plan), plan.figures
     lines = [
-        Line(headline(plan), "good" if figures.fits and figures.gap_count_safe else "bad"),
-        Line(f"{subject(window)}, every node at the hops of the farthest."),
+        Line(headline(plan), "good" if figures.fits and figures.safe else "bad"),
+        Line(f"{charged(window)}."),
         *(Line(warning, "warning") for warning in warnings(plan.profile, nodes=figures.nodes, most=0)),
         BLANK,
         *_strip(plan, width=width),
@@ -57,8 +59,9 @@ def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
 def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
     """The whole slice in one row, transaction by transaction, and what lies beyond it."""
     parts = stretches(plan.cycle_events)
-    rows = {"cycle": [(STRIP[one.kind].mark, one.event) for one in parts]}
-    legend = list(dict.fromkeys(f"{STRIP[one.kind].mark} {STRIP[one.kind].label}" for one in parts))
+    styles = {one.kind: kind_of(plan.profile, one.kind) for one in parts}
+    rows = {"cycle": [(styles[one.kind].mark, one.event) for one in parts]}
+    legend = [f"{style.mark} {style.label}" for style in styles.values()]
     if overruns(plan):
         rows["over"] = [(_OVER, beyond(plan))]
         legend.append(f"{_OVER} beyond the slice")
@@ -81,17 +84,18 @@ def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     bar = _Bar(window.from_us, window.to_us, width - gutter - 3)
     yield Line(f"{us(window.from_us)} to {us(window.to_us)} us by node, {bar.per_column}", "heading")
     for lane in lanes:
-        yield Line(f"{lane.label:<{gutter}} |{bar.cells(_marked(lane))}|", "table")
+        yield Line(f"{lane.label:<{gutter}} |{bar.cells(_marked(window, lane))}|", "table")
     if overruns(window) and window.to_us > window.figures.available_us:
         yield Line(f"{'over':<{gutter}} |{bar.cells([(_OVER, beyond(window))])}|", "bad")
     yield bar.scale(gutter + 2)
-    kinds = dict.fromkeys(event.kind for event in window.events)
-    legend = [f"{KINDS[kind].mark} {KINDS[kind].label}" for kind in KINDS if kind in kinds]
+    shown = {event.kind for event in window.events}
+    kinds = (*bus_of(window.profile).event_kinds, IDLE)
+    legend = [f"{kind.mark} {kind.label}" for kind in kinds if kind.key in shown]
     yield from _wrapped("Legend: ", legend, width=width)
 
 
-def _marked(lane: Lane) -> list[tuple[str, Event]]:
-    return [(KINDS[event.kind].mark, event) for event in lane.events]
+def _marked(window: Schedule, lane: Lane) -> list[tuple[str, Event]]:
+    return [(kind_of(window.profile, event.kind).mark, event) for event in lane.events]
 
 
 def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
@@ -103,7 +107,7 @@ def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     whose = "Events" if owner is None else f"The {owner}"
     yield Line(f"{whose}, {us(window.from_us)} to {us(window.to_us)} us, {bar.per_column}", "heading")
     for lane, figure in zip(lanes, figures, strict=True):
-        yield Line(f"{lane.label:<{gutter}}  {figure:>{digits}} |{bar.cells(_marked(lane))}|", "table")
+        yield Line(f"{lane.label:<{gutter}}  {figure:>{digits}} |{bar.cells(_marked(window, lane))}|", "table")
     yield bar.scale(gutter + digits + 4)
 
 
@@ -161,14 +165,9 @@ def _totals(plan: Schedule) -> Iterator[Line]:
     yield from table(
         ["kind", "eq", "events", "us", "share, %"],
         (
-            [
-                f"{KINDS[one.kind].mark} {KINDS[one.kind].label}",
-                KINDS[one.kind].equation,
-                str(one.events),
-                us(one.total_us),
-                f"{one.share * 100:.2f}",
-            ]
+            [f"{kind.mark} {kind.label}", kind.reference, str(one.events), us(one.total_us), f"{one.share * 100:.2f}"]
             for one in totals(plan)
+            for kind in (kind_of(plan.profile, one.kind),)
         ),
         left=2,
     )

@@ -7,17 +7,19 @@ from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.capacity.node_steps import NodeSteps
-from busplan.profile.model import Profile
 from busplan.report.lines import plural
 from busplan.report.svg import drawing, markup, text_at
 from busplan.report.words import period
 from busplan.sections.base import MAX_TIME_US
+from busplan.sections.profile import Profile
 
 _TOP: Final = 50
 _HEIGHT: Final = 230
 _BELOW: Final = 44
 _MOST_LABELS: Final = 6
 """Periods that a phone has room for."""
+_CSS: Final = ("first", "second")
+"""Classes of the curves, in the order of the timing models."""
 _WIDE: Final = 1000
 """Units of the stretched drawing: a staircase has no shape to keep."""
 
@@ -58,13 +60,13 @@ def axes_chart(profile: Profile, steps: Sequence[NodeSteps]) -> str:
     _grid(root, plane)
     stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
     area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})
-    for one in steps:
-        SubElement(area, "path", {"class": f"curve {one.timing_model}", "d": _path(one, plane)})
+    for css, one in zip(_CSS, steps, strict=False):
+        SubElement(area, "path", {"class": f"curve {css}", "d": _path(one, plane)})
     _figures(root, plane)
     _legend(root, steps)
     _own(root, plane, own_us, own_axes)
-    for one in steps:
-        _mark(root, one.timing_model, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
+    for css, one in zip(_CSS, steps, strict=False):
+        _mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
     return markup(root)
 
 
@@ -109,10 +111,10 @@ def _figures(root: Element, plane: _Plane) -> None:
 
 def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
     """A piece of each curve with its name."""
-    for number, one in enumerate(steps):
+    for number, (css, one) in enumerate(zip(_CSS, steps, strict=False)):
         place = SubElement(root, "svg", {"x": str(110 * number), "overflow": "visible"})
-        SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {one.timing_model}"})
-        _mark(place, one.timing_model, x="22", y=9)
+        SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {css}"})
+        _mark(place, css, x="22", y=9)
         text_at(place, one.timing_model, x="50", y=14)
 
 
@@ -156,8 +158,8 @@ def _own(root: Element, plane: _Plane, own_us: float, own_axes: int) -> None:
     text_at(box, plural(own_axes, "axis"), x=shift, y=y + 4, css="small halo", anchor=side)
 
 
-def _mark(root: Element, model: str, *, x: str, y: float) -> None:
-    """A point of a curve: a square on the paper's, a diamond on the standard's."""
+def _mark(root: Element, css: str, *, x: str, y: float) -> None:
+    """A point of a curve: a square on the first, a diamond on the second."""
     place = SubElement(root, "svg", {"x": x, "y": f"{y:.1f}", "overflow": "visible"})
-    turn = {} if model == "paper" else {"transform": "rotate(45)"}
-    SubElement(place, "rect", {"x": "-4.5", "y": "-4.5", "width": "9", "height": "9", "class": f"mark {model}", **turn})
+    turn = {} if css == _CSS[0] else {"transform": "rotate(45)"}
+    SubElement(place, "rect", {"x": "-4.5", "y": "-4.5", "width": "9", "height": "9", "class": f"mark {css}", **turn})

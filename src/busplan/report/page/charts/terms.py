@@ -5,7 +5,8 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.capacity.figures import CapacityFigures
-from busplan.analysis.timeline.schedule import EventKind
+from busplan.buses import kind_named
+from busplan.buses.figure import MARGIN, Figure
 from busplan.report.lines import us
 from busplan.report.svg import LINE, Scale, drawing, markup, text_at
 
@@ -18,32 +19,12 @@ _MAGNIFIED_BELOW: Final = 0.5
 """Share of the slice below which the cycle is drawn a second time, as wide as the page."""
 
 
-class Term(NamedTuple):
-    """One term of the cycle, or what it leaves."""
-
-    key: str
-    """In the results of `capacity`."""
-    label: str
-    kind: EventKind
-    """Whose colour it has in the timeline."""
-    letter: str
-
-
-TERMS: Final = (
-    Term("sync_us", "synchronous packet", "sync", "S"),
-    Term("cycle_arbitration_us", "arbitration", "arbitration", "A"),
-    Term("cycle_data_us", "data", "request_data", "D"),
-    Term("cycle_acknowledge_us", "acknowledge", "acknowledge", "K"),
-    Term("cycle_execution_us", "execution", "execution", "E"),
-    Term("cycle_gaps_us", "gaps", "arbitration_reset_gap", "G"),
-    Term("nonperiodic_us", "non-periodic window", "nonperiodic", "N"),
-)
-LEFT: Final = Term("margin_us", "left of the slice", "idle", "L")
-"""The bars and their legend have this order."""
+LEFT: Final = MARGIN._replace(label="left of the slice", ink="idle", letter="L")
+"""What the terms leave; it follows them in the bars and in their legend."""
 
 
 class _Segment(NamedTuple):
-    term: Term
+    term: Figure
     start_us: float
     end_us: float
 
@@ -76,7 +57,7 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     for one in results:
         text_at(root, one.timing_model, x="0", y=y + 14, css="small")
         y += LINE
-        for part in _segments(one, (*TERMS, LEFT) if end_us >= one.available_us else TERMS):
+        for part in _segments(one, _drawn(one, end_us)):
             _segment(root, part, scale, y=y, height=height)
         y += height
     if end_us > results[0].available_us:
@@ -85,7 +66,13 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
     return scale.marks(area, top=top, bottom=y)
 
 
-def _segments(one: CapacityFigures, terms: Sequence[Term]) -> Iterator[_Segment]:
+def _drawn(one: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
+    """The terms, and what they leave where the drawing reaches the end of the slice."""
+    terms = kind_named(one.kind).term_figures
+    return (*terms, LEFT) if end_us >= one.available_us else terms
+
+
+def _segments(one: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segment]:
     """The terms that take time, behind one another."""
     start_us = 0.0
     for term in terms:
@@ -98,8 +85,8 @@ def _segments(one: CapacityFigures, terms: Sequence[Term]) -> Iterator[_Segment]
 def _segment(root: Element, part: _Segment, scale: Scale, *, y: int, height: int) -> None:
     """A bar, and its letter where there is room for it."""
     title = f"{part.term.label}, {us(part.end_us - part.start_us)} us"
-    scale.rect(root, part, y=y, height=height, css=f"bar {part.term.kind}", title=title)
+    scale.rect(root, part, y=y, height=height, css=f"bar {part.term.ink}", title=title)
     start, end = scale.percent(part.start_us), scale.percent(part.end_us)
     if end - start >= _LETTER_PERCENT and height == _THICK:
-        css = f"letter on-{part.term.kind}"
+        css = f"letter on-{part.term.ink}"
         text_at(root, part.term.letter, x=f"{(start + end) / 2:.5g}%", y=y + 19, css=css, anchor="middle")

@@ -1,4 +1,4 @@
-"""The profile: what a TOML file may say, with units, ranges and defaults.
+"""The profile: what a TOML file may say, with units, ranges and defaults. A kind of bus adds its own keys.
 
 Models are strict (no text for a number), frozen and closed (an unknown key is refused). A whole number may stand
 for a float.
@@ -9,14 +9,16 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from busplan.profile.bus import Cycle, Ieee1394Bus, Node, Payload, TableExecution
 from busplan.sections.base import Problem, Section, refused
+from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection
+from busplan.sections.execution import TableExecution
 from busplan.sections.limits import Limits
 from busplan.sections.machine import Circle, Delivery, Mechanics, Servo, Tolerance
 
 SCHEMA_VERSION: Final = 1
 
-_CIRCLE_SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanics"}
+CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance")
+"""The sections that only a circle test reads; a profile that has one of them asks for it."""
 
 
 def _without_control_characters(allowed: str) -> Callable[[str], str]:
@@ -47,10 +49,10 @@ class Profile(Section):
     description: Annotated[str, Field(max_length=2000), AfterValidator(_without_control_characters("\n\t"))] = Field(
         default="", description="What the profile stands for, in words", examples=["Two nodes at 4 ms"]
     )
-    bus: Ieee1394Bus = Field(description="The bus")
-    cycle: Cycle = Field(description="The communication cycle")
-    payload: Payload = Field(description="What travels in a cycle")
-    node: Node = Field(description="One distributed node")
+    bus: BusSection = Field(description="The bus")
+    cycle: CycleSection = Field(description="The communication cycle")
+    payload: PayloadSection = Field(description="What travels in a cycle")
+    node: NodeSection = Field(description="One distributed node")
     servo: Servo = Field(default_factory=Servo, description="Position loop and drive of both axes")
     mechanics: Mechanics = Field(default_factory=Mechanics, description="What lies between encoders and table")
     delivery: Delivery = Field(default_factory=Delivery, description="How set-points arrive at the nodes")
@@ -61,7 +63,7 @@ class Profile(Section):
     @property
     def asks_for_circle(self) -> bool:
         """Whether the profile says anything that a circle test is for."""
-        return bool(_CIRCLE_SECTIONS & self.model_fields_set)
+        return not self.model_fields_set.isdisjoint(CIRCLE_SECTIONS)
 
     @model_validator(mode="after")
     def _execution_is_known(self) -> Self:

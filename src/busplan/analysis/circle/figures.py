@@ -1,0 +1,88 @@
+"""The figures of the circle test: symbol, unit, where each comes from, and what it is."""
+
+from typing import Final
+
+from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, Figure, by
+from busplan.buses.time_slice import required_time_slice_us, time_slice_us
+
+_CYCLE: Final = by(time_slice_us, required_time_slice_us)
+_SLICE: Final = by(required_time_slice_us)
+_ISO: Final = "ISO 230-4"
+
+CIRCLE_FIGURES: Final = (
+    PERIOD,
+    Figure("feed_mm_per_min", "F", "profile", "speed along the circle"),
+    Figure("radius_mm", "r", "profile", "radius of the circle"),
+    Figure("duration_s", "D", "path", "duration of the move"),
+    Figure("setpoints", "n", "path", "set-points of the move"),
+    Figure("steps", "n_h", "path", "simulated steps of each axis"),
+    Figure("step_us", "h", "profile", "period of the node's position loop, and step of the simulation"),
+    Figure("loop", "loop", "profile", "where the position loop is closed: node or host"),
+    Figure("delay_us", "T_d", _SLICE, "bus delay inside the loop"),
+    Figure("timing_model", "model", "profile", "timing model that decides whether the bus fits"),
+    Figure("bus_fits", "fits", _CYCLE, "whether the cycle fits the bus"),
+    REQUIRED,
+    AVAILABLE,
+    Figure("servo_grade", "grade", "profile", "how the servo values are known", "servo values", sort="word"),
+    Figure("stable", "stable", "loop", "whether both position loops are stable", "stable", sort="truth", better="more"),
+    Figure(
+        "phase_margin_deg",
+        "phase margin",
+        "loop",
+        "turn of the loop's phase that makes it unstable",
+        "phase margin",
+        decimals=2,
+        better="more",
+    ),
+    Figure(
+        "gain_margin_db",
+        "gain margin",
+        "loop",
+        "change of the loop's gain that makes it unstable",
+        "gain margin",
+        decimals=2,
+        better="more",
+        relative=False,
+    ),
+    Figure("crossover_hz", "f_c", "loop", "frequency at which the phase margin is counted"),
+    Figure(
+        "mean_contour_error_mm",
+        "mean",
+        "simulation",
+        "mean contour error of the whole move",
+        "mean contour error",
+        "um",
+        better="less",
+        scale="radius_mm",
+    ),
+    Figure(
+        "max_contour_error_mm",
+        "max",
+        "simulation",
+        "largest contour error of the whole move",
+        "largest contour error",
+        "um",
+        better="less",
+        scale="radius_mm",
+    ),
+    Figure("radial_deviation_min_mm", "F_min", _ISO, "smallest radial deviation at constant speed"),
+    Figure("radial_deviation_max_mm", "F_max", _ISO, "largest radial deviation at constant speed"),
+    Figure(
+        "circular_deviation_mm",
+        "G",
+        _ISO,
+        "circular deviation about the least-squares centre",
+        "circular deviation G",
+        "um",
+        better="less",
+        scale="radius_mm",
+    ),
+    Figure("radius_deviation_mm", "r_ls - r", "least squares", "least-squares radius less the nominal one"),
+    Figure("centre_offset_mm", "centre", "least squares", "least-squares centre, x and y"),
+    Figure("constant_speed_deg", "arc", "simulation", "arc at constant speed with the loops settled"),
+    Figure(
+        "passed", "passed", "profile", "whether the circle holds every tolerance", "passed", sort="truth", better="more"
+    ),
+    Figure("failures", "failures", "profile", "what the circle does not hold"),
+    Figure("contributions", "contributions", "simulation", "what each error source takes of the largest error"),
+)

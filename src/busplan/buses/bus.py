@@ -1,0 +1,302 @@
+"""What an analysis may ask of a kind of bus.
+
+An analysis asks a bus, never its keys. `terms`, `figures` and limits are written with operators and the functions of
+`busplan.elementwise`, so that they serve plain numbers, arrays, traced numbers and polynomials of the number of nodes
+alike. They branch on words, never on numbers.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+
+from busplan.buses.figure import MARGIN, NODES, PAYLOAD_BYTES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
+from busplan.buses.network import Network
+from busplan.buses.rule import Rule
+from busplan.elementwise import Number, total
+from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.buses.published import PaperSection
+    from busplan.sections.profile import Profile
+    from busplan.sourced import Sourced
+
+Value = int | float | str
+"""A value of a profile's key."""
+
+
+class TimingModel(NamedTuple):
+    """One way to count the cycle of a kind of bus."""
+
+    name: str
+    meaning: str
+    is_conservative: bool
+    """Whether it counts all that the bus is known to need."""
+
+
+class Term(NamedTuple):
+    """A part of the cycle. All terms add up to what the cycle needs."""
+
+    key: str
+    """Of its figure."""
+    us: Number
+
+    @property
+    def name(self) -> str:
+        """What it is called beside the other terms."""
+        return self.key.removeprefix("cycle_").removesuffix("_us")
+
+
+class EventKind(NamedTuple):
+    """How one kind of event, or a stretch of several, is called and drawn."""
+
+    key: str
+    label: str
+    reference: str
+    """Number of the equation that its time comes from, or where else it comes from."""
+    mark: str
+    """Its character in a terminal."""
+    ink: Ink
+
+
+IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
+"""What is left of the slice."""
+
+
+class BusEvent(NamedTuple):
+    """A stretch of the cycle; it begins where the one before it ends. The events of a term add up to it."""
+
+    kind: str
+    """Key of its `EventKind`."""
+    term: str
+    """Key of the term that it is a part of."""
+    us: float
+    label: str
+    """What it is, and who is at work."""
+    node: int | None = None
+    """Whose it is, from 1; None for what belongs to all."""
+    transaction: str | None = None
+    """What it belongs to at a coarse look: the key of an `EventKind` for stretches."""
+    packet: str | None = None
+    """Which packet of the transaction it belongs to."""
+
+
+class Limit(NamedTuple):
+    """What must not be exceeded. Its value never falls with the number of nodes."""
+
+    key: str
+    over: str
+    """What is said of a broken one, a format of `value`, `most` and the profile's `bus`."""
+    value: Callable[[Network], Number]
+    most: Callable[[Network], Number]
+    way_out: str = ""
+    """What makes room where this limit keeps nodes out."""
+    failure: str = ""
+    """What a circle test calls a broken one, where not by its key."""
+    is_safety: bool = False
+    """A cycle fits without it, but nothing is advised that breaks it."""
+
+    def is_broken(self, network: Network) -> Number:
+        """Whether a network breaks it: a truth, or an array of them."""
+        return self.value(network) > self.most(network)
+
+    def words(self, network: Network) -> str:
+        """Say by how much a network breaks it."""
+        return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
+
+
+class Setting(NamedTuple):
+    """A key that a plan may turn without new parts."""
+
+    key: str
+    label: str
+    best: Value | None
+    """The value that needs the least time and is safe for the network; None where no value is known to be."""
+    values: tuple[Value, ...]
+    """Safe values that it has not yet, the smallest change first."""
+    bound: str
+    """What keeps the best value from being better."""
+    reason: str = ""
+    """Why there is no best value."""
+    follows: Value | None = None
+    """A value that means the best one for any number of nodes."""
+
+
+class PayloadRange(NamedTuple):
+    """Payloads that a plan may choose from: the largest, and the step between them."""
+
+    step_bytes: int
+    most_bytes: int
+    bound: str
+    """What keeps the largest from being larger."""
+    carrier: str = "a packet"
+    """What carries no more."""
+
+
+class BusLatency(NamedTuple):
+    """How long one thing takes on the bus, part by part."""
+
+    name: str
+    payload_bytes: Number | None
+    phases: Mapping[str, Number]
+    """Figures by key, which are among the kind's `latency_figures`."""
+
+
+class Halves(NamedTuple):
+    """What a measured latency holds beside the execution [us]."""
+
+    latency_us: float
+    """All of it."""
+    request_and_acknowledge_us: float
+    """Up to the first acknowledge."""
+
+
+class BusCycle(ABC):
+    """One communication cycle of a network under one timing model."""
+
+    network: Network
+    model: str
+
+    @property
+    @abstractmethod
+    def terms(self) -> tuple[Term, ...]:
+        """The cycle in the order of the wire: every term always, 0.0 where it is off."""
+
+    @property
+    def required_us(self) -> Number:
+        """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
+        return total(term.us for term in self.terms)
+
+    @abstractmethod
+    def events(self) -> Iterator[BusEvent]:
+        """The same cycle laid out, of plain numbers only."""
+
+    def figures(self) -> Mapping[str, Number]:
+        """The kind's own figures beside the terms, by key."""
+        return {}
+
+    def latencies(self) -> tuple[BusLatency, ...]:
+        """How long things take; a kind without transactions has its cycle."""
+        phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
+        return (BusLatency("cycle", None, phases),)
+
+
+class Bus(ABC):
+    """A kind of bus: no state, only answers."""
+
+    kind: ClassVar[str]
+    title: ClassVar[str]
+    """What the kind is called."""
+    timing_models: ClassVar[tuple[TimingModel, ...]]
+    """In the order reports show them."""
+    term_figures: ClassVar[tuple[Figure, ...]]
+    """One for each term, in the order of the wire."""
+    capacity_figures: ClassVar[tuple[Figure, ...]]
+    """Of `capacity`, in the order of its document; `figure.capacity_figures` puts them together."""
+    setup_figures: ClassVar[tuple[Figure, ...]] = ()
+    """Those of them that say how the bus is set."""
+    compared_figures: ClassVar[tuple[Figure, ...]] = ()
+    """Figures of its own that `diff` compares under each timing model."""
+    planned_figures: ClassVar[tuple[str, ...]] = ()
+    """Keys of its own figures that a plan's options show."""
+    facts: ClassVar[tuple[str, ...]] = ()
+    """Keys of the set-up figures that a page's heading shows."""
+    safety: ClassVar[str] = "setting"
+    """What an unsafe bus has set wrongly, in words."""
+    no_safe_setting: ClassVar[str] = "No safe setting is known."
+    """What is said where nothing is known to be safe."""
+    safety_figure: ClassVar[Figure | None] = None
+    """The figure that says whether every safety limit holds."""
+    table_figures: ClassVar[tuple[Figure, ...]] = ()
+    """Rows of its own in the table of `capacity`."""
+    limits: ClassVar[tuple[Limit, ...]]
+    """In the order in which they are reported; at least one grows with the nodes."""
+    rules: ClassVar[tuple[Rule, ...]] = ()
+    event_kinds: ClassVar[tuple[EventKind, ...]]
+    """In the order of the cycle."""
+    stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
+    """What several events make together."""
+    constants: ClassVar[Mapping[str, "Sourced"]] = {}
+    """Its figures with a source, by name."""
+    key_sources: ClassVar[Mapping[str, "Sourced"]] = {}
+    """Keys of a profile whose default is a figure with a source."""
+    key_symbols: ClassVar[Mapping[str, str]] = {}
+    """What stands for its keys in formulas, where it is not by their name."""
+    warning_keys: ClassVar[tuple[str, ...]] = ()
+    """Keys that its warnings look at."""
+    warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()
+    """Constants that its warnings look at."""
+    structural_changes: ClassVar[tuple[str, ...]] = ()
+    """What else of the machine may be changed for it to fit, in words."""
+    change_meanings: ClassVar[Mapping[str, str]] = {}
+    """What a change of a key means on the machine, where the key does not say so."""
+    change_words: ClassVar[Mapping[str, str]] = {}
+    """How a table of plans writes a key with its value: a format of the value."""
+    way_charged: ClassVar[str] = "every node alike"
+    """Which way on the wire each node is charged, as drawings of a cycle say it."""
+
+    @abstractmethod
+    def profile_model(self) -> "type[Profile]":
+        """The model of its profiles."""
+
+    @abstractmethod
+    def cycle(self, network: Network, *, model: str) -> BusCycle:
+        """The cycle of a network under one timing model."""
+
+    @property
+    def latency_figures(self) -> tuple[Figure, ...]:
+        """Of `latency`, in the order of its document."""
+        return (TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, *self.term_figures, REQUIRED)
+
+    def latency_subject(self, network: Network) -> str:
+        """Say whose latency it is."""
+        return ", ".join(("the whole cycle", *self.setup_words(network)))
+
+    def halves(self, network: Network, *, model: str, kind: str, payload_bytes: int) -> Halves:  # noqa: ARG002
+        """What a transaction's packets take.
+
+        Raises
+        ------
+        BusplanError
+            The kind has no transactions whose latency could be measured.
+        """
+        raise BusplanError(f"bus.kind {self.kind}: {self.title} has no transactions to find an execution time from")
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
+        """What of the bus a plan may turn, with the values that are safe for this very network."""
+        return ()
+
+    def repairs(self, network: Network) -> dict[str, Value]:  # noqa: ARG002 - a kind may know none
+        """The nearest values that keep the limits of the standard, for each that a network breaks."""
+        return {}
+
+    @abstractmethod
+    def payloads(self, network: Network) -> PayloadRange:
+        """Payloads that a plan may choose from."""
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
+        """How the bus is set, each in a few words."""
+        return ()
+
+    def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
+        """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
+        return []
+
+    def published_sections(self, network: Network, published: Mapping[str, Any]) -> "tuple[PaperSection, ...]":  # noqa: ARG002
+        """Compare published figures with what its equations give."""
+        return ()
+
+    def limit(self, key: str) -> Limit | None:
+        """The limit of a key; None for time, which is no limit of the bus."""
+        return next((one for one in self.limits if one.key == key), None)
+
+    def broken(self, network: Network) -> tuple[Limit, ...]:
+        """The limits that plain numbers break, but for safety."""
+        return tuple(one for one in self.limits if not one.is_safety and one.is_broken(network))
+
+    def is_safe(self, network: Network) -> bool:
+        """Whether plain numbers keep every safety limit."""
+        return not any(one.is_broken(network) for one in self.limits if one.is_safety)
+
+    def event_kind(self, key: str) -> EventKind:
+        """How an event or a stretch of events is called and drawn."""
+        return next(one for one in (*self.event_kinds, IDLE, *self.stretch_kinds) if one.key == key)

@@ -1,0 +1,237 @@
+"""One figure of an answer: its key, its symbol, its unit, where it comes from, and what it is.
+
+Each figure stands once. Tables, JSON, sweeps, differences and derivations read it here. What every bus has is in this
+module; a kind of bus adds its own.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import Any, Final, Literal, NamedTuple
+
+from busplan.buses import time_slice
+from busplan.sourced import EQUATIONS
+
+Sort = Literal["number", "count", "truth", "word", "words"]
+"""What a figure's values are."""
+Better = Literal["more", "less", "neither"]
+Ink = Literal[
+    "sync",
+    "contention",
+    "request",
+    "acknowledge",
+    "work",
+    "response",
+    "gap",
+    "long-gap",
+    "reserve",
+    "idle",
+    "in",
+    "out",
+]
+"""What a stretch of time is to the reader of a drawing: its colour."""
+
+_UNITS: Final = {
+    "_mm_per_min": "mm/min",
+    "_us": "us",
+    "_bytes": "bytes",
+    "_mm": "mm",
+    "_deg": "deg",
+    "_db": "dB",
+    "_hz": "Hz",
+    "_s": "s",
+}
+"""Unit by the end of a key's name, the longer ends first."""
+
+
+class Figure(NamedTuple):
+    """One key of a command's JSON.
+
+    Parameters
+    ----------
+    key
+        Name in JSON, CSV and the results.
+    symbol
+        What stands for it in a derivation.
+    reference
+        Numbers of its equations, or where else it comes from.
+    meaning
+        What it is, in one line.
+    label
+        How a table calls it; a figure without one stands in no table of a command.
+    column
+        What a table's unit column says, where it is not the unit: "%" for a share.
+    sort
+        What its values are.
+    decimals
+        Decimals of a plain number in tables.
+    better
+        Which direction is better.
+    scale
+        Key of the quantity that its rounding is relative to, where it is a difference of such.
+    relative
+        Whether a share of it means something.
+    ink, letter
+        How it is drawn, where it is a part of the slice.
+    """
+
+    key: str
+    symbol: str
+    reference: str
+    meaning: str
+    label: str = ""
+    column: str = ""
+    sort: Sort = "number"
+    decimals: int = 3
+    better: Better = "neither"
+    scale: str | None = None
+    relative: bool = True
+    ink: Ink = "idle"
+    letter: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Unit by the end of its name; empty for counts, shares and words."""
+        return unit_of(self.key)
+
+
+def unit_of(key: str) -> str:
+    """Unit by the end of a key's name; empty for counts, shares and words.
+
+    Examples
+    --------
+    >>> unit_of("margin_us"), unit_of("max_nodes")
+    ('us', '')
+    """
+    return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+
+
+def by(*functions: Callable[..., Any]) -> str:
+    """The numbers of the equations that some functions compute.
+
+    Examples
+    --------
+    >>> by(time_slice.time_slice_us, time_slice.required_time_slice_us)
+    '(1) (2)'
+    """
+    numbers = dict.fromkeys(number for one in functions for number in EQUATIONS[one.__name__].numbers)
+    return " ".join(f"({number})" for number in numbers)
+
+
+def by_key(figures: Iterable[Figure]) -> dict[str, Figure]:
+    """Some figures by their keys."""
+    return {figure.key: figure for figure in figures}
+
+
+_SLICE: Final = by(time_slice.required_time_slice_us)
+_CYCLE: Final = by(time_slice.time_slice_us, time_slice.required_time_slice_us)
+
+TIMING_MODEL: Final = Figure(
+    "timing_model", "model", "profile", "timing model of the figures", "timing that decides", sort="word"
+)
+PERIOD: Final = Figure("period_us", "T_s", "profile", "communication period", "period T_s")
+NODES: Final = Figure("nodes", "N", "profile", "distributed nodes, host not counted", "nodes N", "nodes", "count")
+AXES: Final = Figure("axes", "axes", "profile", "axes of all nodes", "axes", "axes", "count")
+AVAILABLE: Final = Figure(
+    "available_us",
+    "alpha T_s",
+    by(time_slice.time_slice_us),
+    "share of the period that is for communication",
+    "available alpha T_s",
+)
+REQUIRED: Final = Figure(
+    "required_us", "T_need", _SLICE, "what the whole cycle needs, N T_cs", "required N T_cs", better="less"
+)
+NONPERIODIC: Final = Figure(
+    "nonperiodic_us",
+    "T_npd",
+    "profile",
+    "time kept for non-periodic data",
+    "non-periodic T_npd",
+    ink="reserve",
+    letter="N",
+)
+TIME_SLICE: Final = Figure(
+    "time_slice_us",
+    "T_cs,given",
+    by(time_slice.time_slice_us),
+    "time slice that the cycle gives each node",
+    "time slice T_cs, given",
+)
+REQUIRED_TIME_SLICE: Final = Figure(
+    "required_time_slice_us", "T_cs,needed", _SLICE, "time slice that each node needs", "time slice T_cs, needed"
+)
+BINDING_TERM: Final = Figure(
+    "binding_term", "binding term", _SLICE, "the largest part of what the cycle needs", sort="word"
+)
+UTILISATION: Final = Figure(
+    "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", better="less"
+)
+MARGIN: Final = Figure(
+    "margin_us", "margin", _CYCLE, "what is left of the slice", "margin", better="more", scale="available_us"
+)
+MAX_NODES: Final = Figure(
+    "max_nodes", "N_max", _CYCLE, "most nodes that fit the period", "most nodes", "nodes", "count", better="more"
+)
+MAX_AXES: Final = Figure(
+    "max_axes", "axes_max", _CYCLE, "axes of the most nodes that fit", "most axes", "axes", "count", better="more"
+)
+LIMITED_BY: Final = Figure(
+    "limited_by", "limit", _CYCLE, "what keeps the most nodes from being more", "limited by", sort="word"
+)
+MIN_PERIOD: Final = Figure(
+    "min_period_us", "T_s,min", _CYCLE, "smallest period that these nodes fit in", "smallest period", better="less"
+)
+MIN_SLICE_RATIO: Final = Figure(
+    "min_slice_ratio",
+    "alpha_min",
+    _CYCLE,
+    "smallest slice ratio that these nodes fit with",
+    "smallest slice ratio alpha",
+    "1",
+    decimals=4,
+)
+EXCEEDED: Final = Figure("exceeded", "broken", _CYCLE, "limits that the profile breaks", sort="words")
+FITS: Final = Figure(
+    "fits", "fits", _CYCLE, "whether the cycle fits and breaks no limit", "fits", sort="truth", better="more"
+)
+VERDICT_FIGURES: Final = (
+    Figure("models_agree", "models agree", _CYCLE, "whether every timing model says the same of the fit", sort="truth"),
+    Figure("cheapest_change", "change", _CYCLE, "cheapest change that makes it fit, or carries more nodes"),
+    Figure("warnings", "warnings", "table", "what to beware of, whatever the verdict", sort="words"),
+    Figure("text", "text", _CYCLE, "the verdict in words", sort="word"),
+)
+"""Figures of the verdict, which belong to no one timing model."""
+
+TRANSACTION: Final = Figure("transaction", "kind", "profile", "what travels, as read or write", sort="word")
+PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
+
+
+def capacity_figures(
+    terms: Iterable[Figure],
+    *,
+    setup: Iterable[Figure] = (),
+    own: Iterable[Figure] = (),
+    counted: Iterable[Figure] = (),
+) -> tuple[Figure, ...]:
+    """Put the figures of `capacity` together, in the order of its document.
+
+    Parameters
+    ----------
+    terms
+        The terms of the kind's cycle.
+    setup
+        Figures that say how the bus is set.
+    own
+        What else the kind has.
+    counted
+        Other counts of its nodes.
+    """
+    return (
+        *(TIMING_MODEL, PERIOD, NODES, AXES),
+        *setup,
+        *(AVAILABLE, REQUIRED, TIME_SLICE, REQUIRED_TIME_SLICE),
+        *own,
+        *terms,
+        *(BINDING_TERM, UTILISATION, MARGIN),
+        *counted,
+        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
+    )

@@ -1,0 +1,211 @@
+"""IEEE 1394 (FireWire) up to S400, as a kind of bus."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+from busplan.buses.bus import Bus, EventKind, Halves, Limit, PayloadRange, Setting, TimingModel, Value
+from busplan.buses.figure import NONPERIODIC, Figure, by_key
+from busplan.buses.ieee1394 import figures, rules
+from busplan.buses.ieee1394.constants import (
+    CONSTANTS,
+    MAX_HOPS,
+    MAX_NODES,
+    MAX_PAYLOAD_BYTES,
+    PACKET_OVERHEAD_BYTES,
+    PING_PER_NODE_US,
+    PING_US,
+    QUADLET_BYTES,
+    REFERENCE_CABLE_M,
+    SLICE_RATIO,
+    safe_gap_count,
+)
+from busplan.buses.ieee1394.cycle import LIMITS, Ieee1394Cycle, gap_count_of, hops_of, link_of
+from busplan.buses.ieee1394.timing import TIMING_MODELS, transaction
+from busplan.buses.network import Network
+from busplan.buses.rule import Rule
+from busplan.elementwise import larger
+from busplan.sourced import Sourced
+
+if TYPE_CHECKING:
+    from busplan.buses.ieee1394.section import Ieee1394Profile
+    from busplan.buses.published import PaperSection
+
+_PHASES: Final = by_key(figures.LATENCY)
+
+
+def _kind(key: str, label: str, phase: str, mark: str, ink: Any) -> EventKind:
+    return EventKind(key, label, _PHASES[phase].reference, mark, ink)
+
+
+class Ieee1394(Bus):
+    """The bus of the paper."""
+
+    kind = "ieee1394"
+    title = "IEEE 1394"
+    timing_models = (
+        TimingModel("paper", "the paper's equations as published", is_conservative=False),
+        TimingModel("standard", "the standard's clock and packets", is_conservative=True),
+    )
+    term_figures = figures.TERMS
+    capacity_figures = figures.CAPACITY
+    setup_figures = figures.SETUP
+    compared_figures = figures.COMPARED
+    table_figures = figures.TABLE
+    planned_figures = ("gap_count", "gap_count_safe")
+    facts = ("hops", "gap_count")
+    safety = "gap count"
+    no_safe_setting = "No gap count is known to be safe for cables of this length."
+    safety_figure = figures.GAP_COUNT_SAFE
+    limits: ClassVar[tuple[Limit, ...]] = LIMITS
+    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    event_kinds = (
+        EventKind("sync", "synchronous packet", figures.SYNC.reference, "S", "sync"),
+        _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
+        _kind("request_data", "request data", "request_data_us", ">", "request"),
+        _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
+        _kind("execution", "execution", "execution_us", "=", "work"),
+        _kind("response_data", "response data", "response_data_us", "<", "response"),
+        _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
+        _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
+        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+    )
+    stretch_kinds = (
+        EventKind("read", "reads", "", "R", "in"),
+        EventKind("write", "writes", "", "W", "out"),
+    )
+    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    key_sources: ClassVar[Mapping[str, Sourced]] = {
+        "bus.cable_length_m": REFERENCE_CABLE_M,
+        "cycle.slice_ratio": SLICE_RATIO,
+        "cycle.sync.ping_us": PING_US,
+        "cycle.sync.ping_per_node_us": PING_PER_NODE_US,
+        "payload.overhead_bytes": PACKET_OVERHEAD_BYTES,
+    }
+    key_symbols: ClassVar[Mapping[str, str]] = {
+        "payload.overhead_bytes": "overhead",
+        "cycle.sync.ping_us": "ping",
+        "cycle.sync.ping_per_node_us": "ping_node",
+    }
+    warning_keys = ("bus.cable_length_m",)
+    warning_constants = (REFERENCE_CABLE_M,)
+    structural_changes = ("speed", "wiring")
+    change_meanings: ClassVar[Mapping[str, str]] = {
+        "bus.max_hops": "rewired as a tree",
+        "bus.nodes": "the others on a second bus",
+        "bus.speed": "if all nodes can",
+    }
+    change_words: ClassVar[Mapping[str, str]] = {
+        "bus.gap_count": "gap count {}",
+        "bus.max_hops": "tree of {} hops",
+        "bus.speed": "speed {}",
+    }
+    way_charged = "every node at the hops of the farthest"
+
+    def profile_model(self) -> "type[Ieee1394Profile]":
+        """The model of its profiles."""
+        from busplan.buses.ieee1394.section import Ieee1394Profile  # the one module of the bus that loads pydantic
+
+        return Ieee1394Profile
+
+    def cycle(self, network: Network, *, model: str) -> Ieee1394Cycle:
+        """The cycle of a network under one timing model."""
+        return Ieee1394Cycle(network, model)  # type: ignore[arg-type]
+
+    @property
+    def latency_figures(self) -> tuple[Figure, ...]:
+        """Of `latency`, in the order of its document."""
+        return figures.LATENCY
+
+    def latency_subject(self, network: Network) -> str:
+        """Say whose latency it is."""
+        nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
+        return ", ".join((f"farthest of {nodes}", *self.setup_words(network)))
+
+    def halves(self, network: Network, *, model: str, kind: str, payload_bytes: int) -> Halves:
+        """What the packets of a transaction with the farthest node take."""
+        phases = transaction(
+            kind,  # type: ignore[arg-type]
+            model=TIMING_MODELS[model],  # type: ignore[index]
+            link=link_of(network),
+            payload_bytes=payload_bytes,
+            overhead_bytes=network.profile.payload.overhead_bytes,
+            execution_us=0.0,
+        )
+        return Halves(phases.latency_us, phases.request_and_acknowledge_us)
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:
+        """The gap count: one register in each node."""
+        key, label = "bus.gap_count", "gap count"
+        if not network.profile.bus.cable_is_standard:
+            reason = f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m"
+            return (Setting(key, label, None, (), "gap table", reason),)
+        safe = safe_gap_count(hops_of(network))
+        values = () if gap_count_of(network) == safe else (safe,)
+        return (Setting(key, label, safe, values, "gap table", follows="optimal"),)
+
+    def repairs(self, network: Network) -> dict[str, Value]:
+        """The nearest values that keep the standard's own limits and a safe gap count, for each that is broken."""
+        found: dict[str, Value] = {}
+        bus, broken = network.profile.bus, {one.key for one in self.broken(network)}
+        if "payload" in broken:
+            found |= _payload_repairs(network)
+        if "nodes" in broken:
+            found["bus.nodes"] = int(MAX_NODES)
+        hops = hops_of(network)
+        if "hops" in broken:
+            found["bus.max_hops"] = hops = int(MAX_HOPS)
+        if bus.cable_is_standard and gap_count_of(network) < safe_gap_count(hops):
+            found["bus.gap_count"] = safe_gap_count(hops)
+        return found
+
+    def payloads(self, network: Network) -> PayloadRange:
+        """Whole quadlets up to the largest packet of the speed."""
+        speed = network.profile.bus.speed
+        return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), "speed", carrier=speed)
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:
+        """Hops and gap count."""
+        hops = hops_of(network)
+        return (f"{hops} hop{'s' * (hops != 1)}", f"gap count {gap_count_of(network)}")
+
+    def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
+        """An unsafe gap count, and cables that the table does not hold for."""
+        bus, found = network.profile.bus, []
+        limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
+        for number in nodes:
+            with_them = network.with_nodes(number)
+            hops, given = hops_of(with_them), gap_count_of(with_them)
+            if given < safe_gap_count(hops):
+                found.append(
+                    f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
+                    f"({number} node{'s' * (number != 1)}); the smallest safe one is {safe_gap_count(hops)}{limit}."
+                )
+                break
+        if not bus.cable_is_standard:
+            found.append(
+                f"Warning: cables of {bus.cable_length_m:g} m are longer than the {REFERENCE_CABLE_M:g} m that the "
+                "gap-count table holds for."
+            )
+        return found
+
+    def published_sections(self, network: Network, published: Mapping[str, Any]) -> "tuple[PaperSection, ...]":
+        """Compare the published figures of the paper's bench with what the equations give."""
+        from busplan.buses.ieee1394.paper import bus_sections  # one command alone asks for it
+
+        return bus_sections(network, published)
+
+
+def _payload_repairs(network: Network) -> dict[str, Value]:
+    """A faster bus that carries the payloads, or else the payloads that this one carries."""
+    largest = 0
+    for group in network.groups:
+        largest = larger(largest, larger(group.read_bytes, group.write_bytes))
+    faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if largest <= limit]
+    if faster:
+        return {"bus.speed": faster[0]}
+    payload, most = network.profile.payload, int(MAX_PAYLOAD_BYTES[network.profile.bus.speed])
+    keys = ("read_bytes", "write_bytes")
+    return {f"payload.{key}": most for key in keys if getattr(payload, key) > most}
+
+
+BUS: Final = Ieee1394()

@@ -1,0 +1,174 @@
+"""Rules of the gate that only an IEEE 1394 bus has: its limits, its gap count, its packets, its two timing models."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
+
+from busplan.buses.ieee1394.constants import (
+    MAX_HOPS,
+    MAX_NODES,
+    MAX_PAYLOAD_BYTES,
+    QUADLET_BYTES,
+    REFERENCE_CABLE_M,
+    padded_bytes,
+)
+from busplan.buses.rule import Rule, RuleProblem, RuleSubject, microseconds, overrun
+
+if TYPE_CHECKING:
+    from busplan.buses.ieee1394.section import Ieee1394Bus
+
+
+def _bus(subject: RuleSubject) -> "Ieee1394Bus":
+    bus: Any = subject.profile.bus
+    return bus  # type: ignore[no-any-return]
+
+
+def other_model_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The cycle fits under the deciding model alone."""
+    if "time" not in subject.deciding.exceeded and subject.others_overrun:
+        deciding = subject.deciding
+        for other in subject.others:
+            cure = subject.cure(deciding.timing_model, other.timing_model)
+            yield RuleProblem(
+                "cycle.period_us",
+                f"fits the {deciding.timing_model}'s timing, not the {other.timing_model}'s: {overrun(other)}; {cure}",
+            )
+
+
+def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """More nodes than one bus has addresses for."""
+    if "nodes" in subject.deciding.exceeded:
+        nodes = subject.profile.bus.nodes
+        yield RuleProblem(
+            "bus.nodes", f"{nodes} nodes are over the {MAX_NODES:g} of one bus; put the others on a second bus"
+        )
+
+
+def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """More cable hops than the standard allows."""
+    if "hops" in subject.deciding.exceeded:
+        chain = _bus(subject).max_hops is None
+        cure = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
+        yield RuleProblem(
+            "bus.nodes" if chain else "bus.max_hops",
+            f"{subject.deciding.hops} hops are over the {MAX_HOPS:g} of one bus; {cure}",
+        )
+
+
+def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """A payload larger than an asynchronous packet of this speed carries."""
+    speed = _bus(subject).speed
+    most = int(MAX_PAYLOAD_BYTES[speed])
+    for key, size in _payloads(subject):
+        if size > most:
+            faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if size <= limit]
+            cure = f'cheapest cure: bus.speed = "{faster[0]}"' if faster else "share it out among several transactions"
+            yield RuleProblem(key, f"{size} bytes are over the {most} bytes of a packet at {speed}; {cure}")
+
+
+def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """A payload that the wire fills up."""
+    for key, size in _payloads(subject):
+        if size % QUADLET_BYTES:
+            padded = padded_bytes(size)
+            yield RuleProblem(
+                key,
+                f"{size} bytes are no whole number of quadlets; {padded} bytes travel anyway; use or say {padded}",
+            )
+
+
+def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
+    payload = subject.profile.payload
+    for key in ("read_bytes", "write_bytes"):
+        yield f"payload.{key}", getattr(payload, key)
+
+
+def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """A gap count below the table."""
+    one = subject.deciding
+    if not one.gap_count_safe:
+        yield RuleProblem(
+            "bus.gap_count",
+            f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}"
+            f"{'' if _bus(subject).cable_is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
+        )
+
+
+def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """A gap count above the table."""
+    one = subject.deciding
+    if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
+        after = subject.after({"bus.gap_count": "optimal"})
+        won = after.max_nodes - one.max_nodes
+        yield RuleProblem(
+            "bus.gap_count",
+            f"gap count {one.gap_count} is above the {one.safe_gap_count} that {one.hops} hops need; "
+            f"the latter would save {microseconds(one.required_us - after.required_us)} a cycle "
+            f"and win {won} node{'s' * (won != 1)}",
+        )
+
+
+RULES: Final = (
+    Rule(
+        "BP102",
+        "other-model-overrun",
+        "warning",
+        "the cycle fits under one timing model only",
+        "The plan fits the paper, not the standard (or the other way round). The paper counts gaps in the data "
+        "rate, the wire counts them at the base rate, four times slower at S400: a plan that fits the paper alone "
+        "is likely to fail on the machine.",
+        other_model_overrun,
+    ),
+    Rule(
+        "BP106",
+        "too-many-nodes",
+        "error",
+        "more nodes than one bus has addresses for",
+        "An IEEE 1394 bus has 63 nodes, and the host is one of them.",
+        too_many_nodes,
+    ),
+    Rule(
+        "BP107",
+        "too-many-hops",
+        "error",
+        "more cable hops than the standard allows",
+        "Between any two nodes lie at most 16 hops. In a chain with the host at its end that is 16 nodes; a tree "
+        "carries more.",
+        too_many_hops,
+    ),
+    Rule(
+        "BP108",
+        "payload-over-limit",
+        "error",
+        "the payload is larger than a packet of this speed",
+        "An asynchronous packet carries 512 bytes at S100, 1024 at S200 and 2048 at S400.",
+        payload_over_limit,
+    ),
+    Rule(
+        "BP109",
+        "gap-count-unsafe",
+        "error",
+        "the gap count is too small for the hops",
+        "With a gap count below the table of IEEE 1394a, a node may take the gap inside a subaction for the end "
+        'of it, and two nodes talk at once. Use the number of the message, or "optimal".',
+        gap_count_unsafe,
+    ),
+    Rule(
+        "BP110",
+        "gap-count-wasteful",
+        "warning",
+        "the gap count is larger than the hops need",
+        "Every transaction waits for a subaction gap and an arbitration reset gap, both in proportion to the gap "
+        "count. 63 is what a bus starts with; the table of IEEE 1394a says what the hops need. All nodes must "
+        "hold the same number, and it returns to 63 after two bus resets without a new one.",
+        gap_count_wasteful,
+    ),
+    Rule(
+        "BP111",
+        "payload-not-quadlets",
+        "warning",
+        "the payload is no whole number of quadlets",
+        "Payloads travel in quadlets of 4 bytes; what is missing is filled up. The paper's timing does not count "
+        "the fill, the standard's does.",
+        payload_not_quadlets,
+    ),
+)

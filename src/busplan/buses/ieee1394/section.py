@@ -1,0 +1,128 @@
+"""The keys that only profiles of an IEEE 1394 bus have, in [bus], [cycle] and [payload]."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+
+from busplan.buses.ieee1394.constants import (
+    MAX_GAP_COUNT,
+    PACKET_OVERHEAD_BYTES,
+    PING_PER_NODE_US,
+    PING_US,
+    REFERENCE_CABLE_M,
+    SLICE_RATIO,
+    Speed,
+)
+from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.sections.base import Bytes, Count, Problem, Section, TimeUs, refused
+from busplan.sections.cycle import BusSection, CycleSection, PayloadSection, SliceRatio
+from busplan.sections.profile import Profile
+
+
+def _known_speed(value: object) -> object:
+    if isinstance(value, str) and value in ("S800", "S1600", "S3200"):
+        raise refused(
+            Problem(
+                f"{value} arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. "
+                'Expected "S100", "S200" or "S400"'
+            )
+        )
+    return value
+
+
+def _gap_count(value: object, handler: ValidatorFunctionWrapHandler) -> object:
+    # One message for the whole union, instead of one for each of its members.
+    try:
+        return handler(value)
+    except ValueError:
+        raise refused(Problem(f'expected a whole number from 0 to {MAX_GAP_COUNT}, or "optimal"')) from None
+
+
+GapCount = Annotated[Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] | Literal["optimal"], WrapValidator(_gap_count)]
+
+
+class Ieee1394Bus(BusSection):
+    """Section [bus]: an IEEE 1394 (FireWire) bus up to S400."""
+
+    kind: Literal["ieee1394"] = Field(description="Kind of bus", examples=["ieee1394"])
+    speed: Annotated[Speed, BeforeValidator(_known_speed)] = Field(
+        description="Speed code of all packets: S100, S200 or S400", examples=["S400"]
+    )
+    gap_count: GapCount = Field(
+        default=MAX_GAP_COUNT,
+        description='Gap count of all nodes, 0..63, or "optimal": the smallest safe one for the hops',
+        examples=[MAX_GAP_COUNT],
+    )
+    nodes: Count = Field(description="Distributed nodes N, host not counted", examples=[2])
+    max_hops: Count | None = Field(
+        default=None,
+        description="Most cable hops between any two nodes of a tree, the host counted among them; "
+        "without it the bus is a chain with the host at its end",
+        examples=[3],
+    )
+    cable_length_m: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = Field(
+        default=float(REFERENCE_CABLE_M), description="Length of one cable [m]", examples=[4.5]
+    )
+    timing_model: TimingModelName = Field(
+        default="standard",
+        description="Timing model that decides, paper or standard; reports show both",
+        examples=["standard"],
+    )
+
+    @model_validator(mode="after")
+    def _table_holds_for_the_cable(self) -> Self:
+        if self.gap_count == "optimal" and not self.cable_is_standard:
+            raise refused(
+                Problem(
+                    f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
+                    f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number",
+                    key="bus.gap_count",
+                    kind="inconsistent",
+                )
+            )
+        return self
+
+    @property
+    def cable_is_standard(self) -> bool:
+        """Whether the cable is no longer than those that the gap-count table holds for."""
+        return self.cable_length_m <= REFERENCE_CABLE_M
+
+
+class Sync(Section):
+    """Section [cycle.sync]: the synchronous packet that opens a cycle, CTS of equation (2)."""
+
+    ping_us: TimeUs = Field(
+        default=float(PING_US), description="Latency of a ping to one node, measured [us]", examples=[0.3]
+    )
+    ping_per_node_us: TimeUs = Field(
+        default=float(PING_PER_NODE_US), description="What each further node adds, measured [us]", examples=[0.1]
+    )
+
+
+class Ieee1394CycleSection(CycleSection):
+    """Section [cycle]: the communication period and what of it is for communication."""
+
+    slice_ratio: SliceRatio = Field(
+        default=float(SLICE_RATIO),
+        description="Share alpha of the period that is for communication, 0..1",
+        examples=[0.5],
+    )
+    sync: Sync = Field(default_factory=Sync, description="The synchronous packet that opens a cycle")
+
+
+class Ieee1394Payload(PayloadSection):
+    """Section [payload]: what is read from and written to each node in a cycle."""
+
+    overhead_bytes: Bytes = Field(
+        default=int(PACKET_OVERHEAD_BYTES),
+        description="Overhead of a packet in the paper model; the standard model uses real sizes [bytes]",
+        examples=[20],
+    )
+
+
+class Ieee1394Profile(Profile):
+    """A whole profile: one motion network and its cycle."""
+
+    bus: Ieee1394Bus = Field(description="The bus")
+    cycle: Ieee1394CycleSection = Field(description="The communication cycle")
+    payload: Ieee1394Payload = Field(description="What travels in a cycle")

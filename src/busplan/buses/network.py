@@ -1,0 +1,48 @@
+"""What a cycle is computed from: groups of nodes, the period, and the kind's own keys."""
+
+from typing import Any, NamedTuple
+
+from busplan.elementwise import Number, total
+
+
+class Group(NamedTuple):
+    """Nodes that are alike. The numbers may be of any sort."""
+
+    nodes: Number
+    """How many [1]."""
+    axes: Number
+    """Axes of each node [1]."""
+    read_bytes: Number
+    """Payload that is read from each node [bytes]."""
+    write_bytes: Number
+    """Payload that is written to each node [bytes]."""
+    read_execution_us: Number
+    """Execution time of a read in the node [us]."""
+    write_execution_us: Number
+    """Execution time of a write in the node [us]."""
+
+
+class Network(NamedTuple):
+    """A profile as its cycle sees it. The numbers may be of any sort: plain, arrays, traced, polynomials."""
+
+    profile: Any
+    """The profile, of its kind's own model. Its values may be numbers of any sort."""
+    groups: tuple[Group, ...]
+    period_us: Number
+    slice_ratio: Number
+    nonperiodic_us: Number
+
+    @property
+    def nodes(self) -> Number:
+        """Distributed nodes N, host not counted [1]."""
+        return total(group.nodes for group in self.groups)
+
+    @property
+    def axes(self) -> Number:
+        """Axes of all nodes [1]."""
+        return total(group.nodes * group.axes for group in self.groups)
+
+    def with_nodes(self, nodes: Number) -> "Network":
+        """The same network with another number of nodes in its one group."""
+        (group,) = self.groups
+        return self._replace(groups=(group._replace(nodes=nodes),))

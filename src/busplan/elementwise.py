@@ -1,0 +1,197 @@
+"""The few functions that are no operators, for every sort of number.
+
+What a bus computes it writes with operators and with these. Then one function serves plain numbers, arrays, numbers
+that remember how they were computed, and polynomials of the number of nodes. numpy loads only where arrays are.
+"""
+
+from abc import ABC, abstractmethod
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from math import ceil
+from typing import Any, Final, TypeAlias
+
+Number: TypeAlias = Any
+"""A plain number, an array, or a `SpecialNumber`."""
+
+_PLAIN: Final = (int, float)
+
+
+class SpecialNumber(ABC):
+    """A number that is neither plain nor an array: it says itself what the functions of this module give."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def larger_of(self, one: Number, other: Number) -> Number:
+        """The larger of two numbers; this one is among them."""
+
+    @abstractmethod
+    def chosen(self, condition: Number, yes: Number, no: Number) -> Number:
+        """`yes` where the condition holds, else `no`; this one is among the three."""
+
+    @abstractmethod
+    def rounded_up(self) -> Number:
+        """The next whole number."""
+
+    @abstractmethod
+    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Number, ...]) -> Number:
+        """The entry of a table at this place."""
+
+    @abstractmethod
+    def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> Number:
+        """The value at this place, linear between points."""
+
+    def named(self, _key: str, _symbol: str) -> Number:
+        """Give the number a name."""
+        return self
+
+    def worded(self, _words: str) -> Number:
+        """Say where the number comes from."""
+        return self
+
+
+def _special(*numbers: Number) -> SpecialNumber | None:
+    return next((one for one in numbers if isinstance(one, SpecialNumber)), None)
+
+
+def larger(one: Number, other: Number) -> Number:
+    """The larger of two numbers, the first of equals.
+
+    Examples
+    --------
+    >>> larger(2, 3.0)
+    3.0
+    """
+    if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
+        return max(one, other)
+    own = _special(one, other)
+    if own is not None:
+        return own.larger_of(one, other)
+    import numpy as np
+
+    return np.maximum(one, other)
+
+
+def choose(condition: Number, yes: Number, no: Number) -> Number:
+    """`yes` where the condition holds, else `no`.
+
+    Examples
+    --------
+    >>> choose(2 > 3, "yes", "no")
+    'no'
+    """
+    if isinstance(condition, bool):
+        return yes if condition else no
+    own = _special(condition, yes, no)
+    if own is not None:
+        return own.chosen(condition, yes, no)
+    import numpy as np
+
+    return np.where(condition, yes, no)
+
+
+def rounded_up(number: Number) -> Number:
+    """The next whole number.
+
+    Examples
+    --------
+    >>> rounded_up(3.25), rounded_up(3)
+    (4, 3)
+    """
+    if isinstance(number, _PLAIN):
+        return ceil(number)
+    if isinstance(number, SpecialNumber):
+        return number.rounded_up()
+    import numpy as np
+
+    return np.ceil(number)
+
+
+def from_table(table: Sequence[float], place: Number, *, words: str, sources: tuple[Number, ...] = ()) -> Number:
+    """The entry of a table at a place from 0; beyond its end the last one.
+
+    Parameters
+    ----------
+    table
+        The entries.
+    place
+        Which of them [1].
+    words
+        What a derivation says of it.
+    sources
+        Sourced numbers that the table goes with.
+
+    Examples
+    --------
+    >>> from_table((5, 7, 8), 1, words="a table"), from_table((5, 7, 8), 9, words="a table")
+    (7, 8)
+    """
+    if isinstance(place, _PLAIN):
+        return table[min(int(place), len(table) - 1)]
+    if isinstance(place, SpecialNumber):
+        return place.entry(table, words=words, sources=sources)
+    import numpy as np
+
+    return np.asarray(table)[np.minimum(np.asarray(place, dtype=np.int64), len(table) - 1)]
+
+
+def interpolated(places: Sequence[float], values: Sequence[float], place: Number, *, words: str) -> Number:
+    """The value at a place inside some points, linear between them.
+
+    Parameters
+    ----------
+    places, values
+        The points, places ascending; one or more.
+    place
+        From the first of `places` to the last.
+    words
+        What a derivation calls the points.
+
+    Examples
+    --------
+    >>> interpolated((4, 16), (36.0, 39.0), 8, words="table")
+    37.0
+    """
+    if isinstance(place, _PLAIN):
+        return _between(places, values, place)
+    if isinstance(place, SpecialNumber):
+        return place.between(places, values, words=words)
+    import numpy as np
+
+    index = np.searchsorted(places, place)
+    left = np.maximum(index - 1, 0)
+    xs, ys = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
+    x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
+    return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
+
+
+def _between(places: Sequence[float], values: Sequence[float], place: float) -> float:
+    index = bisect_left(places, place)
+    if places[index] == place:
+        return values[index]
+    x0, y0, x1, y1 = places[index - 1], values[index - 1], places[index], values[index]
+    return y0 + (y1 - y0) * (place - x0) / (x1 - x0)
+
+
+def named(number: Number, key: str, symbol: str) -> Number:
+    """Give a step of a computation its name, for a derivation; any other number stays as it is."""
+    return number.named(key, symbol) if isinstance(number, SpecialNumber) else number
+
+
+def worded(number: Number, words: str) -> Number:
+    """Say in words where a number comes from, for a derivation; any other number stays as it is."""
+    return number.worded(words) if isinstance(number, SpecialNumber) else number
+
+
+def total(parts: Iterable[Number]) -> Number:
+    """The sum of some numbers; 0.0 of none.
+
+    Examples
+    --------
+    >>> total([1.5, 2]), total([])
+    (3.5, 0.0)
+    """
+    found: Number = None
+    for one in parts:
+        found = one if found is None else found + one
+    return 0.0 if found is None else found

@@ -1,0 +1,82 @@
+"""From the data of a profile to the model of its kind of bus."""
+
+from collections.abc import Iterator, Mapping
+from types import UnionType
+from typing import Annotated, Any, Final, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from busplan.buses import kind_named, kind_names
+from busplan.sections.profile import Profile
+
+_EXTENDED: Final = ("bus", "cycle", "payload", "node")
+"""Sections that a kind of bus adds keys to."""
+
+
+def kind_of(data: Mapping[str, Any]) -> str | None:
+    """The kind of bus that a profile's data names; None where it names none that is known."""
+    section = data.get("bus")
+    kind = section.get("kind") if isinstance(section, Mapping) else None
+    return kind if isinstance(kind, str) and kind in kind_names() else None
+
+
+def profile_model(kind: str | None) -> type[Profile]:
+    """The model of profiles of a kind of bus; of an unknown one that of what all kinds share."""
+    return Profile if kind is None else kind_named(kind).profile_model()
+
+
+def may_be_of_a_kind(path: tuple[int | str, ...]) -> bool:
+    """Whether a key that no model of ours has may belong to a kind of bus: nobody can tell before the kind is known."""
+    return path[0] in _EXTENDED or len(path) == 1
+
+
+def models_of(annotation: Any) -> list[type[BaseModel]]:
+    """Models inside an annotation: the section itself, or each member of a union of sections."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) in (Union, UnionType, Annotated):
+        return [model for part in get_args(annotation) for model in models_of(part)]
+    return []
+
+
+def number_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """Dotted keys of a model whose value is one number, in the order of the schema."""
+    for name, field in model.model_fields.items():
+        inner = models_of(field.annotation)
+        for one in inner:
+            yield from number_keys(one, f"{prefix}{name}.")
+        if not inner and _is_number(field.annotation):
+            yield f"{prefix}{name}"
+
+
+def cycle_keys(kind: str) -> tuple[str, ...]:
+    """Keys in numbers that the cycle of a kind of bus may depend on."""
+    keys = number_keys(profile_model(kind))
+    return tuple(key for key in dict.fromkeys(keys) if key.partition(".")[0] in _EXTENDED)
+
+
+def words_of(kind: str, key: str) -> tuple[str, ...]:
+    """Words that a key takes in the place of a number."""
+    model: type[BaseModel] = profile_model(kind)
+    *sections, name = key.split(".")
+    for part in sections:
+        inner = models_of(model.model_fields[part].annotation) if part in model.model_fields else []
+        if not inner:
+            return ()
+        model = inner[0]
+    field = model.model_fields.get(name)
+    return () if field is None or not _is_number(field.annotation) else tuple(_texts(field.annotation))
+
+
+def _is_number(annotation: Any) -> bool:
+    if annotation in (int, float):
+        return True
+    # A literal's arguments are values, and a tuple's are elements.
+    return get_origin(annotation) in (Union, UnionType, Annotated) and any(map(_is_number, get_args(annotation)))
+
+
+def _texts(annotation: Any) -> Iterator[str]:
+    if isinstance(annotation, str):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _texts(part)

@@ -1,0 +1,52 @@
+"""What profiles of every kind of bus say of the cycle and its nodes: [bus], [cycle], [payload], [node].
+
+A kind of bus adds its own keys in a class of its own. The limits of its standard are not checked here: a profile that
+breaks them loads, and the analysis says why it does not fit.
+"""
+
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Section, TimeUs
+from busplan.sections.execution import Execution
+
+SliceRatio = Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)]
+
+
+class BusSection(Section):
+    """Section [bus]. Every kind of bus has `nodes` and `timing_model`, where they belong among its own keys."""
+
+    kind: str = Field(description="Kind of bus", examples=["ieee1394"])
+
+    if TYPE_CHECKING:
+        nodes: int
+        timing_model: str
+
+
+class CycleSection(Section):
+    """Section [cycle]: the communication period and what of it is for communication."""
+
+    period_us: Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
+        description="Communication period T_s [us]", examples=[4000]
+    )
+    slice_ratio: SliceRatio = Field(
+        default=1.0, description="Share alpha of the period that is for communication, 0..1", examples=[0.5]
+    )
+    nonperiodic_us: TimeUs = Field(
+        default=0.0, description="Time kept for non-periodic data in each cycle T_npd [us]", examples=[0]
+    )
+
+
+class PayloadSection(Section):
+    """Section [payload]: what is read from and written to each node in a cycle."""
+
+    read_bytes: Count = Field(description="Payload of the read transaction [bytes]", examples=[12])
+    write_bytes: Count = Field(description="Payload of the write transaction [bytes]", examples=[12])
+
+
+class NodeSection(Section):
+    """Section [node]: one distributed node."""
+
+    axes: Count = Field(description="Axes that one node controls", examples=[4])
+    execution: Execution = Field(description="Execution time T_exec in the node, measured")
