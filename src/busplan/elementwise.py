@@ -45,6 +45,10 @@ class SpecialNumber(ABC):
         """Give the number a name."""
         return self
 
+    def constant(self, number: Number) -> Number:
+        """Give a constant that computes with this number as one that remembers, too."""
+        return number
+
     def worded(self, _words: str) -> Number:
         """Say where the number comes from."""
         return self
@@ -181,6 +185,11 @@ def named(number: Number, key: str, symbol: str) -> Number:
 def worded(number: Number, words: str) -> Number:
     """Say in words where a number comes from, for a derivation; any other number stays as it is."""
     return number.worded(words) if isinstance(number, SpecialNumber) else number
+
+
+def alike(constant: Number, number: Number) -> Number:
+    """A constant that is computed with other constants before it meets a number: of that number's sort."""
+    return number.constant(constant) if isinstance(number, SpecialNumber) else constant
 
 
 def total(parts: Iterable[Number]) -> Number:

@@ -208,6 +208,8 @@ class Bus(ABC):
     """The figure that says whether every safety limit holds."""
     table_figures: ClassVar[tuple[Figure, ...]] = ()
     """Rows of its own in the table of `capacity`."""
+    latency_table_figures: ClassVar[tuple[Figure, ...] | None] = None
+    """Rows of the table of `latency`; without them its terms."""
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
     rules: ClassVar[tuple[Rule, ...]] = ()

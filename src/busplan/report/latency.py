@@ -6,6 +6,7 @@ from itertools import groupby
 from busplan.analysis.latency import LatencyResult, Transaction, with_payload
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Bus
+from busplan.buses.figure import REQUIRED
 from busplan.report.lines import BLANK, GridRow, Line, figure_row, grid
 from busplan.report.words import execution_line, warnings
 from busplan.sections.profile import Profile
@@ -13,13 +14,8 @@ from busplan.sections.profile import Profile
 
 def latency_table_rows(bus: Bus) -> tuple[GridRow, ...]:
     """Rows of the table: each phase of a transaction, all of them in us."""
-    setup = {figure.key for figure in (*bus.setup_figures, *bus.latency_figures[:_HEAD])}
-    own = (figure for figure in bus.latency_figures if figure.label and figure.key not in setup)
-    return tuple(figure_row(figure)._replace(unit="") for figure in own)
-
-
-_HEAD = 4
-"""Figures that say which transaction it is: timing model, transaction, payload and nodes."""
+    figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
+    return tuple(figure_row(figure)._replace(unit="") for figure in figures)
 
 
 def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:

@@ -203,6 +203,10 @@ class Traced(SpecialNumber):
         found = y0 + (y1 - y0) * (self - x0) / (x1 - x0)
         return Traced(found.value, operation=CHOSEN, parts=(found, *sources))
 
+    def constant(self, number: Operand) -> Any:
+        """Give a constant as an input of the derivation."""
+        return Traced(float(number), given=constant(number)) if isinstance(number, Sourced) else number
+
     def worded(self, words: str) -> Any:
         """Say where the number comes from."""
         return Traced(self.value, formula=words, numbers=short(self.value), parts=(self,))

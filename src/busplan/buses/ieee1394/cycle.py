@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Limit, Term
+from busplan.buses.figure import AVAILABLE
 from busplan.buses.ieee1394 import equations, figures
 from busplan.buses.ieee1394.constants import (
     DATA_RATE_MBIT_S,
@@ -24,7 +25,7 @@ from busplan.buses.ieee1394.timing import (
 )
 from busplan.buses.network import Group, Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, SpecialNumber, larger, named, total, worded
+from busplan.elementwise import Number, SpecialNumber, alike, larger, named, total, worded
 
 _LATENCY_SYMBOLS: Final = {figure.key: figure.symbol for figure in figures.LATENCY}
 
@@ -42,14 +43,16 @@ def hops_of(network: Network) -> Number:
 def gap_count_of(network: Network) -> Number:
     """Gap count in force [1]."""
     given = network.profile.bus.gap_count
-    return safe_gap_count(hops_of(network)) if isinstance(given, str) else given
+    if not isinstance(given, str):
+        return given
+    return worded(safe_gap_count(hops_of(network)), 'g_safe, for bus.gap_count is "optimal"')
 
 
 def link_of(network: Network) -> Link:
     """Rate, gap count and distance of the farthest node."""
     bus = network.profile.bus
     return Link(
-        data_rate_mbit_s=DATA_RATE_MBIT_S[bus.speed],
+        data_rate_mbit_s=alike(DATA_RATE_MBIT_S[bus.speed], network.nodes),
         gap_count=named(gap_count_of(network), "gap_count", "g"),
         hops=named(hops_of(network), "hops", "H"),
         cable_length_m=bus.cable_length_m,
@@ -156,6 +159,7 @@ class Ieee1394Cycle(BusCycle):
         """How the bus is set, the latencies, and the number of nodes as the paper has it."""
         network, (read, write) = self.network, _one_of_each(self.exchanges)
         safe = safe_gap_count(self.link.hops)
+        given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
         return {
             "hops": self.link.hops,
             "gap_count": self.link.gap_count,
@@ -169,7 +173,7 @@ class Ieee1394Cycle(BusCycle):
             "subaction_gap_us": read.subaction_gap_us,
             "arbitration_reset_gap_us": read.arbitration_reset_gap_us,
             "nodes_eq11": equations.published_nodes(
-                time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1),
+                named(given_us, AVAILABLE.key, AVAILABLE.symbol),
                 sync_us=self.sync_us,
                 latency_us=(read.latency_us + write.latency_us) / 2,
                 gaps_us=read.gaps_us,

@@ -11,6 +11,7 @@ from busplan.buses.figure import (
     Figure,
     Ink,
     by,
+    by_key,
     capacity_figures,
 )
 from busplan.buses.ieee1394 import equations as eq
@@ -192,3 +193,25 @@ LATENCY: Final = (
     ),
 )
 """In the order of the document, which is that of the phases of a transaction."""
+LATENCY_TABLE: Final = tuple(
+    by_key(LATENCY)[key]
+    for key in (
+        "request_bytes",
+        "response_bytes",
+        "arbitration_us",
+        "request_data_us",
+        "response_data_us",
+        "acknowledge_us",
+        "request_us",
+        "response_us",
+        "request_and_acknowledge_us",
+        "execution_us",
+        "response_and_acknowledge_us",
+        "latency_us",
+        "subaction_gap_us",
+        "arbitration_reset_gap_us",
+        "gaps_us",
+        "latency_with_gaps_us",
+    )
+)
+"""In the order of the bench: T1+T2, T3, T4+T5, and the gaps behind them."""

@@ -51,6 +51,7 @@ class Ieee1394(Bus):
     setup_figures = figures.SETUP
     compared_figures = figures.COMPARED
     table_figures = figures.TABLE
+    latency_table_figures = figures.LATENCY_TABLE
     planned_figures = ("gap_count", "gap_count_safe")
     facts = ("hops", "gap_count")
     safety = "gap count"

@@ -23,7 +23,7 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
-from busplan.elementwise import Number, choose
+from busplan.elementwise import Number, alike, choose, worded
 
 TimingModelName = Literal["paper", "standard"]
 TransactionKind = Literal["read", "write"]
@@ -113,7 +113,7 @@ def _standard_packets(kind: TransactionKind, payload_bytes: Number, _overhead_by
         )
     return PacketSizes(
         request_bytes=choose(is_quadlet, QUADLET_WRITE_REQUEST_BYTES, BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + data_bytes),
-        response_bytes=WRITE_RESPONSE_BYTES,
+        response_bytes=worded(alike(WRITE_RESPONSE_BYTES, payload_bytes), WRITE_RESPONSE_BYTES.meaning),
     )
 
 
@@ -182,7 +182,7 @@ def transaction(
     >>> round(phases.request_and_acknowledge_us, 3)
     5.347
     """
-    clock_mbit_s = model.gap_clock_mbit_s(link.data_rate_mbit_s)
+    clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
     packets = model.packets(kind, payload_bytes, overhead_bytes)
 
     def data_us(packet_bytes: float) -> float:

@@ -77,7 +77,7 @@ def models_part(answer: Overview, sources: Sources) -> Part:
     )
     columns = (Column(one.timing_model, group=_group(one)) for one in transactions)
     halves = _grid(
-        f"Latency, us: {bus.latency_subject(network_of(answer.profile))}",
+        f"Latency in us, {bus.latency_subject(network_of(answer.profile))}",
         (*_HEAD[:2], *columns),
         latency_table_rows(bus),
         sources["latency"],
