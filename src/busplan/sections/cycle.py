@@ -4,7 +4,7 @@ A kind of bus adds its own keys in a class of its own. The limits of its standar
 breaks them loads, and the analysis says why it does not fit.
 """
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
@@ -23,6 +23,9 @@ class BusSection(Section):
         nodes: int
         timing_model: str
 
+        def __getattr__(self, key: str) -> Any:
+            """A key of the kind of bus, which only a run knows."""
+
 
 class CycleSection(Section):
     """Section [cycle]: the communication period and what of it is for communication."""
@@ -37,12 +40,22 @@ class CycleSection(Section):
         default=0.0, description="Time kept for non-periodic data in each cycle T_npd [us]", examples=[0]
     )
 
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """A key of the kind of bus, which only a run knows."""
+
 
 class PayloadSection(Section):
     """Section [payload]: what is read from and written to each node in a cycle."""
 
     read_bytes: Count = Field(description="Payload of the read transaction [bytes]", examples=[12])
     write_bytes: Count = Field(description="Payload of the write transaction [bytes]", examples=[12])
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """A key of the kind of bus, which only a run knows."""
 
 
 class NodeSection(Section):
