@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.errors import BusplanError
+from busplan.servo.checks import Refused, refuse
 from busplan.servo.delivery import Arrivals
 from busplan.servo.engine import Engine, compiled, is_compiled
 from busplan.servo.kernel import ROUND, Constants, run_rows
@@ -213,14 +213,13 @@ def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> in
     cycles = len(setpoints_mm) - 1
     steps = cycles * timing.steps_per_period
     if steps > MAX_STEPS:
-        raise BusplanError(
-            f"step_us = {timing.step_us}: the move takes {steps} steps, more than {MAX_STEPS}; "
-            f"choose a longer step or a shorter move"
-        )
+        right = f"the move takes {steps} steps, more than {MAX_STEPS}; choose a longer step or a shorter move"
+        refuse(Refused("step_us", timing.step_us, right))
     travel_mm = float(np.abs(setpoints_mm).max()) + axis.max_velocity_mm_s * cycles * timing.period_us / _US_PER_S
     if travel_mm > _LARGEST_COUNT * axis.encoder_resolution_mm > 0:
-        raise BusplanError(
-            f"encoder_resolution_mm = {axis.encoder_resolution_mm}: too fine for {travel_mm:.3g} mm of travel; "
+        right = (
+            f"too fine for {travel_mm:.3g} mm of travel; "
             f"choose at least {travel_mm / _LARGEST_COUNT:.3g} mm, or 0 (ideal)"
         )
+        refuse(Refused("encoder_resolution_mm", axis.encoder_resolution_mm, right))
     return steps
