@@ -233,11 +233,12 @@ def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch, loop: str) -> None:
     kwargs = {"axis": an_axis(**FULL), "timing": timing, "arrivals": arriving, "engine": "python"}
     whole = simulate_axis(setpoints, **kwargs)  # type: ignore[arg-type]
     monkeypatch.setattr(axis_module, "_CHUNK_STEPS", {False: 70, True: 70})
-    done: list[int] = []
-    np.testing.assert_array_equal(simulate_axis(setpoints, **kwargs, progress=done.append), whole)  # type: ignore[arg-type]
-    assert len(done) == math.ceil(300 / 7)
-    assert done == sorted(done)
-    assert done[-1] == len(whole) == 3000
+    told: list[tuple[int, int]] = []
+    chunked = simulate_axis(setpoints, **kwargs, progress=lambda *one: told.append(one))  # type: ignore[arg-type]
+    np.testing.assert_array_equal(chunked, whole)
+    assert len(told) == math.ceil(300 / 7)
+    assert told == sorted(told)
+    assert told[-1] == (len(whole), len(whole)) == (3000, 3000)
 
 
 def test_memory_grows_by_no_more_than_16_bytes_a_step(monkeypatch: pytest.MonkeyPatch) -> None:

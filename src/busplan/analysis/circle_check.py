@@ -1,9 +1,10 @@
 """The circle test as a question that a search asks many times: what does it not hold?"""
 
 from busplan.analysis.capacity import figures
-from busplan.analysis.circle_test import Progress, circle_test
+from busplan.analysis.circle_test import circle_test
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
+from busplan.progress import Progress
 
 _PARTS = 1000
 """Parts of one test that progress counts."""

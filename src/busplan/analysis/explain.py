@@ -4,7 +4,7 @@ Nothing is computed a second time by other means: the functions that give the fi
 what was done with them (`busplan.analysis.trace`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, Final, NamedTuple
 
@@ -18,9 +18,9 @@ from busplan.analysis.writing import written
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.toml import override
+from busplan.progress import Progress
 from busplan.timing import TRANSACTION_KINDS, TimingModelName, TransactionKind
 
-Progress = Callable[[int, int], None]
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest, and what is not for anyone to know."""
 

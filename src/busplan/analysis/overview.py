@@ -3,7 +3,7 @@
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity import Capacity, capacity
-from busplan.analysis.circle_test import CircleFigures, CircleTest, Progress, circle_test
+from busplan.analysis.circle_test import CircleFigures, CircleTest, circle_test
 from busplan.analysis.contour_profile import ContourProfile, contour_profile
 from busplan.analysis.explain import assumptions
 from busplan.analysis.latency import BOTH_MODELS, LatencyResult, latency
@@ -14,6 +14,7 @@ from busplan.analysis.verdict import Verdict, verdicts
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.sections import MAX_TIME_US, MIN_STEP_US
+from busplan.progress import Progress
 
 CONTOUR_SECTORS: Final = 720
 """Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""

@@ -15,9 +15,10 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from busplan.analysis.circle_test import CircleFigures, Progress
+    from busplan.analysis.circle_test import CircleFigures
     from busplan.analysis.difference import Difference
     from busplan.profile.model import Profile
+    from busplan.progress import Progress
 
 
 def diff_command(

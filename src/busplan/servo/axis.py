@@ -1,11 +1,11 @@
 """One axis from its set-points to its position, by a fixed-step simulation of loop and drive."""
 
-from collections.abc import Callable, MutableSequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from busplan.progress import Progress
 from busplan.servo.checks import Refused, refuse
 from busplan.servo.delivery import Arrivals
 from busplan.servo.engine import Engine, compiled, is_compiled
@@ -13,8 +13,10 @@ from busplan.servo.kernel import ROUND, Constants, run_rows
 from busplan.servo.parameters import Axis, LoopTiming
 from busplan.servo.plan import Plan, plans, stored_targets_mm
 
+if TYPE_CHECKING:
+    from collections.abc import MutableSequence
+
 Floats = NDArray[np.float64]
-Progress = Callable[[int], None]
 
 MAX_STEPS = 50_000_000
 """Two axes of that many positions take 800 MB."""
@@ -55,7 +57,7 @@ def simulate_axis(
         A loop on the host loses a velocity command instead of a set-point, and the last one stands whatever
         `on_loss` says: to hold a velocity is to extrapolate a position.
     progress
-        Called with the number of steps done, now and then.
+        Called with the number of steps done and to be done, now and then.
     engine
         "auto" (numba when it is installed), "numba" or "python"; the result is the same.
 
@@ -111,7 +113,7 @@ def simulate_axis(
         # Plain Python handles its own floats twice as fast as numpy's.
         done += run(state, constants, out, *plan) if run else _run_plain(state, constants, plan, out)
         if progress is not None:
-            progress(done)
+            progress(done, len(position_mm))
     return position_mm
 
 

@@ -1,13 +1,14 @@
 """The circle test: path, bus, both axes, mechanics and measures, joined."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from busplan.progress import Progress
 from busplan.servo.axis import axis_targets, checked_steps, simulate_axis
 from busplan.servo.checks import Refused, refuse
 from busplan.servo.contour import Contour, contour_error, covered_deg, measure_contour
@@ -19,7 +20,6 @@ from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 _IDEAL_DELIVERY = Delivery()
 _IDEAL_MECHANICS = Mechanics()
@@ -191,7 +191,7 @@ def simulate_circle(
     arrivals_x, arrivals_y = received(name="x"), received(name="y")
     total = 2 * path.setpoints * timing.steps_per_period
 
-    def report(done_before: int, done: int) -> None:
+    def report(done_before: int, done: int, _axis_total: int) -> None:
         if progress is not None:
             progress(done_before + done, total)
 
