@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
 from busplan.errors import BusplanError, PlacedError
-from busplan.profile.collect import Source
+from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.rules import bus, circle
@@ -41,7 +41,7 @@ class FileResult(NamedTuple):
 
 
 def check_source(
-    source: Source,
+    source: ProfileSource,
     *,
     with_circle: bool = True,
     recorded: Mapping[str, Recorded] | None = None,

@@ -11,7 +11,7 @@ from busplan.servo.delivery import Arrivals
 from busplan.servo.engine import Engine, compiled, is_compiled
 from busplan.servo.kernel import ROUND, Constants, run_rows
 from busplan.servo.parameters import Axis, LoopTiming
-from busplan.servo.plan import Plan, plans, stored_targets_mm
+from busplan.servo.rows import KernelRows, kernel_rows, stored_targets_mm
 
 if TYPE_CHECKING:
     from collections.abc import MutableSequence
@@ -108,10 +108,10 @@ def simulate_axis(
     run = compiled(run_rows, _SIGNATURE) if is_compiled(engine) else None
     chunk_steps = _CHUNK_STEPS[run is not None]
     state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
-    for plan in plans(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
+    for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
         out = position_mm[done:]
         # Plain Python handles its own floats twice as fast as numpy's.
-        done += run(state, constants, out, *plan) if run else _run_plain(state, constants, plan, out)
+        done += run(state, constants, out, *rows) if run else _run_plain(state, constants, rows, out)
         if progress is not None:
             progress(done, len(position_mm))
     return position_mm
@@ -143,17 +143,17 @@ def axis_targets(
     """
     arrivals = Arrivals.punctual(len(setpoints_mm) - 1) if arrivals is None else arrivals
     kept, passed = [np.empty(0)], 0
-    for plan in plans(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=_CHUNK_STEPS[False]):
-        targets = stored_targets_mm(plan)
+    for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=_CHUNK_STEPS[False]):
+        targets = stored_targets_mm(rows)
         kept.append(targets[(-1 - passed) % every :: every])
         passed += len(targets)
     return np.concatenate(kept)
 
 
-def _run_plain(state: Floats, constants: Constants, plan: Plan, out: Floats) -> int:
+def _run_plain(state: Floats, constants: Constants, rows: KernelRows, out: Floats) -> int:
     floats = state.tolist()
     stored = run_rows(
-        floats, constants, cast("MutableSequence[float]", out.data), *(column.tolist() for column in plan)
+        floats, constants, cast("MutableSequence[float]", out.data), *(column.tolist() for column in rows)
     )
     state[:] = floats
     return stored

@@ -11,16 +11,16 @@ from busplan.report.latency import LATENCY_ROWS
 from busplan.report.lines import GridRow, count, percent, plural, us, yes
 from busplan.report.page.charts.axes import axes_chart
 from busplan.report.page.charts.terms import LEFT, TERMS, terms_chart
-from busplan.report.page.content import Chart, Column, Part, Row, Source, Swatch, Table, Verdict
+from busplan.report.page.content import Chart, Part, Row, ShownVerdict, SourceCommand, Swatch, Table, TableColumn
 from busplan.report.timeline.kinds import KINDS
 from busplan.report.timeline.lanes import drawn_window, subject
 from busplan.report.timeline.mermaid import timeline_mermaid
 from busplan.report.timeline.svg import is_coarse, timeline_svg
 from busplan.report.words import verdict_lines
 
-Sources = Mapping[str, Source]
+Sources = Mapping[str, SourceCommand]
 
-_HEAD: Final = (Column("", "words"), Column("eq", "words"), Column("unit", "words"))
+_HEAD: Final = (TableColumn("", "words"), TableColumn("eq", "words"), TableColumn("unit", "words"))
 
 
 def plain(value: float) -> str:
@@ -34,7 +34,7 @@ def plain(value: float) -> str:
     return f"{value:.12g}"
 
 
-def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
+def bus_verdict(answer: Overview, sources: Sources) -> ShownVerdict:
     """Does the cycle fit, and do the timing models agree?"""
     verdict, source = answer.verdict, sources["capacity"]
     word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
@@ -47,7 +47,7 @@ def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
         (f"margin, {one.timing_model}", source.figure(f"/results/{index}/margin_us", us, "us"))
         for index, one in enumerate(answer.capacity.results)
     )
-    return Verdict(
+    return ShownVerdict(
         "Does the cycle fit its period?",
         word,
         "good" if verdict.all_well else "bad",
@@ -69,13 +69,13 @@ def models_part(answer: Overview, sources: Sources) -> Part:
     decides = answer.profile.bus.timing_model
     cycle = _grid(
         f"The cycle; the {decides} model decides",
-        (*_HEAD, *(Column(one.timing_model) for one in results)),
+        (*_HEAD, *(TableColumn(one.timing_model) for one in results)),
         CAPACITY_ROWS,
         sources["capacity"],
         [f"/results/{index}" for index in range(len(results))],
         figures=FIGURES["capacity"],
     )
-    columns = (Column(one.timing_model, group=f"{one.transaction} {one.payload_bytes} B") for one in transactions)
+    columns = (TableColumn(one.timing_model, group=f"{one.transaction} {one.payload_bytes} B") for one in transactions)
     halves = _grid(
         "One transaction of the farthest node, us",
         (*_HEAD[:2], *columns),
@@ -94,9 +94,9 @@ def models_part(answer: Overview, sources: Sources) -> Part:
 
 def _grid(
     caption: str,
-    columns: Sequence[Column],
+    columns: Sequence[TableColumn],
     rows: Sequence[GridRow],
-    source: Source,
+    source: SourceCommand,
     owners: Sequence[str],
     *,
     figures: Mapping[str, Figure],
@@ -141,7 +141,13 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
     totals = source.value("/totals")
     table = Table(
         "What takes the slice" if plan.figures.fits else "What takes the cycle",
-        (Column("kind", "words"), Column("eq", "words"), Column("events"), Column("us"), Column("%")),
+        (
+            TableColumn("kind", "words"),
+            TableColumn("eq", "words"),
+            TableColumn("events"),
+            TableColumn("us"),
+            TableColumn("%"),
+        ),
         tuple(
             Row(
                 (
@@ -166,7 +172,7 @@ def terms_part(answer: Overview, sources: Sources) -> Part:
     )
     table = Table(
         "Terms of the cycle, us",
-        (Column("term", "words"), Column("eq", "words"), *(Column(one.timing_model) for one in results)),
+        (TableColumn("term", "words"), TableColumn("eq", "words"), *(TableColumn(one.timing_model) for one in results)),
         tuple(
             Row(
                 (
@@ -192,7 +198,7 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
         axes_chart(answer.profile, answer.steps),
     )
     columns = [
-        Column(word, "words" if word == "limited by" else "figures", one.timing_model)
+        TableColumn(word, "words" if word == "limited by" else "figures", one.timing_model)
         for one in answer.steps
         for word in ("nodes", "axes", "limited by")
     ]
@@ -210,7 +216,7 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
             )
         )
     table = Table(
-        "Most nodes and axes; the profile's own period in bold", (Column("period, us"), *columns), tuple(rows)
+        "Most nodes and axes; the profile's own period in bold", (TableColumn("period, us"), *columns), tuple(rows)
     )
     return Part("axes", "Axes against period", charts=(chart,), tables=(table,), commands=(source.anchor,))
 
