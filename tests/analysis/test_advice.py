@@ -11,9 +11,9 @@ from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.planning.cures import MAX_ADVISED_RATIO, Change, change_for_more, change_to_fit
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 BOTH: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)

@@ -13,10 +13,10 @@ from busplan.analysis.calibration.calibrate import Calibration, calibrate
 from busplan.analysis.latency import phases
 from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TimingModelName
 from busplan.errors import BusplanError
-from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.profile.measurements import Measurement, parse_measurements
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, locate_measurements
+from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")

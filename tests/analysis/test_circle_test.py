@@ -9,9 +9,9 @@ from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.contour_profile import contour_profile
 from busplan.analysis.circle.roundness import CircleFigures, circle_test, to_attack
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 

@@ -13,9 +13,9 @@ from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.comparison.difference import CIRCLE, CYCLE, PLAN, Difference, Figure, difference
 from busplan.errors import BusplanError
 from busplan.profile.keys import dotted_keys
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 

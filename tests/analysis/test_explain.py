@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from busplan.analysis.quantities import FIGURES
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,14 +21,13 @@ from busplan.analysis.derivation.latency import latency_figures
 from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.derivation.verdict import VERDICT_KEYS
 from busplan.analysis.latency import BOTH_MODELS, latency
-from busplan.analysis.quantities import FIGURES
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.report.documents import capacity_document, latency_rows
+from busplan.sections.profile import Profile
 
 MODELS = st.sampled_from(["paper", "standard"])
 Make = Callable[..., Profile]

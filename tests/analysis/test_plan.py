@@ -14,9 +14,9 @@ from busplan.analysis.planning.cures import MAX_ADVISED_RATIO
 from busplan.analysis.planning.options import plan
 from busplan.buses.ieee1394.timing import TIMING_MODELS
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]

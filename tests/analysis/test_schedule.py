@@ -15,8 +15,8 @@ from busplan.analysis.latency import BOTH_MODELS, phases
 from busplan.analysis.timeline.schedule import MOST_NODES, schedule, totals, zoom
 from busplan.buses.ieee1394.timing import TRANSACTION_KINDS
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
+from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from busplan.analysis.circle.check import CircleCheck
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.planning.best_values import largest_payload, most_nodes, smallest_period, smallest_ratio
-from busplan.sections.profile import Profile
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 TimingModelName = Literal["paper", "standard"]
 Make = Callable[..., Profile]

@@ -17,8 +17,8 @@ from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 

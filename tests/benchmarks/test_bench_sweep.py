@@ -17,8 +17,8 @@ import pytest
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
 from busplan.analysis.sweep.grid import Chunk, Grid, Steps, checked_grid
-from busplan.sections.profile import Profile
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 MODELS = ("paper", "standard")
 GRIDS = {

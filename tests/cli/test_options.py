@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from busplan.cli.options import bus_changes, complete_profile, parse_sizes, periods_us, timing_models
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
+from busplan.sections.profile import Profile
 
 
 @cache

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from busplan.errors import BusplanError
 from busplan.profile.document import Document
 from busplan.profile.edit import edited, edited_file
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
+from busplan.sections.profile import Profile
 
 LINEAR = {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}
 TABLE = {"kind": "table", "payload_bytes": [4, 64, 1024], "time_us": [30, 50.5, 400.0]}

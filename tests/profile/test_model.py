@@ -19,6 +19,7 @@ from busplan.buses.ieee1394.section import (
 from busplan.sections.cycle import NodeSection
 from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.sections.profile import Profile
+from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
 
@@ -507,3 +508,13 @@ def test_a_linear_execution_time_knows_every_payload() -> None:
 def test_the_kind_of_bus_is_the_unions_tag() -> None:
     assert refused(bus__kind="can")
     assert isinstance(profile().bus, Ieee1394Bus)
+
+
+def test_what_a_profile_does_not_say_is_what_the_servo_core_assumes() -> None:
+    profile = Profile.model_validate(data())
+    assert Axis(**profile.servo.axis_keys("x")) == Axis()
+    assert Delivery(**profile.delivery.model_dump()) == Delivery()
+    assert Mechanics(**profile.mechanics.model_dump()) == Mechanics()
+    assert LoopTiming(period_us=4000, step_us=profile.servo.step_us, loop=profile.servo.loop) == LoopTiming(
+        period_us=4000, interpolation=profile.servo.interpolation
+    )

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.sections.execution import TableExecution
 from busplan.profile.shipped import load, locate, shipped_folder, shipped_names
 from busplan.profile.starter import starter_text
 from busplan.profile.toml import decode, validate
+from busplan.sections.execution import TableExecution
 
 NAMES = ["paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]
 

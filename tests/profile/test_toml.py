@@ -11,10 +11,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
-from busplan.sections.execution import TableExecution
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import MAX_FILE_BYTES, decode, override, read_bytes, validate
+from busplan.sections.execution import TableExecution
+from busplan.sections.profile import Profile
 
 TEXT: Final = """\
 schema_version = 1

@@ -4,10 +4,10 @@ import tomllib
 
 import pytest
 
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text
+from busplan.sections.profile import Profile
 
 
 def read(text: str) -> Profile:

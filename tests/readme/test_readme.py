@@ -17,12 +17,12 @@ from busplan.analysis.capacity.figures import CapacityFigures, capacity
 from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
 from busplan.analysis.latency import latency
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.report.documents import capacity_rows, latency_rows
 from busplan.report.explain import constant_rows, equation_rows
 from busplan.report.markdown import code, table
 from busplan.sections.machine import AxisOverride
+from busplan.sections.profile import Profile
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

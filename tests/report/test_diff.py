@@ -11,12 +11,12 @@ from markdown_it import MarkdownIt
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.comparison.difference import CYCLE, PLAN, Difference, difference
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.changes import shown_value
 from busplan.report.diff import diff_document, diff_lines, diff_markdown, regression_words
 from busplan.report.text import to_json
+from busplan.sections.profile import Profile
 
 AB = ("a.toml", "b.toml")
 

@@ -19,19 +19,19 @@ from markdown_it import MarkdownIt
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.analysis.overview import Overview, overview
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.report.page.chapters import Subject, page
+from busplan.report.page.chapters import ReportedProfile, page
 from busplan.report.page.charts.axes import axes_chart, drawn_range
 from busplan.report.page.charts.bars import signed_bar
 from busplan.report.page.charts.circle import circle_chart, magnified
 from busplan.report.page.charts.terms import TERMS, terms_chart
 from busplan.report.page.commands import shell_word
-from busplan.report.page.content import Figure, Page
+from busplan.report.page.content import Page, ShownFigure
 from busplan.report.page.html import page_html
 from busplan.report.page.markdown import page_markdown
 from busplan.report.timeline.kinds import KINDS
+from busplan.sections.profile import Profile
 
 SVG = "{http://www.w3.org/2000/svg}"
 BASE = load("paper-4ms").profile
@@ -52,7 +52,7 @@ def changed(**changes: object) -> Profile:
 
 
 def made(*profiles: Profile, title: str | None = None) -> Page:
-    subjects = [Subject(f"{number}.toml", overview(one, with_circle=False), other_period=False)
+    subjects = [ReportedProfile(f"{number}.toml", overview(one, with_circle=False), other_period=False)
                 for number, one in enumerate(profiles)]  # fmt: skip
     return page(subjects, title=title)
 
@@ -123,7 +123,7 @@ def test_a_shell_gives_back_any_path(raw: bytes) -> None:
 
 
 def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
-    one = Subject("paper-4ms", simulated(), other_period=False)
+    one = ReportedProfile("paper-4ms", simulated(), other_period=False)
     html = page_html(page([one, one], title=None))
     assert html == page_html(page([one, one], title=None))
     assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)", html) == []
@@ -147,21 +147,21 @@ def test_headings_go_down_one_by_one_and_tables_have_scopes() -> None:
 
 
 def test_only_the_parts_in_their_order() -> None:
-    chapter = page([Subject("x", simulated(), other_period=False)], title=None).chapters[0]
+    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
     assert [part.key for part in chapter.parts] == [
         *("verdict", "models", "timeline", "terms", "axes", "circle", "sources", "assumptions", "commands"),
     ]
 
 
 def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> None:
-    chapter = page([Subject("x", simulated(), other_period=False)], title=None).chapters[0]
+    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
     documents = {one.anchor: one for one in chapter.sources}
     seen = 0
     for table in (table for part in chapter.parts for table in part.tables):
         for row in table.rows:
             for column, cell in zip(table.columns, row.cells, strict=True):
                 model = next((one for one in (column.heading, column.group) if one in ("paper", "standard")), None)
-                if isinstance(cell, Figure) and model is not None:
+                if isinstance(cell, ShownFigure) and model is not None:
                     owner = documents[cell.source].value("/".join(cell.pointer.split("/")[:3]))
                     assert owner["timing_model"] == model
                     assert owner.get("transaction", "") in column.group
@@ -170,18 +170,18 @@ def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> Non
 
 
 def test_a_row_of_periods_holds_the_figures_of_its_period() -> None:
-    chapter = page([Subject("x", simulated(), other_period=False)], title=None).chapters[0]
+    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
     (part,) = (part for part in chapter.parts if part.key == "axes")
     (source,) = (one for one in chapter.sources if one.anchor == part.commands[0])
     for row in part.tables[0].rows:
-        figures = [cell for cell in row.cells if isinstance(cell, Figure)]
+        figures = [cell for cell in row.cells if isinstance(cell, ShownFigure)]
         periods = {source.value("/".join(cell.pointer.split("/")[:3]))["period_us"] for cell in figures}
         assert periods == {figures[0].value}
     assert [row.cells[0].text for row in part.tables[0].rows if row.level] == ["4000"]  # type: ignore[union-attr]
 
 
 def test_markdown_says_the_same_as_html() -> None:
-    content = page([Subject("paper-4ms", simulated(), other_period=False)], title=None)
+    content = page([ReportedProfile("paper-4ms", simulated(), other_period=False)], title=None)
     markdown = page_markdown(content)
     rendered = Tags(MarkdownIt("commonmark").enable("table").render(markdown)).text
     for part in content.chapters[0].parts:
@@ -214,7 +214,7 @@ def test_markdown_says_the_same_as_html() -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
-    content = page([Subject("x", overview(profile), other_period=False)], title=None)
+    content = page([ReportedProfile("x", overview(profile), other_period=False)], title=None)
     assert words in Tags(page_html(content)).text
     assert "nan" not in page_html(content).lower().replace("nano", "")
     assert words.partition(":")[0] in page_markdown(content).replace("\\", "")
@@ -226,7 +226,7 @@ def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
 )
 def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
     profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)
-    html = page_html(page([Subject("x", overview(profile), other_period=False)], title=None))
+    html = page_html(page([ReportedProfile("x", overview(profile), other_period=False)], title=None))
     assert len(html.encode()) < 300_000
     assert said in Tags(html).text
     lanes = re.findall(r"by node</text>.*?</svg>", html, re.DOTALL)

@@ -10,7 +10,6 @@ import pytest
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.latency import latency
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.report.capacity import capacity_lines
@@ -19,6 +18,7 @@ from busplan.report.latency import latency_lines
 from busplan.report.lines import table, us
 from busplan.report.text import to_csv, to_json
 from busplan.report.words import period, verdict_lines
+from busplan.sections.profile import Profile
 
 
 @pytest.fixture

@@ -11,12 +11,12 @@ from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.sweep.blocks import FIGURES, Block, Column, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
 from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.sections.profile import Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report import documents, text
 from busplan.report.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
 from busplan.report.sweep.top import Tally, TopRows
+from busplan.sections.profile import Profile
 
 BOTH: tuple[TimingModelName, ...] = ("paper", "standard")
 AXES: dict[str, Values] = {

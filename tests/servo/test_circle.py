@@ -31,7 +31,8 @@ TURN_PER_S = FEED_MM_S / RADIUS_MM
 
 
 def an_axis(**changes: Any) -> Axis:
-    values: dict[str, Any] = {"position_gain_per_s": 50.0, "max_velocity_mm_s": 400.0}
+    """An ideal drive under a P loop alone."""
+    values: dict[str, Any] = {"position_gain_per_s": 50.0, "velocity_feedforward": 0.0, "max_velocity_mm_s": 400.0}
     return Axis(**(values | changes))
 
 

@@ -35,7 +35,8 @@ TIMINGS = [
 
 
 def an_axis(**changes: Any) -> Axis:
-    values: dict[str, Any] = {"position_gain_per_s": 100.0, "max_velocity_mm_s": 1e6}
+    """A loop alone: its response is that of its target."""
+    values: dict[str, Any] = {"position_gain_per_s": 100.0, "velocity_feedforward": 0.0, "max_velocity_mm_s": 1e6}
     return Axis(**(values | changes))
 
 

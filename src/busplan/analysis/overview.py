@@ -6,13 +6,14 @@ from busplan.analysis.capacity.figures import Capacity, capacity
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.circle.contour_profile import ContourProfile, contour_profile
-from busplan.analysis.circle.roundness import CircleFigures, CircleTest, Progress, circle_test
+from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
 from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.trace import Input
 from busplan.analysis.latency import LatencyResult, latency
 from busplan.analysis.network import model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
+from busplan.progress import Progress
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 

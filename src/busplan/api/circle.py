@@ -1,6 +1,6 @@
 """`busplan.circle_test`."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.analysis.circle import roundness as analysis
@@ -8,6 +8,7 @@ from busplan.analysis.circle.contour_profile import contour_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, items, load_profile
+from busplan.progress import Progress
 from busplan.report import documents
 from busplan.report.circle import PLOT_SECTORS, circle_lines
 from busplan.report.lines import Line
@@ -60,7 +61,7 @@ def circle_test(
     *,
     periods_us: Iterable[float] | None = None,
     with_contributions: bool = False,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> CircleTestAnswer:
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 

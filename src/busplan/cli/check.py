@@ -13,7 +13,7 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from busplan.profile.collect import Source
+    from busplan.profile.collect import ProfileSource
     from busplan.rules.gate import FileResult
     from busplan.rules.report import CheckReport
 
@@ -106,7 +106,9 @@ def check_command(
         raise PlanFailsError
 
 
-def _check(sources: "Sequence[Source]", one: "Callable[[Source], FileResult]", *, jobs: int) -> "CheckReport":
+def _check(
+    sources: "Sequence[ProfileSource]", one: "Callable[[ProfileSource], FileResult]", *, jobs: int
+) -> "CheckReport":
     from busplan.rules.report import CheckReport
 
     workers = min(jobs, len(sources))

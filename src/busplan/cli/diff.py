@@ -15,8 +15,9 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from busplan.analysis.circle.roundness import CircleFigures, Progress
+    from busplan.analysis.circle.roundness import CircleFigures
     from busplan.analysis.comparison.difference import Difference
+    from busplan.progress import Progress
     from busplan.sections.profile import Profile
 
 

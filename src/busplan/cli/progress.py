@@ -1,19 +1,21 @@
 """A progress bar on stderr for what takes longer than a second; nothing where stderr is no terminal."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic
 from typing import TYPE_CHECKING
 
+from busplan.progress import Progress
+
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich.progress import Progress as Bar
 
 _PATIENCE_S = 1.0
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
+def progress_bar(title: str) -> Iterator[Progress]:
     """Give a function that takes the work done and the work to do.
 
     Parameters
@@ -22,7 +24,7 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
         What is under way.
     """
     started = monotonic()
-    bar: Progress | None = None
+    bar: Bar | None = None
 
     def report(done: int, total: int) -> None:
         nonlocal bar
@@ -40,7 +42,7 @@ def progress_bar(title: str) -> Iterator[Callable[[int, int], None]]:
             bar.stop()
 
 
-def _start() -> "Progress":
+def _start() -> "Bar":
     from rich.console import Console
     from rich.progress import Progress
 

@@ -102,14 +102,14 @@ def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, period: str | None, circle: bool
 ) -> "Page":
     from busplan.analysis.overview import overview
-    from busplan.report.page.chapters import Subject, page
+    from busplan.report.page.chapters import ReportedProfile, page
 
     subjects = []
     with progress_bar("circle tests") as progress:
         for number, (argument, plan) in enumerate(zip(arguments, plans, strict=True)):
             own = part_of(progress, number=number, of=len(plans))
             answer = overview(plan, with_circle=circle, progress=own)
-            subjects.append(Subject(argument, answer, other_period=period is not None))
+            subjects.append(ReportedProfile(argument, answer, other_period=period is not None))
     return page(subjects, title=title)
 
 

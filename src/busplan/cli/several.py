@@ -1,14 +1,15 @@
 """What commands of several profiles share: reading them all, and one progress over all of their work."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
 
 from busplan.errors import BusplanError
+from busplan.progress import Progress
 
 if TYPE_CHECKING:
-    from busplan.sections.profile import Profile
+    from collections.abc import Callable
 
-Progress = Callable[[int, int], None]
+    from busplan.sections.profile import Profile
 
 _PARTS: Final = 1000
 """Parts of one piece of work that the whole's progress counts."""

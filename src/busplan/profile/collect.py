@@ -14,7 +14,7 @@ _CLAIM = re.compile(rb"^(?:\xef\xbb\xbf)?[ \t]*[\"']?schema_version[\"']?[ \t]*=
 _SKIPPED_FOLDERS = {"node_modules", "__pycache__"}
 
 
-class Source(NamedTuple):
+class ProfileSource(NamedTuple):
     """One profile to read, and what to call it; or a path that could not be followed."""
 
     path: Path
@@ -26,7 +26,7 @@ class Source(NamedTuple):
 class Collection(NamedTuple):
     """What a list of paths means."""
 
-    sources: tuple[Source, ...]
+    sources: tuple[ProfileSource, ...]
     skipped: tuple[str, ...]
     """TOML files below a folder that claim no `schema_version`."""
 
@@ -48,7 +48,7 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
         Sources in the order of the arguments, and by name within a folder; a path that means nothing is one too, with
         its failure. Names are from the working folder for all that lies below it, however it was written.
     """
-    sources: dict[str, Source] = {}
+    sources: dict[str, ProfileSource] = {}
     names: set[str] = set()
     skipped: list[str] = []
     for argument in arguments:
@@ -63,20 +63,20 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
     return Collection(tuple(sources.values()), tuple(skipped))
 
 
-def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[Source]:
+def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[ProfileSource]:
     """What one argument means: one source, or all below a folder."""
     try:
         path, name = locate(argument)
         if argument == "-":
-            yield Source(path, stdin_name)
+            yield ProfileSource(path, stdin_name)
         elif name != argument:  # a shipped name, whatever lies in the working folder
-            yield Source(path, name)
+            yield ProfileSource(path, name)
         elif path.is_dir():
             yield from _below(path, skipped)
         else:
-            yield Source(path, _name(path))
+            yield ProfileSource(path, _name(path))
     except (BusplanError, ValueError) as error:  # ValueError: a NUL in the path
-        yield Source(Path(argument), argument, str(error))
+        yield ProfileSource(Path(argument), argument, str(error))
 
 
 def _place(path: Path) -> Path:
@@ -94,7 +94,7 @@ def _name(path: Path) -> str:
     return (path if place.is_absolute() else place).as_posix()
 
 
-def _below(folder: Path, skipped: list[str]) -> Iterator[Source]:
+def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
     """Every profile below a folder, in the order of their names, and every folder that cannot be looked into."""
     unreadable: list[OSError] = []
     found = False
@@ -106,15 +106,15 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[Source]:
             path = Path(root) / name
             if _claims(path):
                 found = True
-                yield Source(path, _name(path))
+                yield ProfileSource(path, _name(path))
             else:
                 skipped.append(_name(path))
     for error in unreadable:
         name = _name(Path(error.filename))
-        yield Source(Path(error.filename), name, f"{name}: cannot be read: {error.strerror}")
+        yield ProfileSource(Path(error.filename), name, f"{name}: cannot be read: {error.strerror}")
     if not found and not unreadable:
         name = _name(folder)
-        yield Source(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
+        yield ProfileSource(folder, name, f"{name}: no profile below this folder (a *.toml with a schema_version)")
 
 
 def _claims(path: Path) -> bool:

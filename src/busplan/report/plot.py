@@ -3,12 +3,13 @@
 from importlib import import_module
 from importlib.util import find_spec
 from io import BytesIO
-from math import ceil, floor, log10
+from math import ceil
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from busplan.errors import BusplanError
+from busplan.report.scale import round_steps
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures, CircleTest
@@ -102,8 +103,7 @@ def _every(points: int) -> int:
 
 def nice_step(largest: float) -> float:
     """The 1, 2 or 5 times a power of ten that divides up to `largest` into two to five parts."""
-    magnitude: float = 10.0 ** floor(log10(largest / 2))
-    return max(factor * magnitude for factor in (1, 2, 5) if factor * magnitude <= largest / 2)
+    return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
 
 
 def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:

@@ -4,11 +4,40 @@ from math import ceil, floor, log10
 from typing import NamedTuple
 
 
+class RoundStep(NamedTuple):
+    """1, 2 or 5 times a power of ten."""
+
+    factor: int
+    power: int
+
+    @property
+    def size(self) -> float:
+        """As a number."""
+        return self.factor * 10.0**self.power
+
+
 class Tick(NamedTuple):
     """One mark of a scale."""
 
     at_us: float
     label: str
+
+
+def round_steps(near: float) -> tuple[RoundStep, ...]:
+    """Round steps about a size, from well below it to well above it.
+
+    Parameters
+    ----------
+    near
+        The size, above 0.
+
+    Examples
+    --------
+    >>> [step.size for step in round_steps(30.0)]
+    [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
+    """
+    power = floor(log10(near))
+    return tuple(RoundStep(factor, power + more) for more in (-1, 0, 1) for factor in (1, 2, 5))
 
 
 def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
@@ -30,11 +59,8 @@ def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
     """
     # A step that is longer than this meets the window no more often than `most`, wherever the window begins.
     smallest_us = (to_us - from_us) / most * (1 + 1e-6)
-    magnitude = floor(log10(smallest_us))
-    factor, power = next(
-        (one, magnitude + add) for add in (0, 1) for one in (1, 2, 5) if one * 10.0 ** (magnitude + add) > smallest_us
-    )
-    step_us = factor * 10.0**power
+    step = next(one for one in round_steps(smallest_us) if one.size > smallest_us)
+    step_us = step.size
     first, last = ceil(from_us / step_us - 1e-9), floor(to_us / step_us + 1e-9)
-    decimals = max(0, -power)
+    decimals = max(0, -step.power)
     return tuple(Tick(number * step_us, f"{number * step_us:.{decimals}f}") for number in range(first, last + 1))

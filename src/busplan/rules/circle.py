@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from busplan.buses.rule import Rule, RuleProblem
-from busplan.errors import BusplanError
 from busplan.rules.finding import Subject
 from busplan.sections.profile import Profile
+from busplan.servo.checks import ParameterError
 
 _NAMED: Final = ("circle", "servo", "delivery", "cycle")
 
@@ -26,9 +26,9 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         return
     try:
         result = circle_test(subject.profile).results[0]
-    except BusplanError as error:
-        for message in error.problems:
-            yield "BP203", RuleProblem(_key_of(message, subject.profile), message)
+    except ParameterError as error:
+        for refused in error.refused:
+            yield "BP203", RuleProblem(_key_of(refused.name, subject.profile), refused.message)
         return
     first = to_attack(result)
     attack = (
@@ -46,9 +46,8 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         yield "BP202" if stability else "BP201", RuleProblem(key, f"{failure.text}{cure}")
 
 
-def _key_of(message: str, profile: Profile) -> str:
-    """Key of the value that a message of the servo core begins with, where the file says it."""
-    name = message.partition(" = ")[0]
+def _key_of(name: str, profile: Profile) -> str:
+    """Key of a parameter of the servo core, where the file says it."""
     for section in _NAMED:
         if name in getattr(profile, section).model_fields_set:
             return f"{section}.{name}"

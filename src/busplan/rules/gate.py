@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
-from busplan.profile.collect import Source
+from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.rules import circle
@@ -42,7 +42,7 @@ class FileResult(NamedTuple):
 
 
 def check_source(
-    source: Source,
+    source: ProfileSource,
     *,
     with_circle: bool = True,
     recorded: Mapping[str, Recorded] | None = None,

@@ -6,10 +6,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from busplan.errors import ProblemKind
+from busplan.servo.checks import LARGEST, SHORTEST_STEP_US
 
 # Bounds that no machine comes near; they keep every product of two quantities finite.
-MAX_TIME_US: Final = 1e9
-MIN_STEP_US: Final = 1e-3
+MAX_TIME_US: Final = LARGEST
+MIN_STEP_US: Final = SHORTEST_STEP_US
 MAX_COUNT: Final = 1_000_000
 
 TimeUs = Annotated[float, Field(ge=0, le=MAX_TIME_US, allow_inf_nan=False)]
@@ -34,7 +35,14 @@ def refused(*problems: Problem) -> PydanticCustomError:
 class Section(BaseModel):
     """What all sections of a profile share."""
 
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", defer_build=True)
+    model_config = ConfigDict(
+        strict=True,
+        frozen=True,
+        extra="forbid",
+        defer_build=True,
+        # In the schema, and so in editors, a section is called by its key.
+        model_title_generator=lambda section: section.__name__.removesuffix("Section"),
+    )
 
 
 _Section = TypeVar("_Section", bound=Section)

@@ -13,7 +13,7 @@ from busplan.sections.base import Problem, Section, refused
 from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection
 from busplan.sections.execution import TableExecution
 from busplan.sections.limits import Limits
-from busplan.sections.machine import Circle, Delivery, Mechanics, Servo, Tolerance
+from busplan.sections.machine import CircleSection, DeliverySection, MechanicsSection, ServoSection, ToleranceSection
 
 SCHEMA_VERSION: Final = 1
 
@@ -53,12 +53,14 @@ class Profile(Section):
     cycle: CycleSection = Field(description="The communication cycle")
     payload: PayloadSection = Field(description="What travels in a cycle")
     node: NodeSection = Field(description="One distributed node")
-    servo: Servo = Field(default_factory=Servo, description="Position loop and drive of both axes")
-    mechanics: Mechanics = Field(default_factory=Mechanics, description="What lies between encoders and table")
-    delivery: Delivery = Field(default_factory=Delivery, description="How set-points arrive at the nodes")
-    circle: Circle = Field(default_factory=Circle, description="The circle of the test")
+    servo: ServoSection = Field(default_factory=ServoSection, description="Position loop and drive of both axes")
+    mechanics: MechanicsSection = Field(
+        default_factory=MechanicsSection, description="What lies between encoders and table"
+    )
+    delivery: DeliverySection = Field(default_factory=DeliverySection, description="How set-points arrive at the nodes")
+    circle: CircleSection = Field(default_factory=CircleSection, description="The circle of the test")
     limits: Limits = Field(default_factory=Limits, description="What the gate asks for beyond fitting")
-    tolerance: Tolerance = Field(default_factory=Tolerance, description="What the circle test must hold")
+    tolerance: ToleranceSection = Field(default_factory=ToleranceSection, description="What the circle test must hold")
 
     @property
     def asks_for_circle(self) -> bool:

@@ -4,6 +4,6 @@ One axis after the other is simulated at a fixed step, from the set-points of a 
 table; what comes out is measured as ISO 230-4 measures real machines, and the stability margins of the position
 loop stand beside it. Nothing here opens a file, prints, or knows a profile.
 
-Read in this order: `parameters` (what can be set), `path`, `delivery`, `plan`, `kernel`, `axis`, `mechanics`,
+Read in this order: `parameters` (what can be set), `path`, `delivery`, `rows`, `kernel`, `axis`, `mechanics`,
 `contour`, `margins`, `circle` (all of it joined). Only `parameters` and `checks` do without numpy.
 """

@@ -1,20 +1,22 @@
 """One axis from its set-points to its position, by a fixed-step simulation of loop and drive."""
 
-from collections.abc import Callable, MutableSequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.errors import BusplanError
+from busplan.progress import Progress
+from busplan.servo.checks import Refused, refuse
 from busplan.servo.delivery import Arrivals
 from busplan.servo.engine import Engine, compiled, is_compiled
 from busplan.servo.kernel import ROUND, Constants, run_rows
 from busplan.servo.parameters import Axis, LoopTiming
-from busplan.servo.plan import Plan, plans, stored_targets_mm
+from busplan.servo.rows import KernelRows, kernel_rows, stored_targets_mm
+
+if TYPE_CHECKING:
+    from collections.abc import MutableSequence
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int], None]
 
 MAX_STEPS = 50_000_000
 """Two axes of that many positions take 800 MB."""
@@ -55,7 +57,7 @@ def simulate_axis(
         A loop on the host loses a velocity command instead of a set-point, and the last one stands whatever
         `on_loss` says: to hold a velocity is to extrapolate a position.
     progress
-        Called with the number of steps done, now and then.
+        Called with the number of steps done and to be done, now and then.
     engine
         "auto" (numba when it is installed), "numba" or "python"; the result is the same.
 
@@ -106,12 +108,12 @@ def simulate_axis(
     run = compiled(run_rows, _SIGNATURE) if is_compiled(engine) else None
     chunk_steps = _CHUNK_STEPS[run is not None]
     state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
-    for plan in plans(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
+    for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
         out = position_mm[done:]
         # Plain Python handles its own floats twice as fast as numpy's.
-        done += run(state, constants, out, *plan) if run else _run_plain(state, constants, plan, out)
+        done += run(state, constants, out, *rows) if run else _run_plain(state, constants, rows, out)
         if progress is not None:
-            progress(done)
+            progress(done, len(position_mm))
     return position_mm
 
 
@@ -141,17 +143,17 @@ def axis_targets(
     """
     arrivals = Arrivals.punctual(len(setpoints_mm) - 1) if arrivals is None else arrivals
     kept, passed = [np.empty(0)], 0
-    for plan in plans(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=_CHUNK_STEPS[False]):
-        targets = stored_targets_mm(plan)
+    for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=_CHUNK_STEPS[False]):
+        targets = stored_targets_mm(rows)
         kept.append(targets[(-1 - passed) % every :: every])
         passed += len(targets)
     return np.concatenate(kept)
 
 
-def _run_plain(state: Floats, constants: Constants, plan: Plan, out: Floats) -> int:
+def _run_plain(state: Floats, constants: Constants, rows: KernelRows, out: Floats) -> int:
     floats = state.tolist()
     stored = run_rows(
-        floats, constants, cast("MutableSequence[float]", out.data), *(column.tolist() for column in plan)
+        floats, constants, cast("MutableSequence[float]", out.data), *(column.tolist() for column in rows)
     )
     state[:] = floats
     return stored
@@ -213,14 +215,13 @@ def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> in
     cycles = len(setpoints_mm) - 1
     steps = cycles * timing.steps_per_period
     if steps > MAX_STEPS:
-        raise BusplanError(
-            f"step_us = {timing.step_us}: the move takes {steps} steps, more than {MAX_STEPS}; "
-            f"choose a longer step or a shorter move"
-        )
+        right = f"the move takes {steps} steps, more than {MAX_STEPS}; choose a longer step or a shorter move"
+        refuse(Refused("step_us", timing.step_us, right))
     travel_mm = float(np.abs(setpoints_mm).max()) + axis.max_velocity_mm_s * cycles * timing.period_us / _US_PER_S
     if travel_mm > _LARGEST_COUNT * axis.encoder_resolution_mm > 0:
-        raise BusplanError(
-            f"encoder_resolution_mm = {axis.encoder_resolution_mm}: too fine for {travel_mm:.3g} mm of travel; "
+        right = (
+            f"too fine for {travel_mm:.3g} mm of travel; "
             f"choose at least {travel_mm / _LARGEST_COUNT:.3g} mm, or 0 (ideal)"
         )
+        refuse(Refused("encoder_resolution_mm", axis.encoder_resolution_mm, right))
     return steps

@@ -1,106 +1,208 @@
-"""What a number must be, and what is said when it is not."""
+"""What a parameter must be, and what is said when it is not."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import field, fields
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from busplan.errors import BusplanError
 
 LARGEST = 1e9
 """Beyond this a gain, a length or a time is a slip of the keyboard; products of them stay far from overflow."""
+SHORTEST_STEP_US = 1e-3
 
 _MULTIPLE_TOLERANCE = 1e-9
 """Periods such as 1000 / 3 us are no exact floats; a relative 1e-9 is a microsecond in a quarter of an hour."""
+_KNOWN = "known"
+_Value = TypeVar("_Value")
 
 
-def refuse(*problems: str) -> None:
-    """Raise all problems together; no problem, no exception.
+class Refused(NamedTuple):
+    """One value that cannot be simulated."""
+
+    name: str
+    """Of the parameter, as the user knows it."""
+    value: object
+    """As the message shows it."""
+    right: str
+    """What would be right."""
+
+    @property
+    def message(self) -> str:
+        """All of it in one sentence."""
+        return f"{self.name} = {self.value}: {self.right}"
+
+
+class ParameterError(BusplanError):
+    """Parameters that cannot be simulated, each by its name.
 
     Parameters
     ----------
-    *problems
-        One complete message each.
+    *refused
+        At least one.
+    """
+
+    def __init__(self, *refused: Refused) -> None:
+        super().__init__(*(one.message for one in refused))
+        self.refused = refused
+
+    def __reduce__(self) -> tuple[Callable[..., "ParameterError"], tuple[Refused, ...]]:
+        """Travel between processes as what it was made of: an exception by itself travels as its message."""
+        return ParameterError, self.refused
+
+
+def refuse(*refused: Refused) -> None:
+    """Raise all that is wrong together; nothing wrong, no exception.
+
+    Parameters
+    ----------
+    *refused
+        Each value that cannot be simulated.
 
     Raises
     ------
-    BusplanError
-        There is at least one problem.
+    ParameterError
+        There is at least one.
 
     Examples
     --------
     >>> refuse()
-    >>> refuse("radius_mm = 0: must be above 0")
+    >>> refuse(Refused("radius_mm", 0, "must be above 0"))
     Traceback (most recent call last):
     ...
-    busplan.errors.BusplanError: radius_mm = 0: must be above 0
+    busplan.servo.checks.ParameterError: radius_mm = 0: must be above 0
     """
-    if problems:
-        raise BusplanError(*problems)
+    if refused:
+        raise ParameterError(*refused)
 
 
-def not_finite(**values: float) -> Iterator[str]:
-    """Yield a problem for every value that is no usable number.
+class Known(NamedTuple):
+    """What is known of a parameter besides its name, its type and its default."""
+
+    description: str
+    """With the unit in brackets at its end."""
+    example: object
+    least: float | None
+    """Smallest value; None for a word, whose type lists what is allowed."""
+    most: float | None
+    never: tuple[int, str] | None
+    """A value between them that is not allowed, and what would be right."""
+
+
+class Parameter(NamedTuple):
+    """One value that can be set."""
+
+    name: str
+    type: Any
+    default: Any
+    known: Known
+
+
+def parameter(
+    default: _Value,
+    description: str,
+    *,
+    example: object,
+    least: float | None = None,
+    most: float | None = None,
+    never: tuple[int, str] | None = None,
+) -> _Value:
+    """Declare a parameter: a field of a dataclass with its default and what else is known of it."""
+    known = Known(description, example, least, most, never)
+    return field(default=default, metadata={_KNOWN: known})
+
+
+def parameters(of: Any) -> Iterator[Parameter]:
+    """Give every parameter of a dataclass, in the order of its fields.
+
+    Parameters
+    ----------
+    of
+        The dataclass, or an instance of it.
+    """
+    for one in fields(of):
+        if _KNOWN in one.metadata:
+            yield Parameter(one.name, one.type, one.default, one.metadata[_KNOWN])
+
+
+def out_of_range(values: Any) -> Iterator[Refused]:
+    """Yield every parameter of a dataclass whose value is not allowed.
+
+    Parameters
+    ----------
+    values
+        An instance; its fields are declared by `parameter`.
+
+    Yields
+    ------
+    Refused
+        What is wrong with which value, and what would be right.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Encoder:
+    ...     lines: int = parameter(1000, "Lines of the disc [1]", example=500, least=1, most=100_000)
+    >>> [one.message for one in out_of_range(Encoder(lines=0))]
+    ['lines = 0: must be between 1 and 100000']
+    """
+    for name, type_, _, known in parameters(values):
+        value = getattr(values, name)
+        if known.least is None or known.most is None:
+            yield from not_one_of(*get_args(type_), **{name: value})
+        elif not known.least <= value <= known.most:
+            yield Refused(name, value, f"must be between {known.least:g} and {known.most:g}")
+        elif known.never is not None and value == known.never[0]:
+            yield Refused(name, value, known.never[1])
+
+
+def not_positive(**values: float) -> Iterator[Refused]:
+    """Yield every value that is not above zero.
 
     Parameters
     ----------
     **values
         Name and value, the name as the user knows it.
 
-    Yields
-    ------
-    str
-        What is wrong with which value, and what would be right.
-
     Examples
     --------
-    >>> list(not_finite(skew_us=float("nan"), jitter_us=1.0))
-    ['skew_us = nan: must be a number between -1e+09 and 1e+09']
-    """
-    for name, value in values.items():
-        if not abs(value) <= LARGEST:
-            yield f"{name} = {value}: must be a number between {-LARGEST:g} and {LARGEST:g}"
-
-
-def not_positive(**values: float) -> Iterator[str]:
-    """Yield a problem for every value that is not above zero; see `not_finite`.
-
-    Examples
-    --------
-    >>> list(not_positive(radius_mm=0))
+    >>> [one.message for one in not_positive(radius_mm=0)]
     ['radius_mm = 0: must be above 0 and at most 1e+09']
     """
     for name, value in values.items():
         if not 0 < value <= LARGEST:
-            yield f"{name} = {value}: must be above 0 and at most {LARGEST:g}"
+            yield Refused(name, value, f"must be above 0 and at most {LARGEST:g}")
 
 
-def negative(**values: float) -> Iterator[str]:
-    """Yield a problem for every value below zero; see `not_finite`.
+def negative(**values: float) -> Iterator[Refused]:
+    """Yield every value below zero; see `not_positive`.
 
     Examples
     --------
-    >>> list(negative(drive_lag_us=-1, backlash_mm=0))
+    >>> [one.message for one in negative(drive_lag_us=-1, backlash_mm=0)]
     ['drive_lag_us = -1: must be between 0 and 1e+09']
     """
     for name, value in values.items():
         if not 0 <= value <= LARGEST:
-            yield f"{name} = {value}: must be between 0 and {LARGEST:g}"
+            yield Refused(name, value, f"must be between 0 and {LARGEST:g}")
 
 
-def not_one_of(*allowed: str, **values: str) -> Iterator[str]:
-    """Yield a problem for every word that is not among the allowed ones.
+def not_one_of(*allowed: str, **values: str) -> Iterator[Refused]:
+    """Yield every word that is not among the allowed ones.
 
     Examples
     --------
-    >>> list(not_one_of("ccw", "cw", direction="left"))
+    >>> [one.message for one in not_one_of("ccw", "cw", direction="left")]
     ["direction = 'left': must be one of 'ccw', 'cw'"]
     """
     for name, value in values.items():
         if value not in allowed:
-            yield f"{name} = {value!r}: must be one of {', '.join(map(repr, allowed))}"
+            yield Refused(name, repr(value), f"must be one of {', '.join(map(repr, allowed))}")
 
 
-def no_multiple(*, period_us: float, step_us: float) -> Iterator[str]:
-    """Yield the problem of a period that is no whole number of steps.
+def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
+    """Yield the step whose period is no whole number of it.
 
     Parameters
     ----------
@@ -109,24 +211,21 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[str]:
 
     Yields
     ------
-    str
+    Refused
         What is wrong, with the nearest steps that fit.
 
     Examples
     --------
-    >>> list(no_multiple(period_us=1000, step_us=300))
+    >>> [one.message for one in no_multiple(period_us=1000, step_us=300)]
     ['step_us = 300: the period of 1000 us is no multiple of it; 333.333 or 250 us would fit']
-    >>> list(no_multiple(period_us=1000, step_us=2000))
+    >>> [one.message for one in no_multiple(period_us=1000, step_us=2000)]
     ['step_us = 2000: longer than the period of 1000 us; the period is the longest step that fits']
     """
     steps = period_us / step_us
     if round(steps) == 0 or steps < 1 - _MULTIPLE_TOLERANCE:
-        yield (
-            f"step_us = {step_us}: longer than the period of {period_us:g} us; the period is the longest step that fits"
-        )
+        right = f"longer than the period of {period_us:g} us; the period is the longest step that fits"
+        yield Refused("step_us", step_us, right)
     elif abs(steps - round(steps)) > _MULTIPLE_TOLERANCE * steps:
         longer, shorter = period_us / math.floor(steps), period_us / math.ceil(steps)
-        yield (
-            f"step_us = {step_us}: the period of {period_us:g} us is no multiple of it; "
-            f"{longer:.6g} or {shorter:.6g} us would fit"
-        )
+        right = f"the period of {period_us:g} us is no multiple of it; {longer:.6g} or {shorter:.6g} us would fit"
+        yield Refused("step_us", step_us, right)

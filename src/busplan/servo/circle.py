@@ -1,15 +1,16 @@
 """The circle test: path, bus, both axes, mechanics and measures, joined."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.errors import BusplanError
+from busplan.progress import Progress
 from busplan.servo.axis import axis_targets, checked_steps, simulate_axis
+from busplan.servo.checks import Refused, refuse
 from busplan.servo.contour import Contour, contour_error, covered_deg, measure_contour
 from busplan.servo.delivery import Arrivals, arrivals, check_delivery
 from busplan.servo.engine import Engine
@@ -19,7 +20,6 @@ from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 _IDEAL_DELIVERY = Delivery()
 _IDEAL_MECHANICS = Mechanics()
@@ -111,7 +111,7 @@ class CircleRun:
             The targets are those the loops followed: interpolated, late and lost as they were.
         """
         if every < 1:
-            raise BusplanError(f"every = {every}: must be 1 or more")
+            refuse(Refused("every", every, "must be 1 or more"))
         seen = slice(every - 1, None, every)
         target = partial(axis_targets, timing=self.timing, every=every)
         x_mm, y_mm = self.x_mm[seen], self.y_mm[seen]
@@ -181,7 +181,7 @@ def simulate_circle(
 
     >>> from busplan.servo.path import circle_path
     >>> path = circle_path(50.0, feed_mm_per_min=6000.0, period_us=1000.0)
-    >>> axis = Axis(position_gain_per_s=50.0, max_velocity_mm_s=400.0)
+    >>> axis = Axis(position_gain_per_s=50.0, velocity_feedforward=0.0)
     >>> run = simulate_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))
     >>> round(run.contour.radius_deviation_mm, 3), round(50 * (1 / (1 + (2 / 50) ** 2) ** 0.5 - 1), 3)
     (-0.04, -0.04)
@@ -191,7 +191,7 @@ def simulate_circle(
     arrivals_x, arrivals_y = received(name="x"), received(name="y")
     total = 2 * path.setpoints * timing.steps_per_period
 
-    def report(done_before: int, done: int) -> None:
+    def report(done_before: int, done: int, _axis_total: int) -> None:
         if progress is not None:
             progress(done_before + done, total)
 
@@ -243,32 +243,35 @@ def check_circle(
     >>> axis = Axis(position_gain_per_s=50.0, max_velocity_mm_s=400.0)
     >>> check_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))
     """
-    problems = []
+    refused = []
     if path.period_us != timing.period_us:
-        problems.append(f"period_us = {timing.period_us}: the set-points of the path come every {path.period_us} us")
+        right = f"the set-points of the path come every {path.period_us} us"
+        refused.append(Refused("period_us", timing.period_us, right))
     for name, axis in (("x", x), ("y", y)):
-        problems.extend(_out_of_reach(path, name=name, axis=axis))
-    if problems:
-        raise BusplanError(*problems)
+        refused.extend(_out_of_reach(path, name=name, axis=axis))
+    refuse(*refused)
     check_delivery(delivery, period_us=timing.period_us)
     checked_steps(path.x_mm, axis=x, timing=timing)
     checked_steps(path.y_mm, axis=y, timing=timing)
 
 
-def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[str]:
-    """The problem of a drive that cannot keep up with the feed in both directions."""
+def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refused]:
+    """A drive that cannot keep up with the feed in both directions."""
     highest_mm_s, offset_mm_s = axis.highest_command_mm_s, abs(axis.drive_offset_mm_s)
     levels = f" and dac_bits = {axis.dac_bits}" if axis.dac_bits else ""
     if offset_mm_s >= highest_mm_s:
-        yield (
-            f"drive_offset_mm_s = {axis.drive_offset_mm_s}: axis {name} commands at most {highest_mm_s:g} mm/s with "
-            f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the offset must stay below it"
+        yield Refused(
+            "drive_offset_mm_s",
+            axis.drive_offset_mm_s,
+            f"axis {name} commands at most {highest_mm_s:g} mm/s with "
+            f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the offset must stay below it",
         )
     elif path.feed_mm_s >= highest_mm_s - offset_mm_s:
-        yield (
-            f"feed_mm_per_min = {path.feed_mm_per_min}: axis {name} reaches "
-            f"{(highest_mm_s - offset_mm_s) * 60:g} mm/min with max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; "
-            f"the feed must stay below it"
+        yield Refused(
+            "feed_mm_per_min",
+            path.feed_mm_per_min,
+            f"axis {name} reaches {(highest_mm_s - offset_mm_s) * 60:g} mm/min with "
+            f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the feed must stay below it",
         )
 
 

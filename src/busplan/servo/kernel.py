@@ -1,6 +1,6 @@
 """The fixed-step kernel: one function, plain Python and numba alike.
 
-It runs over the rows of a plan (see `busplan.servo.plan`). A row is a run of sub-steps of equal length;
+It runs over the rows of a move (see `busplan.servo.rows`). A row is a run of sub-steps of equal length;
 its action says what happens in each: sample and control, let the command take effect, store the position.
 
 Only what numba compiles is used, and `x + ROUND - ROUND` for `round(x)`, a call that plain Python would feel: adding
@@ -46,7 +46,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     friction_keep: Iterable[float],
     friction_shift: Iterable[float],
 ) -> int:
-    """Run one axis over the rows of a plan.
+    """Run one axis over a chunk of rows.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     out
         Takes the position [mm] at the end of every stored sub-step.
     substeps, target, increment, forward, action, length, drive_keep, drive_shift, friction_keep, friction_shift
-        The columns of `busplan.servo.plan.Plan`.
+        The columns of `busplan.servo.rows.KernelRows`.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     """
     kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
     position, velocity, disturbance, sign, command, _, _ = state
-    # Every plan begins with a control, so no command is on its way between two of them.
+    # Every chunk of rows begins with a control, so no command is on its way between two of them.
     pending = command
     stored = 0
     for n, start, move, feed, act, dt, keep, shift, fade, fade_shift in zip(  # noqa: B905 - numba knows no strict

@@ -1,19 +1,33 @@
 """What can be set: one axis, the timing of its loop, the delivery of set-points, the mechanics.
 
-Zero means ideal: no lag, no offset, no play, an encoder and a DAC as fine as the arithmetic. No numpy here, so
-that a profile can be checked without loading it.
+Zero means ideal: no lag, no offset, no play, an encoder and a DAC as fine as the arithmetic. Names, defaults, ranges
+and descriptions stand here alone: profiles take theirs from these fields. No numpy here, so that a profile can be
+checked without loading it.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from busplan.servo.checks import negative, no_multiple, not_finite, not_one_of, not_positive, refuse
+from busplan.servo.checks import (
+    LARGEST,
+    SHORTEST_STEP_US,
+    Refused,
+    no_multiple,
+    not_positive,
+    out_of_range,
+    parameter,
+    refuse,
+)
 
 LoopPlace = Literal["node", "host"]
 Interpolation = Literal["linear", "hold"]
 OnLoss = Literal["hold", "extrapolate"]
 
-MAX_DAC_BITS = 32
+MAX_LENGTH_MM = 1e6
+MAX_SPEED_MM_S = 1e6
+_MIN_SPEED_MM_S = 1e-6
+_MAX_PPM = 1e5
 FINEST_ENCODER_MM = 1e-9
 """A picometre: finer counts than these would not fit into the 53 bits of a float over metres of travel."""
 
@@ -22,85 +36,81 @@ FINEST_ENCODER_MM = 1e-9
 class Axis:
     """One axis: its position controller, its drive, its encoder.
 
-    Parameters
-    ----------
-    position_gain_per_s
-        Proportional gain kp [1/s].
-    max_velocity_mm_s
-        Largest velocity command, full scale of the DAC [mm/s].
-    integral_gain_per_s2
-        Integral gain ki [1/s^2].
-    derivative_gain
-        Derivative gain kd [1].
-    velocity_feedforward
-        Share of the target velocity that is commanded directly [1].
-    acceleration_feedforward_s
-        Velocity commanded per target acceleration [s].
-    drive_lag_us
-        Time constant tau of the velocity-controlled drive [us].
-    drive_offset_mm_s
-        Velocity at which the drive creeps when it is told to stand [mm/s].
-    dac_bits
-        Resolution of the velocity command, 2^bits levels over twice `max_velocity_mm_s` [bits].
-    encoder_resolution_mm
-        Length of one encoder count [mm].
-    reversal_mm_s
-        Velocity disturbance of Coulomb friction in motion; a reversal swings it by twice as much [mm/s].
-    reversal_recovery_us
-        Time constant with which the drive recovers from that disturbance [us].
-    reversal_smoothing_mm_s
-        Velocity over which the sign of the friction turns smoothly [mm/s].
-
     Raises
     ------
     BusplanError
-        A value is not finite, of the wrong sign, or out of range.
+        A value is out of range.
 
     Examples
     --------
     >>> Axis(position_gain_per_s=143.0, max_velocity_mm_s=400.0).drive_lag_us
     0.0
-    >>> Axis(position_gain_per_s=float("inf"), max_velocity_mm_s=400.0)
+    >>> Axis(position_gain_per_s=float("inf"))
     Traceback (most recent call last):
     ...
-    busplan.errors.BusplanError: position_gain_per_s = inf: must be between 0 and 1e+09
+    busplan.servo.checks.ParameterError: position_gain_per_s = inf: must be between 0 and 1e+09
     """
 
-    position_gain_per_s: float
-    max_velocity_mm_s: float
-    integral_gain_per_s2: float = 0.0
-    derivative_gain: float = 0.0
-    velocity_feedforward: float = 0.0
-    acceleration_feedforward_s: float = 0.0
-    drive_lag_us: float = 0.0
-    drive_offset_mm_s: float = 0.0
-    dac_bits: int = 0
-    encoder_resolution_mm: float = 0.0
-    reversal_mm_s: float = 0.0
-    reversal_recovery_us: float = 0.0
-    reversal_smoothing_mm_s: float = 0.0
+    position_gain_per_s: float = parameter(100.0, "Proportional gain kp [1/s]", example=143, least=0, most=LARGEST)
+    integral_gain_per_s2: float = parameter(0.0, "Integral gain ki [1/s^2]", example=0, least=0, most=LARGEST)
+    derivative_gain: float = parameter(0.0, "Derivative gain kd [1]", example=0, least=0, most=LARGEST)
+    velocity_feedforward: float = parameter(
+        1.0, "Share of the target velocity that is commanded directly [1]", example=1, least=-LARGEST, most=LARGEST
+    )
+    acceleration_feedforward_s: float = parameter(
+        0.0, "Velocity commanded per target acceleration [s]", example=0, least=-LARGEST, most=LARGEST
+    )
+    drive_lag_us: float = parameter(
+        0.0, "Time constant of the velocity-controlled drive, 0 ideal [us]", example=7500, least=0, most=LARGEST
+    )
+    drive_offset_mm_s: float = parameter(
+        0.0,
+        "Velocity at which the drive creeps when told to stand [mm/s]",
+        example=0.56,
+        least=-MAX_SPEED_MM_S,
+        most=MAX_SPEED_MM_S,
+    )
+    max_velocity_mm_s: float = parameter(
+        1000.0,
+        "Largest velocity command, full scale of the DAC [mm/s]",
+        example=400,
+        least=_MIN_SPEED_MM_S,
+        most=MAX_SPEED_MM_S,
+    )
+    dac_bits: int = parameter(
+        0,
+        "Resolution of the velocity command, 0 ideal, else 2 to 32 [bits]",
+        example=16,
+        least=0,
+        most=32,
+        never=(1, "expected 0 (ideal), or 2 to 32: one bit is a sign and no level"),
+    )
+    """2^bits levels over twice `max_velocity_mm_s`."""
+    encoder_resolution_mm: float = parameter(
+        0.0, "Length of one encoder count, 0 ideal [mm]", example=0.001, least=0, most=MAX_LENGTH_MM
+    )
+    reversal_mm_s: float = parameter(
+        0.0,
+        "Velocity disturbance of friction when the axis reverses [mm/s]",
+        example=1.6,
+        least=0,
+        most=MAX_SPEED_MM_S,
+    )
+    """Of Coulomb friction in motion; a reversal swings it by twice as much."""
+    reversal_recovery_us: float = parameter(
+        10_000.0, "Time constant with which that disturbance dies away [us]", example=10000, least=0, most=LARGEST
+    )
+    reversal_smoothing_mm_s: float = parameter(
+        0.5,
+        "Velocity over which the sign of friction turns [mm/s]",
+        example=0.5,
+        least=_MIN_SPEED_MM_S,
+        most=MAX_SPEED_MM_S,
+    )
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated, all of it in one message."""
-        refuse(
-            *negative(
-                position_gain_per_s=self.position_gain_per_s,
-                integral_gain_per_s2=self.integral_gain_per_s2,
-                derivative_gain=self.derivative_gain,
-                drive_lag_us=self.drive_lag_us,
-                encoder_resolution_mm=self.encoder_resolution_mm,
-                reversal_mm_s=self.reversal_mm_s,
-                reversal_recovery_us=self.reversal_recovery_us,
-                reversal_smoothing_mm_s=self.reversal_smoothing_mm_s,
-            ),
-            *not_positive(max_velocity_mm_s=self.max_velocity_mm_s),
-            *not_finite(
-                velocity_feedforward=self.velocity_feedforward,
-                acceleration_feedforward_s=self.acceleration_feedforward_s,
-                drive_offset_mm_s=self.drive_offset_mm_s,
-            ),
-            *self._out_of_range(),
-        )
+        refuse(*out_of_range(self), *self._too_fine())
 
     @property
     def level_mm_s(self) -> float:
@@ -115,20 +125,10 @@ class Axis:
         """
         return self.max_velocity_mm_s - self.level_mm_s
 
-    def _out_of_range(self) -> list[str]:
-        problems = []
-        if self.dac_bits != 0 and not 2 <= self.dac_bits <= MAX_DAC_BITS:  # noqa: PLR2004 - sign and one bit
-            problems.append(f"dac_bits = {self.dac_bits}: must be 0 (ideal) or between 2 and {MAX_DAC_BITS}")
+    def _too_fine(self) -> Iterator[Refused]:
         if 0 < self.encoder_resolution_mm < FINEST_ENCODER_MM:
-            problems.append(
-                f"encoder_resolution_mm = {self.encoder_resolution_mm}: "
-                f"must be 0 (ideal) or {FINEST_ENCODER_MM:g} mm or more"
-            )
-        if self.reversal_mm_s > 0 and self.reversal_smoothing_mm_s == 0:
-            problems.append(
-                "reversal_smoothing_mm_s = 0: must be above 0 when reversal_mm_s is, or an axis at rest chatters"
-            )
-        return problems
+            right = f"must be 0 (ideal) or {FINEST_ENCODER_MM:g} mm or more"
+            yield Refused("encoder_resolution_mm", self.encoder_resolution_mm, right)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,13 +139,6 @@ class LoopTiming:
     ----------
     period_us
         Communication period T_s: one set-point a period [us].
-    step_us
-        Step of the simulation, and the period of the position loop when it runs on the node [us].
-    loop
-        "node": the loop runs each step on the node. "host": it runs each period on the host, across the bus.
-    interpolation
-        What a node does between set-points: "linear" moves on the line between the last two, "hold" stands.
-        Without meaning when the loop runs on the host.
     delay_us
         Time Td from the sample to the moment its command takes effect, 0 to one period; used by the loop on
         the host only, where it lies inside the loop [us].
@@ -162,25 +155,34 @@ class LoopTiming:
     """
 
     period_us: float
-    step_us: float = 100.0
-    loop: LoopPlace = "node"
-    interpolation: Interpolation = "linear"
+    loop: LoopPlace = parameter(
+        "node",
+        "Where the position loop is closed: on the node each step, or on the host each period",
+        example="node",
+    )
+    interpolation: Interpolation = parameter(
+        "linear",
+        "What a node does between set-points: move on the line between the last two, or hold",
+        example="linear",
+    )
+    """Without meaning when the loop runs on the host."""
+    step_us: float = parameter(
+        100.0,
+        "Period of the node's position loop, and step of the simulation [us]",
+        example=100,
+        least=SHORTEST_STEP_US,
+        most=LARGEST,
+    )
     delay_us: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated, all of it in one message."""
-        problems = [
-            *not_positive(period_us=self.period_us, step_us=self.step_us),
-            *not_one_of("node", "host", loop=self.loop),
-            *not_one_of("linear", "hold", interpolation=self.interpolation),
-        ]
-        refuse(*problems)
+        refuse(*not_positive(period_us=self.period_us), *out_of_range(self))
         refuse(*no_multiple(period_us=self.period_us, step_us=self.step_us), *self._late())
 
-    def _late(self) -> list[str]:
-        if 0 <= self.delay_us <= self.period_us:
-            return []
-        return [f"delay_us = {self.delay_us}: must be between 0 and the period of {self.period_us:g} us"]
+    def _late(self) -> Iterator[Refused]:
+        if not 0 <= self.delay_us <= self.period_us:
+            yield Refused("delay_us", self.delay_us, f"must be between 0 and the period of {self.period_us:g} us")
 
     @property
     def steps_per_period(self) -> int:
@@ -197,23 +199,10 @@ class LoopTiming:
 class Delivery:
     """How set-points arrive at the nodes.
 
-    Parameters
-    ----------
-    jitter_us
-        The synchronous packet of a cycle arrives uniformly within plus or minus this time, all axes alike [us].
-    skew_us
-        The y node takes its set-points over this much later than the x node, in every cycle [us].
-    loss_probability
-        Share of the packets with a set-point that never arrive, drawn for each cycle and node on its own [1].
-    on_loss
-        What a node does without its set-point: "hold" the last one, or "extrapolate" the last two.
-    seed
-        Seed of all that is random here.
-
     Raises
     ------
     BusplanError
-        A value is not finite, of the wrong sign, or out of range.
+        A value is out of range.
 
     Examples
     --------
@@ -221,43 +210,42 @@ class Delivery:
     0.0
     """
 
-    jitter_us: float = 0.0
-    skew_us: float = 0.0
-    loss_probability: float = 0.0
-    on_loss: OnLoss = "hold"
-    seed: int = 0
+    jitter_us: float = parameter(
+        0.0,
+        "The synchronous packet comes within plus or minus this time [us]",
+        example=2,
+        least=0,
+        most=LARGEST,
+    )
+    """Uniformly, in every cycle anew, and for all axes alike."""
+    skew_us: float = parameter(
+        0.0,
+        "The y node takes its set-points over this much after x [us]",
+        example=0.1,
+        least=-LARGEST,
+        most=LARGEST,
+    )
+    loss_probability: float = parameter(
+        0.0, "Share of the set-points that never arrive, 0..1", example=0.001, least=0, most=1
+    )
+    """Drawn for each cycle and node on its own."""
+    on_loss: OnLoss = parameter("hold", "What a node does without its set-point", example="hold")
+    """It holds the last one, or extrapolates the last two."""
+    seed: int = parameter(0, "Seed of all that is random", example=1, least=0, most=2**63 - 1)
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated, all of it in one message."""
-        problems = [
-            *negative(jitter_us=self.jitter_us),
-            *not_finite(skew_us=self.skew_us),
-            *not_one_of("hold", "extrapolate", on_loss=self.on_loss),
-        ]
-        if not 0 <= self.loss_probability <= 1:
-            problems.append(f"loss_probability = {self.loss_probability}: must be between 0 and 1")
-        if self.seed < 0:
-            problems.append(f"seed = {self.seed}: must be 0 or more")
-        refuse(*problems)
+        refuse(*out_of_range(self))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mechanics:
     """What lies between the encoders and the table.
 
-    Parameters
-    ----------
-    backlash_mm
-        Play between motor and table, the whole gap, on each axis [mm].
-    scale_x_ppm, scale_y_ppm
-        How much too long the axis moves [um/m].
-    squareness_um_per_m
-        How far the y axis leans towards x: displacement in x for each metre of y [um/m].
-
     Raises
     ------
     BusplanError
-        A value is not finite, or the backlash is negative.
+        A value is out of range.
 
     Examples
     --------
@@ -265,18 +253,16 @@ class Mechanics:
     0.0
     """
 
-    backlash_mm: float = 0.0
-    scale_x_ppm: float = 0.0
-    scale_y_ppm: float = 0.0
-    squareness_um_per_m: float = 0.0
+    backlash_mm: float = parameter(0.0, "Play between motor and table [mm]", example=0.002, least=0, most=MAX_LENGTH_MM)
+    """The whole gap, on each axis."""
+    scale_x_ppm: float = parameter(0.0, "Scale error of the x axis [um/m]", example=10, least=-_MAX_PPM, most=_MAX_PPM)
+    """How much too long the axis moves."""
+    scale_y_ppm: float = parameter(0.0, "Scale error of the y axis [um/m]", example=-10, least=-_MAX_PPM, most=_MAX_PPM)
+    squareness_um_per_m: float = parameter(
+        0.0, "Displacement in x for each metre of y [um/m]", example=20, least=-_MAX_PPM, most=_MAX_PPM
+    )
+    """How far the y axis leans towards x."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated, all of it in one message."""
-        refuse(
-            *negative(backlash_mm=self.backlash_mm),
-            *not_finite(
-                scale_x_ppm=self.scale_x_ppm,
-                scale_y_ppm=self.scale_y_ppm,
-                squareness_um_per_m=self.squareness_um_per_m,
-            ),
-        )
+        refuse(*out_of_range(self))

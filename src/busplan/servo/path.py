@@ -7,8 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.errors import BusplanError
-from busplan.servo.checks import negative, not_one_of, not_positive, refuse
+from busplan.servo.checks import Refused, negative, not_one_of, not_positive, refuse
 
 Direction = Literal["ccw", "cw"]
 Floats = NDArray[np.float64]
@@ -131,13 +130,14 @@ def circle_path(
     period_s, feed_mm_s = period_us / _US_PER_S, feed_mm_per_min / _S_PER_MIN
     length_mm, ramp_s = 2 * math.pi * radius_mm, ramp_periods * period_s
     if length_mm < feed_mm_s * ramp_s:
-        raise BusplanError(_too_short(radius_mm, feed_mm_per_min=feed_mm_per_min, ramp_s=ramp_s))
+        refuse(_too_short(radius_mm, feed_mm_per_min=feed_mm_per_min, ramp_s=ramp_s))
     duration_s = length_mm / feed_mm_s + ramp_s
     if setpoints > MAX_SETPOINTS:
-        raise BusplanError(
-            f"feed_mm_per_min = {feed_mm_per_min}: the circle takes {setpoints:.3g} periods of {period_us:g} us, "
-            f"more than {MAX_SETPOINTS}; choose a faster feed, a smaller radius or a longer period"
+        right = (
+            f"the circle takes {setpoints:.3g} periods of {period_us:g} us, more than {MAX_SETPOINTS}; "
+            f"choose a faster feed, a smaller radius or a longer period"
         )
+        refuse(Refused("feed_mm_per_min", feed_mm_per_min, right))
     time_s = np.arange(setpoints + 1, dtype=np.float64) * period_s
     way_mm = _trapezoid(time_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s, length_mm=length_mm)
     angle = way_mm / radius_mm
@@ -192,11 +192,13 @@ def _speeding_up(time_s: Floats, *, feed_mm_s: float, ramp_s: float) -> Floats:
     return np.where(time_s < ramp_s, ramp_mm, feed_mm_s * (time_s - ramp_s / 2))
 
 
-def _too_short(radius_mm: float, *, feed_mm_per_min: float, ramp_s: float) -> str:
+def _too_short(radius_mm: float, *, feed_mm_per_min: float, ramp_s: float) -> Refused:
     length_mm = 2 * math.pi * radius_mm
     reachable = length_mm / ramp_s * _S_PER_MIN
     smallest_mm = feed_mm_per_min / _S_PER_MIN * ramp_s / (2 * math.pi)
-    return (
-        f"feed_mm_per_min = {feed_mm_per_min}: never reached on a circle of radius_mm = {radius_mm} with ramps "
-        f"of {ramp_s:g} s; choose at most {reachable:.6g} mm/min, at least {smallest_mm:.6g} mm, or shorter ramps"
+    return Refused(
+        "feed_mm_per_min",
+        feed_mm_per_min,
+        f"never reached on a circle of radius_mm = {radius_mm} with ramps of {ramp_s:g} s; "
+        f"choose at most {reachable:.6g} mm/min, at least {smallest_mm:.6g} mm, or shorter ramps",
     )

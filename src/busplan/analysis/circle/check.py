@@ -1,8 +1,9 @@
 """The circle test as a question that a search asks many times: what does it not hold?"""
 
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.circle.roundness import Progress, circle_test
+from busplan.analysis.circle.roundness import circle_test
 from busplan.errors import BusplanError
+from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
 _PARTS = 1000

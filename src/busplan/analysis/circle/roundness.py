@@ -4,7 +4,7 @@ The bus comes first. A cycle that does not fit its period delivers no set-points
 stability: a host loop's delay makes the circle better while it eats the margin, so no circle passes without one.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan.analysis.capacity.figures import CapacityFigures
@@ -19,13 +19,11 @@ from busplan.analysis.circle.failures import (
 )
 from busplan.analysis.circle.setup import bus, loop_timing, setup
 from busplan.profile.toml import override
+from busplan.progress import Progress
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import LoopTiming
 from busplan.servo.path import circle_setpoints
-
-Progress = Callable[[int, int], None]
-"""Called with the steps done and the steps to do."""
 
 
 class CircleFigures(NamedTuple):

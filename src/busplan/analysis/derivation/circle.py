@@ -3,7 +3,7 @@
 A simulation has no formula. Its lines say what was measured of it, at which step, and everything that went in.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.circle.failures import CONTOUR_MEASURES, LEAST_ARC_DEG
@@ -14,11 +14,11 @@ from busplan.analysis.derivation.inputs import traced
 from busplan.analysis.derivation.simulation import SimulationNumbers
 from busplan.analysis.derivation.trace import Input, Traced, short
 from busplan.buses.figure import by_key
+from busplan.progress import Progress
 from busplan.sections.machine import AxisKeys
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
 
-Progress = Callable[[int, int], None]
 Figures = dict[str, Traced]
 _LOOP_KEYS: Final = ("position_gain_per_s", "integral_gain_per_s2", "derivative_gain", "drive_lag_us")
 """What of the servo the linear loop holds."""

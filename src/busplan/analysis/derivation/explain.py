@@ -4,7 +4,7 @@ Nothing is computed a second time by other means: the functions that give the fi
 what was done with them (`busplan.analysis.derivation.trace`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from typing import Any, Final, NamedTuple
 
@@ -19,9 +19,9 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
+from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
-Progress = Callable[[int, int], None]
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest, and what is not for anyone to know."""
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from busplan.profile.shipped import shipped_names
-from busplan.report.manual.pages import Entry, Section
+from busplan.report.manual.pages import Entry, ManualSection
 
-_EXIT_STATUS: Final = Section(
+_EXIT_STATUS: Final = ManualSection(
     "Exit status",
     (
         "The page of a command says when it exits 0 and when 1.",
@@ -35,10 +35,10 @@ _PAPER: Final = (
     "whose equations the reports name."
 )
 _STANDARDS: Final = "IEEE Std 1394-1995 and 1394a-2000 for the bus, ISO 230-4 for the measures of the circle test."
-_SEE_ALSO: Final = Section("See also", (_PAPER, _STANDARDS), ())
+_SEE_ALSO: Final = ManualSection("See also", (_PAPER, _STANDARDS), ())
 
 
-def closing_sections(variables: Sequence[Entry]) -> tuple[Section, ...]:
+def closing_sections(variables: Sequence[Entry]) -> tuple[ManualSection, ...]:
     """Exit status, environment, files, and what else to read.
 
     Parameters
@@ -46,12 +46,12 @@ def closing_sections(variables: Sequence[Entry]) -> tuple[Section, ...]:
     variables
         Variables of the environment that stand for an option.
     """
-    environment = Section("Environment", (), (*variables, *_COLOURS, _COMPLETION))
+    environment = ManualSection("Environment", (), (*variables, *_COLOURS, _COMPLETION))
     return (_EXIT_STATUS, environment, _files(), _SEE_ALSO)
 
 
-def _files() -> Section:
-    return Section(
+def _files() -> ManualSection:
+    return ManualSection(
         "Files",
         (),
         (

@@ -19,7 +19,7 @@ class Entry(NamedTuple):
     text: str
 
 
-class Section(NamedTuple):
+class ManualSection(NamedTuple):
     """Paragraphs, then entries."""
 
     title: str
@@ -49,7 +49,7 @@ class Manual(NamedTuple):
     program: CommandPage
     version: str
     commands: tuple[CommandPage, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[ManualSection, ...]
 
 
 def spans(text: str) -> Iterator[tuple[str, bool]]:

@@ -12,16 +12,16 @@ from busplan.report.latency import latency_table_rows
 from busplan.report.lines import GridRow, count, percent, plural, us, yes
 from busplan.report.page.charts.axes import axes_chart
 from busplan.report.page.charts.terms import LEFT, terms_chart
-from busplan.report.page.content import Chart, Column, Part, Row, Source, Swatch, Table, Verdict
+from busplan.report.page.content import Chart, Part, Row, ShownVerdict, SourceCommand, Swatch, Table, TableColumn
 from busplan.report.timeline.kinds import kind_of
 from busplan.report.timeline.lanes import charged, drawn_window
 from busplan.report.timeline.mermaid import timeline_mermaid
 from busplan.report.timeline.svg import is_coarse, timeline_svg
 from busplan.report.words import verdict_lines
 
-Sources = Mapping[str, Source]
+Sources = Mapping[str, SourceCommand]
 
-_HEAD: Final = (Column("", "words"), Column("eq", "words"), Column("unit", "words"))
+_HEAD: Final = (TableColumn("", "words"), TableColumn("eq", "words"), TableColumn("unit", "words"))
 
 
 def plain(value: float) -> str:
@@ -35,7 +35,7 @@ def plain(value: float) -> str:
     return f"{value:.12g}"
 
 
-def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
+def bus_verdict(answer: Overview, sources: Sources) -> ShownVerdict:
     """Does the cycle fit, and do the timing models agree?"""
     verdict, source = answer.verdict, sources["capacity"]
     word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
@@ -48,7 +48,7 @@ def bus_verdict(answer: Overview, sources: Sources) -> Verdict:
         (f"margin, {one.timing_model}", source.figure(f"/results/{index}/margin_us", us, "us"))
         for index, one in enumerate(answer.capacity.results)
     )
-    return Verdict(
+    return ShownVerdict(
         "Does the cycle fit its period?",
         word,
         "good" if verdict.all_well else "bad",
@@ -70,12 +70,12 @@ def models_part(answer: Overview, sources: Sources) -> Part:
     decides, bus = answer.profile.bus.timing_model, bus_of(answer.profile)
     cycle = _grid(
         f"The cycle; the {decides} model decides",
-        (*_HEAD, *(Column(one.timing_model) for one in results)),
+        (*_HEAD, *(TableColumn(one.timing_model) for one in results)),
         capacity_table_rows(bus),
         sources["capacity"],
         [f"/results/{index}" for index in range(len(results))],
     )
-    columns = (Column(one.timing_model, group=_group(one)) for one in transactions)
+    columns = (TableColumn(one.timing_model, group=_group(one)) for one in transactions)
     halves = _grid(
         f"Latency in us, {bus.latency_subject(network_of(answer.profile))}",
         (*_HEAD[:2], *columns),
@@ -93,9 +93,9 @@ def models_part(answer: Overview, sources: Sources) -> Part:
 
 def _grid(
     caption: str,
-    columns: Sequence[Column],
+    columns: Sequence[TableColumn],
     rows: Sequence[GridRow],
-    source: Source,
+    source: SourceCommand,
     owners: Sequence[str],
 ) -> Table:
     """Figures of several owners side by side, rows as in the terminal."""
@@ -138,7 +138,13 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
     totals = source.value("/totals")
     table = Table(
         "What takes the slice" if plan.figures.fits else "What takes the cycle",
-        (Column("kind", "words"), Column("eq", "words"), Column("events"), Column("us"), Column("%")),
+        (
+            TableColumn("kind", "words"),
+            TableColumn("eq", "words"),
+            TableColumn("events"),
+            TableColumn("us"),
+            TableColumn("%"),
+        ),
         tuple(
             Row(
                 (
@@ -164,7 +170,7 @@ def terms_part(answer: Overview, sources: Sources) -> Part:
     )
     table = Table(
         "Terms of the cycle, us",
-        (Column("term", "words"), Column("eq", "words"), *(Column(one.timing_model) for one in results)),
+        (TableColumn("term", "words"), TableColumn("eq", "words"), *(TableColumn(one.timing_model) for one in results)),
         tuple(
             Row(
                 (
@@ -190,7 +196,7 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
         axes_chart(answer.profile, answer.steps),
     )
     columns = [
-        Column(word, "words" if word == "limited by" else "figures", one.timing_model)
+        TableColumn(word, "words" if word == "limited by" else "figures", one.timing_model)
         for one in answer.steps
         for word in ("nodes", "axes", "limited by")
     ]
@@ -208,7 +214,7 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
             )
         )
     table = Table(
-        "Most nodes and axes; the profile's own period in bold", (Column("period, us"), *columns), tuple(rows)
+        "Most nodes and axes; the profile's own period in bold", (TableColumn("period, us"), *columns), tuple(rows)
     )
     return Part("axes", "Axes against period", charts=(chart,), tables=(table,), commands=(source.anchor,))
 

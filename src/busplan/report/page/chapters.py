@@ -11,10 +11,21 @@ from busplan.report.lines import count, percent, plural, us
 from busplan.report.page.bus import axes_part, bus_verdict, fit_word, models_part, plain, terms_part, timeline_part
 from busplan.report.page.circle import circle_part, circle_verdict, sources_part
 from busplan.report.page.commands import shell_word, sources
-from busplan.report.page.content import Cell, Chapter, Code, Column, Link, Page, Part, Row, Source, Table
+from busplan.report.page.content import (
+    Cell,
+    Chapter,
+    ChapterLink,
+    Code,
+    Page,
+    Part,
+    Row,
+    SourceCommand,
+    Table,
+    TableColumn,
+)
 
 
-class Subject(NamedTuple):
+class ReportedProfile(NamedTuple):
     """One profile of a page."""
 
     argument: str
@@ -24,7 +35,7 @@ class Subject(NamedTuple):
     """Whether its period is not that of its file."""
 
 
-def page(subjects: Sequence[Subject], *, title: str | None) -> Page:
+def page(subjects: Sequence[ReportedProfile], *, title: str | None) -> Page:
     """Put the content of a page together.
 
     Parameters
@@ -41,7 +52,7 @@ def page(subjects: Sequence[Subject], *, title: str | None) -> Page:
     return Page(own if title is None else title, f"busplan {__version__}", table, chapters)
 
 
-def _chapter(subject: Subject, *, anchor: str) -> Chapter:
+def _chapter(subject: ReportedProfile, *, anchor: str) -> Chapter:
     answer = subject.answer
     listed = sources(answer, argument=subject.argument, anchor=anchor, other_period=subject.other_period)
     named = {one.anchor.removeprefix(f"{anchor}-"): one for one in listed}
@@ -79,7 +90,7 @@ def _chapter(subject: Subject, *, anchor: str) -> Chapter:
     )
 
 
-def _assumptions_part(source: Source) -> Part:
+def _assumptions_part(source: SourceCommand) -> Part:
     rows = tuple(
         Row(
             (
@@ -91,7 +102,7 @@ def _assumptions_part(source: Source) -> Part:
         for number, one in enumerate(source.value("/assumptions"))
     )
     columns = tuple(
-        Column(word, "figures" if word == "value" else "words")
+        TableColumn(word, "figures" if word == "value" else "words")
         for word in ("name", "value", "unit", "grade", "source", "meaning")
     )
     table = Table("Assumptions with their grades, the least well known first", columns, rows, stacks=True)
@@ -102,29 +113,29 @@ def _value(value: float | str) -> str:
     return value if isinstance(value, str) else plain(value)
 
 
-def _commands_part(listed: Sequence[Source]) -> Part:
+def _commands_part(listed: Sequence[SourceCommand]) -> Part:
     rows = tuple(Row((one.purpose, one)) for one in listed)
-    columns = (Column("what", "words"), Column("command", "words"))
+    columns = (TableColumn("what", "words"), TableColumn("command", "words"))
     line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
     return Part(
         "commands", "How to get every figure again", (line,), tables=(Table("Commands", columns, rows, stacks=True),)
     )
 
 
-def _comparison(subjects: Sequence[Subject], chapters: Sequence[Chapter]) -> Table:
+def _comparison(subjects: Sequence[ReportedProfile], chapters: Sequence[Chapter]) -> Table:
     models = tuple(dict.fromkeys(one.timing_model for each in subjects for one in each.answer.capacity.results))
     columns = (
-        Column("profile", "words"),
-        Column("fits", "words"),
-        Column("models agree", "words"),
-        Column("period, us"),
-        Column("nodes"),
-        Column("axes"),
-        Column("used, %"),
-        *(Column(f"{model}", group="margin, us") for model in models),
-        Column("most axes"),
-        *(Column(word, group="contour error, um") for word in ("mean", "max", "G")),
-        Column("circle passed", "words"),
+        TableColumn("profile", "words"),
+        TableColumn("fits", "words"),
+        TableColumn("models agree", "words"),
+        TableColumn("period, us"),
+        TableColumn("nodes"),
+        TableColumn("axes"),
+        TableColumn("used, %"),
+        *(TableColumn(f"{model}", group="margin, us") for model in models),
+        TableColumn("most axes"),
+        *(TableColumn(word, group="contour error, um") for word in ("mean", "max", "G")),
+        TableColumn("circle passed", "words"),
     )
     rows = tuple(
         Row(_compared(subject, chapter, models=models)) for subject, chapter in zip(subjects, chapters, strict=True)
@@ -132,14 +143,14 @@ def _comparison(subjects: Sequence[Subject], chapters: Sequence[Chapter]) -> Tab
     return Table("All profiles, each under the timing model that decides", columns, rows)
 
 
-def _compared(subject: Subject, chapter: Chapter, *, models: Sequence[str]) -> tuple[Cell, ...]:
+def _compared(subject: ReportedProfile, chapter: Chapter, *, models: Sequence[str]) -> tuple[Cell, ...]:
     answer, (capacity, *_) = subject.answer, chapter.sources
     places = {one.timing_model: f"/results/{index}" for index, one in enumerate(answer.capacity.results)}
     own = places[answer.verdict.deciding.timing_model]
     circle = next((one for one in chapter.sources if one.document["command"] == "circle-test"), None)
     measures = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
     return (
-        Link(chapter.name, chapter.anchor, chapter.origin),
+        ChapterLink(chapter.name, chapter.anchor, chapter.origin),
         capacity.figure("/verdicts/0/fits", fit_word),
         capacity.figure("/verdicts/0/models_agree", fit_word),
         capacity.figure(f"{own}/period_us", plain, "us"),

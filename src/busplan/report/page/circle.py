@@ -10,7 +10,7 @@ from busplan.report.lines import GridRow, count, yes
 from busplan.report.page.bus import plain
 from busplan.report.page.charts.bars import signed_bar
 from busplan.report.page.charts.circle import Magnified, circle_chart, magnified
-from busplan.report.page.content import Chart, Column, Drawing, Part, Row, Source, Table, Verdict
+from busplan.report.page.content import Chart, Drawing, Part, Row, ShownVerdict, SourceCommand, Table, TableColumn
 
 _QUESTION: Final = "Is the circle still round?"
 _ROWS: Final = (
@@ -35,14 +35,14 @@ _ROWS: Final = (
 )
 
 
-def circle_verdict(answer: Overview, sources: Mapping[str, Source]) -> Verdict:
+def circle_verdict(answer: Overview, sources: Mapping[str, SourceCommand]) -> ShownVerdict:
     """Is the circle still round?"""
     result = answer.circle_figures
     if result is None:
-        return Verdict(_QUESTION, "NOT RUN", "bad" if answer.no_circle else "plain", _why_not(answer))
+        return ShownVerdict(_QUESTION, "NOT RUN", "bad" if answer.no_circle else "plain", _why_not(answer))
     source = sources["circle"]
     lines = tuple(line.text for line in circle_verdict_lines(answer.profile.name, result))
-    return Verdict(
+    return ShownVerdict(
         _QUESTION,
         "PASSED" if result.passed else "FAILED",
         "good" if result.passed else "bad",
@@ -70,7 +70,7 @@ def _why_not(answer: Overview) -> tuple[str, ...]:
     return ("The profile has no section for a circle test, so none was run.",)
 
 
-def circle_part(answer: Overview, sources: Mapping[str, Source]) -> Part:
+def circle_part(answer: Overview, sources: Mapping[str, SourceCommand]) -> Part:
     """The magnified circle and its figures."""
     result, title = answer.circle_figures, "The circle"
     if result is None:
@@ -84,7 +84,7 @@ def circle_part(answer: Overview, sources: Mapping[str, Source]) -> Part:
         charts = (Chart("round", caption, circle_chart(answer.contour, scale)),)
     table = Table(
         "Figures of the circle test",
-        (Column("", "words"), Column("unit", "words"), Column("value")),
+        (TableColumn("", "words"), TableColumn("unit", "words"), TableColumn("value")),
         tuple(Row((row.label, row.unit, source.figure(f"/results/0/{row.key}", row.write, row.unit))) for row in _ROWS),
     )
     return Part(
@@ -113,7 +113,7 @@ def _caption(scale: Magnified, result: CircleFigures, *, tolerance_mm: float | N
     return f"{words}; {limit} dashed."
 
 
-def sources_part(answer: Overview, sources: Mapping[str, Source]) -> Part | None:
+def sources_part(answer: Overview, sources: Mapping[str, SourceCommand]) -> Part | None:
     """What makes the circle less round, ranked; nothing without a simulation."""
     result = answer.circle_figures
     if result is None or result.contributions is None:
@@ -138,11 +138,11 @@ def sources_part(answer: Overview, sources: Mapping[str, Source]) -> Part | None
         for index, one in enumerate(result.contributions)
     )
     columns = (
-        Column("source", "words"),
-        Column("", "drawing"),
-        Column("takes, um"),
-        Column("max", group="without it, um"),
-        Column("G", group="without it, um"),
+        TableColumn("source", "words"),
+        TableColumn("", "drawing"),
+        TableColumn("takes, um"),
+        TableColumn("max", group="without it, um"),
+        TableColumn("G", group="without it, um"),
     )
     caption = "Each error source removed in turn; what it takes from the largest contour error, largest first"
     line = "Sources act together: what they take one by one need not add up. A negative one hides another."

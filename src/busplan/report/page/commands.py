@@ -7,7 +7,7 @@ from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.overview import Overview
 from busplan.report import documents
 from busplan.report.explain import figure_document
-from busplan.report.page.content import Source
+from busplan.report.page.content import SourceCommand
 from busplan.report.timeline.documents import timeline_document
 
 
@@ -44,7 +44,7 @@ def period_option(period_us: float) -> tuple[str, str]:
     return "--period", f"{repr(period_us).removesuffix('.0')}us"
 
 
-def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool) -> tuple[Source, ...]:
+def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool) -> tuple[SourceCommand, ...]:
     """List the commands behind one profile's figures, each with the document that it writes.
 
     Parameters
@@ -61,9 +61,9 @@ def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool)
     own = period_option(answer.profile.cycle.period_us) if other_period else ()
     each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
 
-    def source(name: str, purpose: str, document: documents.Document, *options: str) -> Source:
+    def source(name: str, purpose: str, document: documents.Document, *options: str) -> SourceCommand:
         words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
-        return Source(f"{anchor}-{name}", " ".join(words), purpose, document)
+        return SourceCommand(f"{anchor}-{name}", " ".join(words), purpose, document)
 
     bus, periods = answer.capacity, answer.periods
     found = [

@@ -9,7 +9,7 @@ from busplan.report.documents import Document
 Tone = Literal["good", "bad", "warning", "plain"]
 
 
-class Figure(NamedTuple):
+class ShownFigure(NamedTuple):
     """One value as it is shown, with the place of the exact one in a command's JSON."""
 
     text: str
@@ -27,7 +27,7 @@ class Figure(NamedTuple):
         return json.dumps(self.value, allow_nan=False, ensure_ascii=False)
 
 
-class Source(NamedTuple):
+class SourceCommand(NamedTuple):
     """One command and the document that it writes: what the figures are taken from."""
 
     anchor: str
@@ -45,7 +45,7 @@ class Source(NamedTuple):
             found = found[int(step) if isinstance(found, list) else step]
         return found
 
-    def figure(self, pointer: str, write: Callable[[Any], str], unit: str = "") -> Figure:
+    def figure(self, pointer: str, write: Callable[[Any], str], unit: str = "") -> ShownFigure:
         """Take a figure from the document; what does not exist is a dash.
 
         Parameters
@@ -58,7 +58,7 @@ class Source(NamedTuple):
             Unit of what is shown.
         """
         value = self.value(pointer)
-        return Figure("-" if value is None else write(value), unit, value, self.anchor, pointer)
+        return ShownFigure("-" if value is None else write(value), unit, value, self.anchor, pointer)
 
 
 class Drawing(NamedTuple):
@@ -75,7 +75,7 @@ class Swatch(NamedTuple):
     text: str
 
 
-class Link(NamedTuple):
+class ChapterLink(NamedTuple):
     """A profile's name, leading to its chapter."""
 
     text: str
@@ -90,10 +90,10 @@ class Code(NamedTuple):
     text: str
 
 
-Cell = str | Figure | Drawing | Swatch | Link | Code | Source
+Cell = str | ShownFigure | Drawing | Swatch | ChapterLink | Code | SourceCommand
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of a table."""
 
     heading: str
@@ -114,7 +114,7 @@ class Table(NamedTuple):
     """A table with its caption."""
 
     caption: str
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     rows: tuple[Row, ...]
     stacks: bool = False
     """Whether a phone shows each row as lines: a table of words, which nobody compares down a column."""
@@ -141,7 +141,7 @@ class Chart(NamedTuple):
     """The same in Mermaid, for a page without SVG."""
 
 
-class Verdict(NamedTuple):
+class ShownVerdict(NamedTuple):
     """One question and its answer."""
 
     question: str
@@ -151,7 +151,7 @@ class Verdict(NamedTuple):
     source: str = ""
     pointer: str = ""
     """Place of these lines, joined, in the command's document; empty where it has none."""
-    figures: tuple[tuple[str, Figure], ...] = ()
+    figures: tuple[tuple[str, ShownFigure], ...] = ()
     """What a reader looks for first."""
 
 
@@ -161,7 +161,7 @@ class Part(NamedTuple):
     key: str
     title: str
     lines: tuple[str, ...] = ()
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[ShownVerdict, ...] = ()
     charts: tuple[Chart, ...] = ()
     tables: tuple[Table, ...] = ()
     commands: tuple[str, ...] = ()
@@ -176,9 +176,9 @@ class Chapter(NamedTuple):
     origin: str
     """The PROFILE argument, as a shell takes it."""
     description: str
-    facts: tuple[tuple[str, Figure], ...]
+    facts: tuple[tuple[str, ShownFigure], ...]
     parts: tuple[Part, ...]
-    sources: tuple[Source, ...]
+    sources: tuple[SourceCommand, ...]
 
     def line(self, anchor: str) -> str:
         """The command of that id."""

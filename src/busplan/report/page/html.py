@@ -28,12 +28,12 @@ def page_html(page: content.Page) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.tests["figure"] = lambda cell: isinstance(cell, content.Figure)
+    environment.tests["figure"] = lambda cell: isinstance(cell, content.ShownFigure)
     environment.tests["drawing"] = lambda cell: isinstance(cell, content.Drawing)
     environment.tests["swatch"] = lambda cell: isinstance(cell, content.Swatch)
-    environment.tests["link"] = lambda cell: isinstance(cell, content.Link)
+    environment.tests["link"] = lambda cell: isinstance(cell, content.ChapterLink)
     environment.tests["code"] = lambda cell: isinstance(cell, content.Code)
-    environment.tests["source"] = lambda cell: isinstance(cell, content.Source)
+    environment.tests["source"] = lambda cell: isinstance(cell, content.SourceCommand)
     # An SVG of ours is markup: its writer has escaped what it says.
     environment.filters["svg"] = Markup
     light, dark = fills(".chart")

@@ -4,7 +4,19 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.report.markdown import code, escaped, table
-from busplan.report.page.content import Cell, Chapter, Code, Drawing, Figure, Link, Page, Part, Source, Swatch, Table
+from busplan.report.page.content import (
+    Cell,
+    Chapter,
+    ChapterLink,
+    Code,
+    Drawing,
+    Page,
+    Part,
+    ShownFigure,
+    SourceCommand,
+    Swatch,
+    Table,
+)
 
 _OWN: Final = 2
 """Level of a row in bold."""
@@ -78,12 +90,12 @@ def _in_row(text: str, *, level: int) -> str:
 
 def _cell(cell: Cell) -> str:
     match cell:
-        case Figure():
+        case ShownFigure():
             text = cell.text
-        case Link():
+        case ChapterLink():
             origin = "" if cell.origin == cell.text else f" {code(cell.origin)}"
             text = f"[{code(cell.text)}](#{cell.anchor}){origin}"
-        case Source():
+        case SourceCommand():
             text = code(cell.line)
         case Code():
             text = code(cell.text)

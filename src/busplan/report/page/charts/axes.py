@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.capacity.node_steps import NodeSteps
 from busplan.report.lines import plural
+from busplan.report.scale import round_steps
 from busplan.report.svg import drawing, markup, text_at
 from busplan.report.words import period
 from busplan.sections.base import MAX_TIME_US
@@ -83,8 +84,8 @@ def drawn_range(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, fl
 
 def _step(most: int) -> int:
     """The 1, 2 or 5 times a power of ten that divides a number of axes into at most five parts."""
-    magnitude: int = 10 ** floor(log10(max(1, most / 5)))
-    return next(factor * magnitude for factor in (1, 2, 5, 10) if factor * magnitude * 5 >= most)
+    smallest = max(1.0, most / 5)
+    return next(int(step.size) for step in round_steps(smallest) if step.size >= smallest)
 
 
 def _grid(root: Element, plane: _Plane) -> None:

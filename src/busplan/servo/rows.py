@@ -21,7 +21,7 @@ _Number = TypeVar("_Number", np.float64, np.int64)
 _US_PER_S = 1e6
 
 
-class Plan(NamedTuple):
+class KernelRows(NamedTuple):
     """Columns of the kernel's rows, all of one length.
 
     Parameters
@@ -54,9 +54,9 @@ class Plan(NamedTuple):
     friction_shift_s: Floats
 
 
-def plans(
+def kernel_rows(
     setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, chunk_steps: int
-) -> Iterator[Plan]:
+) -> Iterator[KernelRows]:
     """Cut a move into rows, so many steps at a time that memory does not grow with the move.
 
     Parameters
@@ -70,7 +70,7 @@ def plans(
     arrivals
         When and whether the packets of each cycle arrive.
     chunk_steps
-        Steps in one plan, about [1].
+        Steps in one chunk of rows, about [1].
 
     Raises
     ------
@@ -80,7 +80,7 @@ def plans(
 
     Yields
     ------
-    Plan
+    KernelRows
         The rows in order of time.
 
     Notes
@@ -98,8 +98,8 @@ def plans(
     >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
     >>> timing = LoopTiming(period_us=1000.0, step_us=100.0)
     >>> sent_mm, on_time = np.array([0.0, 1.0, 2.0]), Arrivals.punctual(2)
-    >>> plan, = plans(sent_mm, axis=axis, timing=timing, arrivals=on_time, chunk_steps=1000)
-    >>> plan.substeps.tolist(), plan.target_mm.tolist(), plan.increment_mm.tolist()
+    >>> rows, = kernel_rows(sent_mm, axis=axis, timing=timing, arrivals=on_time, chunk_steps=1000)
+    >>> rows.substeps.tolist(), rows.target_mm.tolist(), rows.increment_mm.tolist()
     ([10, 10], [0.0, 0.0], [0.0, 0.1])
     """
     _check(setpoints_mm, arrivals=arrivals, half_us=timing.period_us / 2)
@@ -114,12 +114,12 @@ def plans(
         yield make(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, cycles=some)
 
 
-def stored_targets_mm(plan: Plan) -> Floats:
-    """Target at the end of every stored sub-step of a plan.
+def stored_targets_mm(rows: KernelRows) -> Floats:
+    """Target at the end of every stored sub-step of a chunk of rows.
 
     Parameters
     ----------
-    plan
+    rows
         Rows of one axis.
 
     Returns
@@ -132,13 +132,13 @@ def stored_targets_mm(plan: Plan) -> Floats:
     >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
     >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
     >>> sent_mm, on_time = np.array([0.0, 0.1, 0.2]), Arrivals.punctual(2)
-    >>> plan, = plans(sent_mm, axis=axis, timing=timing, arrivals=on_time, chunk_steps=1000)
-    >>> stored_targets_mm(plan).round(6).tolist()
+    >>> rows, = kernel_rows(sent_mm, axis=axis, timing=timing, arrivals=on_time, chunk_steps=1000)
+    >>> stored_targets_mm(rows).round(6).tolist()
     [0.0, 0.0, 0.05, 0.1]
     """
-    stored = np.where(plan.action & STORE, plan.substeps, 0)
+    stored = np.where(rows.action & STORE, rows.substeps, 0)
     within = np.arange(stored.sum()) - np.repeat(np.cumsum(stored) - stored, stored) + 1
-    return np.asarray(np.repeat(plan.target_mm, stored) + np.repeat(plan.increment_mm, stored) * within)
+    return np.asarray(np.repeat(rows.target_mm, stored) + np.repeat(rows.increment_mm, stored) * within)
 
 
 def _check(setpoints_mm: Floats, *, arrivals: Arrivals, half_us: float) -> None:
@@ -152,7 +152,7 @@ def _check(setpoints_mm: Floats, *, arrivals: Arrivals, half_us: float) -> None:
         raise ValueError(f"offsets must begin and end with 0 and stay within {half_us:g} us")
 
 
-def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> Plan:
+def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> KernelRows:
     steps = timing.steps_per_period
     # Held, the previous set-point stands for the cycle; on the line, it is where the line starts.
     ahead = 0 if timing.interpolation == "linear" else -1
@@ -187,7 +187,7 @@ def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
     )
 
 
-def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> Plan:
+def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> KernelRows:
     here_mm, _, forward_mm_s = _motion(setpoints_mm, axis=axis, timing=timing, cycles=cycles + 1)
     edges = np.append(cycles, cycles[-1] + 1)
     times = edges * timing.steps_per_period + arrivals.offsets_us[edges] / timing.step_us
@@ -247,7 +247,7 @@ def _fill(
     increment_mm: Floats | None = None,
     action: Ints | None = None,
     length_s: Floats | None = None,
-) -> Plan:
+) -> KernelRows:
     """Add what all rows have alike: by default whole steps that control, switch and store, on a standing target."""
     # One exponential serves all whole steps.
     lengths_s = np.array([timing.step_us / _US_PER_S]) if length_s is None else length_s
@@ -257,7 +257,7 @@ def _fill(
         *_decay(lengths_s, time_constant_s=axis.drive_lag_us / _US_PER_S),
         *_decay(lengths_s, time_constant_s=axis.reversal_recovery_us / _US_PER_S),
     )
-    return Plan(
+    return KernelRows(
         substeps,
         target_mm,
         np.zeros(shape) if increment_mm is None else increment_mm,

@@ -10,7 +10,7 @@ from busplan.servo.axis import axis_targets
 from busplan.servo.delivery import Arrivals
 from busplan.servo.kernel import CONTROL, STORE, SWITCH
 from busplan.servo.parameters import Axis, Interpolation, LoopTiming
-from busplan.servo.plan import plans
+from busplan.servo.rows import kernel_rows
 
 Floats = NDArray[np.float64]
 
@@ -44,8 +44,8 @@ def test_the_target_of_a_node_is_the_line_from_the_last_packet_that_arrived(
     timing = LoopTiming(period_us=PERIOD_US, step_us=100.0, interpolation=interpolation)
     arrivals = Arrivals(offsets_us=offsets_us, lost=np.zeros(CYCLES + 1, dtype=bool))
     aimed: list[float] = []
-    for plan in plans(SETPOINTS, axis=AXIS, timing=timing, arrivals=arrivals, chunk_steps=2 * STEPS):
-        for n, start, slope in zip(plan.substeps, plan.target_mm, plan.increment_mm, strict=True):
+    for rows in kernel_rows(SETPOINTS, axis=AXIS, timing=timing, arrivals=arrivals, chunk_steps=2 * STEPS):
+        for n, start, slope in zip(rows.substeps, rows.target_mm, rows.increment_mm, strict=True):
             aimed += [start + i * slope for i in range(n)]
     expected = [
         literal_target(100.0 * i, offsets_us=offsets_us, interpolation=interpolation) for i in range(CYCLES * STEPS)
@@ -60,8 +60,8 @@ def test_the_rows_of_a_host_loop_cover_time_without_gap_and_store_on_the_grid(
     timing = LoopTiming(period_us=PERIOD_US, step_us=100.0, loop="host", delay_us=delay_us)
     arrivals = Arrivals(offsets_us=offsets_us, lost=np.zeros(CYCLES + 1, dtype=bool))
     time_us, sampled, switched, stored = 0.0, [], [], []
-    for plan in plans(SETPOINTS, axis=AXIS, timing=timing, arrivals=arrivals, chunk_steps=3 * STEPS):
-        for n, action, length_s in zip(plan.substeps, plan.action, plan.length_s, strict=True):
+    for rows in kernel_rows(SETPOINTS, axis=AXIS, timing=timing, arrivals=arrivals, chunk_steps=3 * STEPS):
+        for n, action, length_s in zip(rows.substeps, rows.action, rows.length_s, strict=True):
             sampled += [time_us] if action & CONTROL and n else []
             switched += [time_us] if action & SWITCH and n else []
             for _ in range(n):
@@ -97,8 +97,8 @@ def test_a_lost_command_of_a_host_loop_never_takes_effect() -> None:
     lost = np.zeros(CYCLES + 1, dtype=bool)
     lost[2] = True
     arrivals = Arrivals(offsets_us=np.zeros(CYCLES + 1), lost=lost)
-    (plan,) = plans(SETPOINTS, axis=AXIS, timing=timing, arrivals=arrivals, chunk_steps=1000)
-    assert plan.substeps[plan.action == SWITCH].tolist() == [1, 1, 0, 1, 1, 1, 1]
+    (rows,) = kernel_rows(SETPOINTS, axis=AXIS, timing=timing, arrivals=arrivals, chunk_steps=1000)
+    assert rows.substeps[rows.action == SWITCH].tolist() == [1, 1, 0, 1, 1, 1, 1]
 
 
 def test_a_late_node_waits_at_the_end_of_its_line_with_its_feed_forward() -> None:
@@ -107,9 +107,9 @@ def test_a_late_node_waits_at_the_end_of_its_line_with_its_feed_forward() -> Non
     offsets_us = np.zeros(CYCLES + 1)
     offsets_us[3] = 250.0
     arrivals = Arrivals(offsets_us=offsets_us, lost=np.zeros(CYCLES + 1, dtype=bool))
-    (plan,) = plans(SETPOINTS, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=1000)
-    rows = list(zip(plan.substeps, plan.target_mm, plan.forward_mm_s, strict=True))
-    waits = [(n, mm, forward) for n, mm, forward in rows if n == 3]
+    (rows,) = kernel_rows(SETPOINTS, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=1000)
+    targets = zip(rows.substeps, rows.target_mm, rows.forward_mm_s, strict=True)
+    waits = [(n, mm, forward) for n, mm, forward in targets if n == 3]
     assert waits == [(3, 3.0, pytest.approx(0.5 * 2.0 / (PERIOD_US / 1e6)))]
-    assert (plan.substeps >= 0).all()
-    assert plan.substeps.sum() == CYCLES * STEPS
+    assert (rows.substeps >= 0).all()
+    assert rows.substeps.sum() == CYCLES * STEPS
