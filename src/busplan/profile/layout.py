@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from busplan.errors import BusplanError
+from busplan.printable import printable
 from busplan.profile.positions import KeyPath, scan
 
 _BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
@@ -235,7 +236,7 @@ class Layout:
             raise self.refusal(table, "there is no such table to write a comment above")
         top = starts[0]
         # A line without control characters; and a suppression stays next to the line it speaks of.
-        shown = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in note)
+        shown = printable(note)
         mark = f"# {shown.partition(':')[0]}:"
         indent = self.text[top : len(self.text) - len(self.text[top:].lstrip(" \t"))]
         line = f"{indent}# {shown}{self.line_end}"

@@ -9,6 +9,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from busplan.printable import commands
 from busplan.profile.bus import Cycle, Ieee1394Bus, Node, Payload, TableExecution
 from busplan.profile.gate import Limits
 from busplan.profile.machine import Circle, Delivery, Mechanics, Servo, Tolerance
@@ -21,7 +22,7 @@ _CIRCLE_SECTIONS: Final = {"servo", "circle", "tolerance", "delivery", "mechanic
 
 def _without_control_characters(allowed: str) -> Callable[[str], str]:
     def check(text: str) -> str:
-        if any(not (character.isprintable() or character in allowed) for character in text):
+        if any(commands(one) and one not in allowed for one in text):
             raise refused(Problem("must not hold control characters"))
         return text
 

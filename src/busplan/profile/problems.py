@@ -8,6 +8,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
+from busplan.printable import printable
 from busplan.profile.bus import LinearExecution, TableExecution
 from busplan.profile.document import Document
 from busplan.profile.model import Profile
@@ -63,7 +64,7 @@ def _quoted(part: str) -> str:
     if bare:
         return part
     escaped = part.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in escaped) + '"'
+    return '"' + printable(escaped, write=lambda one: f"\\U{ord(one):08x}") + '"'
 
 
 def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[Finding]:
@@ -190,7 +191,7 @@ def _is_element(found: Finding) -> bool:
 
 
 def _shortened(written: str, limit: int = 40) -> str:
-    line = "".join(character if character.isprintable() else " " for character in written)
+    line = printable(written, write=lambda _: " ")
     return line if len(line) <= limit else f"{line[:limit]}..."
 
 

@@ -10,7 +10,7 @@ from busplan.report import markdown
 from busplan.report.capacity import CAPACITY_ROWS
 from busplan.report.changes import CHANGE_HEADINGS, change_document, change_rows
 from busplan.report.documents import Document, document
-from busplan.report.lines import BLANK, GridRow, Line, count, plural, printable, table, us, yes
+from busplan.report.lines import BLANK, GridRow, Line, count, plural, table, us, yes
 from busplan.report.words import period
 
 Arguments = tuple[str, str]
@@ -69,7 +69,7 @@ _MOST_KEYS: Final = 20
 
 def diff_lines(found: Difference, *, arguments: Arguments) -> list[Line]:
     """The verdict, the keys that differ, and every figure of both."""
-    lines = [_headline(found), *(Line(printable(one)) for one in _sides(found, arguments))]
+    lines = [_headline(found), *map(Line, _sides(found, arguments))]
     if not found.keys:
         return lines
     lines.extend(_notes(found))

@@ -2,9 +2,10 @@
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
+
+from busplan.printable import json_text
 
 _BLOCK: Final = 1 << 16
 
@@ -17,7 +18,7 @@ def to_json(document: Mapping[str, Any]) -> str:
     ValueError
         A number is not finite: such a document must not leave the program.
     """
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json_text(document, indent=2) + "\n"
 
 
 def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:

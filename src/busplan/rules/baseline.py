@@ -6,6 +6,7 @@ from sys import float_info
 from typing import Any, Final
 
 from busplan.errors import BusplanError
+from busplan.printable import json_text
 from busplan.rules.finding import Problem, Subject
 
 _SCHEMA: Final = 1
@@ -77,4 +78,4 @@ def write_baseline(recorded: Mapping[str, Recorded]) -> str:
         "command": "baseline",
         "profiles": {path: dict(recorded[path]) for path in sorted(recorded)},
     }
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json_text(document, indent=2) + "\n"

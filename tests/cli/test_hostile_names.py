@@ -1,0 +1,104 @@
+"""A file may be called anything: in no form does its name command a terminal, and JSON reads back to that very name."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+Run = Callable[..., "CompletedProcess[str]"]
+
+# A colour, DEL, a C1 control, marks of direction, a line and a paragraph separator, a byte order mark, no UTF-8.
+EVIL = "a\x1b[31m\x7f\x9b2J\u202e\u2066\u2028\u2029\ufeff\udcff"
+PROFILE, OTHER, FAULTY, FAILING, MEASURED = (
+    f"{EVIL}.toml",
+    f"other-{EVIL}.toml",
+    f"faulty-{EVIL}.toml",
+    f"failing-{EVIL}.toml",
+    f"{EVIL}.csv",
+)
+SHIPPED = Path(__file__).parents[2] / "profiles"
+GATE_FORMATS = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("hostile")
+    text = (SHIPPED / "paper-1ms.toml").read_text(encoding="utf-8")
+    for name, content in (
+        (PROFILE, text),
+        (OTHER, text.replace("nodes = 2", "nodes = 3")),
+        (FAULTY, f'{text}\n[nonsense]\n["\\u202e"]\n'),
+        (FAILING, f"{text.replace('nodes = 2', 'nodes = 9')}\n# busplan: ignore[\u202e\u2028] \u202e\u2066\n"),
+        (MEASURED, (SHIPPED / "table-1.csv").read_text(encoding="utf-8")),
+    ):
+        (folder / name).write_text(content, encoding="utf-8")
+    return folder
+
+
+def calls() -> Iterator[tuple[str, ...]]:
+    for form in ("table", "json", "csv"):
+        yield from ((command, PROFILE, "--format", form) for command in ("capacity", "latency", "timeline"))
+        yield ("plan", PROFILE, "--no-circle", "--format", form)
+        yield ("calibrate", PROFILE, MEASURED, "--format", form)
+        yield ("sweep", PROFILE, "--vary", "bus.nodes=1:3", "--format", form)
+        yield ("capacity", FAULTY, "--format", form)
+    for form in ("table", "json", "markdown"):
+        yield from (("diff", one, OTHER, "--no-circle", "--format", form) for one in (PROFILE, OTHER, FAULTY))
+    yield from (("explain", PROFILE, "gaps_us", "--format", form) for form in ("text", "json", "markdown"))
+    yield from (("report", PROFILE, OTHER, "--no-circle", "--format", form) for form in ("html", "markdown"))
+    yield from (("timeline", PROFILE, "--format", form) for form in ("mermaid", "svg"))
+    for form in GATE_FORMATS:
+        yield ("check", ".", f"no-{EVIL}", "--verbose", "--no-circle", "--format", form)
+        yield ("check", "-", "--stdin-filename", EVIL, "--verbose", "--format", form)
+    yield ("check", ".", "--no-circle", "--baseline", f"base-{EVIL}.json", "--update-baseline")
+    yield ("check", ".", "--no-circle", "--baseline", PROFILE)
+    yield ("timeline", PROFILE, "-o", f"{EVIL}.txt")
+    yield ("sweep", PROFILE, "--vary", f"{EVIL}=1")
+    yield ("explain", PROFILE, EVIL)
+    yield ("plan", PROFILE, "--no-circle", "-o", f"new-{EVIL}")
+
+
+def _shown(arguments: tuple[str, ...]) -> str:
+    return ascii(" ".join(arguments)).replace(ascii(EVIL).strip("'"), "EVIL")
+
+
+@pytest.mark.parametrize("arguments", list(calls()), ids=_shown)
+def test_no_name_commands_a_terminal(arguments: tuple[str, ...], run: Run, folder: Path) -> None:
+    before = set(folder.iterdir())
+    done = run(*arguments, cwd=folder)
+    new = [path for path in folder.iterdir() if path not in before]
+    assert "busplan itself failed" not in done.stderr
+    for text in (done.stdout, done.stderr, *(path.read_text(encoding="utf-8") for path in new)):
+        # The separators of a document are line ends and tabs.
+        assert [line for line in re.split("[\n\t]", text) if not line.isprintable()] == []
+    for path in new:
+        path.unlink()
+
+
+def test_json_reads_back_to_the_name(run: Run, folder: Path) -> None:
+    checked = json.loads(run("check", PROFILE, "--no-circle", "--format", "json", cwd=folder).stdout)
+    assert [one["path"] for one in checked["files"]] == [PROFILE]
+    compared = json.loads(run("diff", PROFILE, OTHER, "--no-circle", "--format", "json", cwd=folder).stdout)
+    assert (compared["a"]["argument"], compared["b"]["argument"]) == (PROFILE, OTHER)
+
+
+def test_a_baseline_knows_the_name_again(run: Run, folder: Path) -> None:
+    given = ("check", PROFILE, "--no-circle", "--baseline", "base.json")
+    run(*given, "--update-baseline", cwd=folder)
+    written = (folder / "base.json").read_text(encoding="utf-8")
+    assert list(json.loads(written)["profiles"]) == [PROFILE]
+    assert "\\u009b" in written
+    (folder / PROFILE).write_bytes((folder / OTHER).read_bytes())
+    assert "BP301" in run(*given, cwd=folder).stdout
+    (folder / PROFILE).write_bytes((SHIPPED / "paper-1ms.toml").read_bytes())
+
+
+def test_markdown_shows_what_the_name_holds(run: Run, folder: Path) -> None:
+    said = run("diff", PROFILE, OTHER, "--no-circle", "--format", "markdown", cwd=folder).stdout
+    assert "| A | `a\\x1b[31m\\x7f\\x9b2J\\u202e\\u2066 \\ufeff\\udcff.toml` |" in said
