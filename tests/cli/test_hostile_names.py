@@ -1,12 +1,16 @@
 """A file may be called anything: in no form does its name command a terminal, and JSON reads back to that very name."""
 
+import csv
 import json
 import re
 from collections.abc import Callable, Iterator
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+
+from busplan.report.text import csv_cell
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess
@@ -102,3 +106,35 @@ def test_a_baseline_knows_the_name_again(run: Run, folder: Path) -> None:
 def test_markdown_shows_what_the_name_holds(run: Run, folder: Path) -> None:
     said = run("diff", PROFILE, OTHER, "--no-circle", "--format", "markdown", cwd=folder).stdout
     assert "| A | `a\\x1b[31m\\x7f\\x9b2J\\u202e\\u2066 \\ufeff\\udcff.toml` |" in said
+
+
+@pytest.mark.parametrize("beginning", ["=cmd|' /C calc'!A0", "+1", "-1", "@SUM(A1)"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("capacity",),
+        ("latency",),
+        ("plan", "--no-circle"),
+        ("circle-test", "--contributions"),
+        ("calibrate", str(SHIPPED / "table-1.csv")),
+    ],
+    ids=lambda command: command[0],
+)
+def test_no_name_is_a_formula_of_a_spreadsheet(
+    command: tuple[str, ...], beginning: str, run: Run, tmp_path: Path
+) -> None:
+    text = (SHIPPED / "paper-4ms.toml").read_text(encoding="utf-8")
+    (tmp_path / "p.toml").write_text(text.replace('name = "paper-4ms"', f'name = "{beginning}"'), encoding="utf-8")
+    name, *options = command
+    rows = list(csv.DictReader(StringIO(run(name, "p.toml", *options, "--format", "csv", cwd=tmp_path).stdout)))
+    assert {row["profile"] for row in rows} == {f"'{beginning}"}
+    cells = [cell for row in rows for key, cell in row.items() if key != "profile"]
+    assert not any(cell.startswith("'") for cell in cells)
+    for cell in cells:
+        if cell.startswith(("=", "+", "-", "@")):
+            float(cell)
+
+
+def test_a_cell_that_begins_with_a_tab_or_a_return_is_text() -> None:
+    cells = [csv_cell(value) for value in ("\t=1", "\r=1", -1.5, "-1.5", ["-x", "y"], "x=1")]
+    assert cells == ["'\t=1", "'\r=1", -1.5, "'-1.5", "'-x y", "x=1"]
