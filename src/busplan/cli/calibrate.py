@@ -79,7 +79,8 @@ def calibrate_command(
     from busplan.profile.toml import override, read_bytes
     from busplan.report import calibration as report
 
-    bench = override(load(profile).profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
+    loaded = load(profile)
+    bench = override(loaded.profile, bus_changes(nodes=nodes, gap_count=gap_count), origin=BUS_OPTIONS)
     path, name, shipped = locate_measurements(measurements)
     result = calibrate(
         bench,
@@ -93,7 +94,7 @@ def calibrate_command(
     )
     if apply:
         note = report.provenance(result, source=Path(name).name)
-        apply_changes(profile, report.execution_changes(result.execution), notes={report.SECTION: note})
+        apply_changes(loaded.document, report.execution_changes(result.execution), notes={report.SECTION: note})
         say(f"wrote [{report.SECTION}] of {profile}; comments of yours beside it are as they were")
     if format_ == "table":
         emit(report.calibration_lines(result, source=name))

@@ -86,7 +86,7 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
             return sys.stdin.buffer.read(limit + 1)
         if path.is_fifo() and not path.is_relative_to("/dev"):
             # Opening it would wait for a writer, for ever; a shell's <(command) is /dev/fd/N and has one.
-            raise BusplanError(f"{name}: is a named pipe; give a profile file, or - for standard input")
+            raise BusplanError(f"{name}: is a named pipe; give a regular file")
         with path.open("rb") as file:
             return file.read(limit + 1)
     except FileNotFoundError:

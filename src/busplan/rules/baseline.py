@@ -10,6 +10,8 @@ from busplan.printable import json_text
 from busplan.rules.finding import Problem, Subject
 
 _SCHEMA: Final = 1
+MAX_BASELINE_BYTES: Final = 32_000_000
+"""Two hundred bytes a profile make records of any repository; more is some other file."""
 _ROUNDING: Final = 1e-9
 """Relative allowance for a figure that was written and read again, or computed on another machine."""
 
