@@ -9,7 +9,7 @@ import pytest
 
 from busplan.errors import BusplanError
 from busplan.profile.bus import TableExecution
-from busplan.profile.shipped import load, locate, shipped_folder, shipped_names
+from busplan.profile.shipped import load, locate, locate_measurements, shipped_folder, shipped_names
 from busplan.profile.starter import starter_text
 from busplan.profile.toml import decode, validate
 

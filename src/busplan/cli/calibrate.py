@@ -95,7 +95,7 @@ def calibrate_command(
     if apply:
         note = report.provenance(result, source=Path(name).name)
         apply_changes(loaded.document, report.execution_changes(result.execution), notes={report.SECTION: note})
-        say(f"wrote [{report.SECTION}] of {profile}; comments of yours beside it are as they were")
+        say(f"wrote [{report.SECTION}] of {profile}; every comment of yours is kept")
     if format_ == "table":
         emit(report.calibration_lines(result, source=name))
         return
