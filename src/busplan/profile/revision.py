@@ -28,7 +28,7 @@ _KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIE
 _AT_HOME: Final = ("-c", "protocol.allow=never", "-c", "core.fsmonitor=false")
 """Reading a page of text from a disk asks no other machine, and runs no program that a repository names."""
 _ALONE: Final = {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": ""}
-"""Likewise. A repository may allow itself a protocol, `protocol.ext.allow`; the empty list of the variable comes first."""
+"""Likewise. A repository may allow itself a protocol, `protocol.ext.allow`; the variable's empty list comes first."""
 
 
 class _Place(NamedTuple):
