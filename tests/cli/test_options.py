@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.cli.options import bus_changes, complete_profile, parse_sizes, periods_us, timing_models
+from busplan.cli.options import bus_changes, complete_profile, parse_sizes, periods_us, time_us, timing_models
 from busplan.errors import BusplanError
 from busplan.profile.model import Profile
 from busplan.profile.shipped import load
@@ -210,3 +210,10 @@ def test_completion_offers_the_shipped_names_that_begin_so() -> None:
     assert complete_profile("paper-o") == ["paper-optimal-gap"]
     assert complete_profile("x") == []
     assert "paper-4ms" in complete_profile("")
+
+
+@pytest.mark.parametrize("text", ["1e308s", "1e303ms", f"{'9' * 400}us"])
+def test_a_time_that_no_number_holds_is_refused(text: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        time_us(text, option="--from")
+    assert str(caught.value) == f"--from {text}: is longer than any time; expected one as 4ms, 250us or 0.001s"
