@@ -66,6 +66,8 @@ def calls() -> Iterator[tuple[str, ...]]:
     yield ("sweep", PROFILE, "--vary", f"{EVIL}=1")
     yield ("explain", PROFILE, EVIL)
     yield ("plan", PROFILE, "--no-circle", "-o", f"new-{EVIL}")
+    yield from ((EVIL,), (f"--{EVIL}",), ("capacity", PROFILE, f"--{EVIL}"), ("schema", EVIL), ("rule", EVIL))
+    yield from (("capacity", PROFILE, option, EVIL) for option in ("--format", "--nodes", "--period", "--gap-count"))
 
 
 def _shown(arguments: tuple[str, ...]) -> str:
