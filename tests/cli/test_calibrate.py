@@ -115,6 +115,16 @@ def test_apply_from_a_table_to_a_line_and_back(bench: Path) -> None:
     assert set(load(str(bench)).document.data()["node"]["execution"]) == {"grade", "kind", "payload_bytes", "time_us"}
 
 
+def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(bench: Path) -> None:
+    text = bench.read_text().replace("payload_bytes = [4, 16", "payload_bytes = [  # from the bench\n4, # least\n16")
+    assert "# from the bench" in text
+    bench.write_text(text.replace("405.2]", "405.2]  # by Li"))
+    run = busplan("calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply", cwd=bench.parent)
+    assert (run.returncode, run.stderr) == (0, "wrote [node.execution] of bench.toml; every comment of yours is kept\n")
+    lines = bench.read_text().splitlines()
+    assert {"# from the bench", "# least", "# by Li"} <= set(lines)
+
+
 @pytest.mark.parametrize("moment", KILLS)
 def test_a_kill_while_writing_leaves_the_profile_whole(bench: Path, moment: str) -> None:
     before = bench.read_bytes()

@@ -522,7 +522,7 @@ def test_the_pre_commit_hook_checks_profiles_and_nothing_else(folder: Path) -> N
 
     def run(*names: str) -> Run:
         return subprocess.run(
-            [*hook["entry"].split(), *names],
+            [*hook["entry"].split(), *hook["args"], *names],
             capture_output=True,
             text=True,
             cwd=repository,
@@ -536,9 +536,14 @@ def test_the_pre_commit_hook_checks_profiles_and_nothing_else(folder: Path) -> N
     failed = run(*shipped, "machine/profiles/fails.toml")
     assert failed.returncode == 1
     assert failed.stdout.startswith("machine/profiles/fails.toml:11:1: BP101 ")
+    option = "--stdin-filename=x/profiles/fails.toml"
+    (repository / option).parent.mkdir(parents=True)
+    shutil.copy(repository / "machine" / "profiles" / "fails.toml", repository / option)
+    assert re.search(hook["files"], option)
+    assert run(*shipped, option).returncode == 1
 
 
-def action_step(number: int, folder: Path, *, path: str, **inputs: str) -> Run:
+def action_step(number: int, folder: Path, *, path: str, temporary: Path | None = None, **inputs: str) -> Run:
     """Run one step of the action as the runner does: inputs put in, then bash with its usual flags."""
     action = parsed("action.yml")
     given = {name: one["default"] for name, one in action["inputs"].items()} | inputs
@@ -556,7 +561,7 @@ def action_step(number: int, folder: Path, *, path: str, **inputs: str) -> Run:
         cwd=folder,
         env=environment(
             PATH=path,
-            RUNNER_TEMP=str(folder / "runner temp"),
+            RUNNER_TEMP=str(temporary or folder / "runner temp"),
             GITHUB_ACTION_PATH=str(ROOT),
             **{name: put_in(value) for name, value in step.get("env", {}).items()},
         ),
@@ -591,13 +596,45 @@ def test_the_action_checks_and_annotates(folder: Path) -> None:
     assert not (folder / "owned").exists()
 
 
+HOSTILE_FILES = ("--exit-zero", "--help", "-o", "--baseline=b", "-", "-qv")
+"""Names that a pull request may give, each an option of `check` or standard input."""
+
+
+@pytest.mark.parametrize("paths", ["*", "-* p", "* nothing-here", "./* p/fails.toml"])
+def test_no_file_of_a_pull_request_is_an_option_of_the_action(folder: Path, paths: str) -> None:
+    program_folder(folder / "runner temp" / "busplan" / "bin")
+    work = folder / "work"
+    work.mkdir()
+    (folder / "p").rename(work / "p")
+    for name in HOSTILE_FILES:
+        shutil.copy(work / "p" / "fails.toml", work / name)
+    run = action_step(1, work, path=os.environ["PATH"], temporary=folder / "runner temp", paths=paths)
+    assert run.returncode == (2 if "nothing-here" in paths else 1), run.stderr
+    for name in HOSTILE_FILES:
+        assert f"file={name},line=11," in run.stdout
+    assert sorted(path.name for path in work.iterdir()) == sorted([*HOSTILE_FILES, "p"])
+
+
+def test_a_folder_called_like_a_shipped_profile_is_that_folder(folder: Path) -> None:
+    program_folder(folder / "runner temp" / "busplan" / "bin")
+    (folder / "p").rename(folder / "paper-1ms")
+    run = action_step(1, folder, path=os.environ["PATH"], paths="paper-1ms")
+    assert run.returncode == 1
+    assert "file=paper-1ms/fails.toml,line=11," in run.stdout
+    run = action_step(1, folder, path=os.environ["PATH"], paths=str(folder / "paper-1ms" / "clean.toml"))
+    assert run.returncode == 0
+    # Options are the workflow's own, and no wildcards.
+    assert action_step(1, folder, path=os.environ["PATH"], paths="paper-1ms", args="--exit-zero").returncode == 0
+    assert action_step(1, folder, path=os.environ["PATH"], paths="paper-1ms", args="--baseline *").returncode == 2
+
+
 def test_the_action_installs_into_a_folder_of_its_own(folder: Path) -> None:
     # The install itself takes a network and half a minute: here a python3 that writes down what it is asked for.
     stub = folder / "stub"
     stub.mkdir()
     (stub / "python3").write_text(
         '#!/bin/bash\nprintf "%s\\n" "$@" >> log\n'
-        'if [ "$2" = venv ]; then mkdir -p "$3/bin"; cp "$0" "$3/bin/python"; fi\n',
+        'if [ "$3" = venv ]; then mkdir -p "$4/bin"; cp "$0" "$4/bin/python"; fi\n',
         encoding="utf-8",
     )
     (stub / "python3").chmod(0o755)
@@ -605,6 +642,6 @@ def test_the_action_installs_into_a_folder_of_its_own(folder: Path) -> None:
     assert run.returncode == 0, run.stderr
     temporary = folder / "runner temp" / "busplan"
     assert (folder / "log").read_text(encoding="utf-8").splitlines() == [
-        "-m", "venv", str(temporary), "-m", "pip", "install", "--quiet", str(ROOT),
+        "-I", "-m", "venv", str(temporary), "-I", "-m", "pip", "install", "--quiet", str(ROOT),
     ]  # fmt: skip
     assert (ROOT / "pyproject.toml").is_file()

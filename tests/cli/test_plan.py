@@ -108,7 +108,7 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
     ("arguments", "words"),
     [
         (["paper-1ms", "--apply"], "busplan init"),
-        (["-", "--apply"], "-o NEW.toml"),
+        (["-", "--apply"], "give the profile as a file"),
         (["mine.toml", "--nodes", "2", "--axes", "8"], "give one of them"),
         (["mine.toml", "--apply", "-o", "x.toml"], "give one of them"),
         (["mine.toml", "--force"], "goes with -o"),

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -131,6 +132,15 @@ def test_standard_input_is_called_so_in_messages(refused: Refused) -> None:
 
 def test_a_file_that_never_ends_is_given_up(refused: Refused) -> None:
     assert refused("capacity", "/dev/zero").startswith("/dev/zero:1:1: the file is larger than 100,000 bytes")
+
+
+@pytest.mark.skipif(not os.access("/dev/shm", os.W_OK), reason="no memory of its own below /dev")
+def test_a_pipe_that_nobody_writes_is_not_waited_for_below_dev_either(refused: Refused) -> None:
+    with TemporaryDirectory(dir="/dev/shm") as folder:
+        path = f"{folder}/pipe.toml"
+        os.mkfifo(path)
+        # As a process: it would wait for ever.
+        assert refused("capacity", path, env={}) == f"{path}: is a named pipe; give a regular file"
 
 
 def test_a_file_that_is_not_ones_own_is_refused(refused: Refused, tmp_path: Path) -> None:

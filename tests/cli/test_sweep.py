@@ -177,6 +177,10 @@ REFUSALS = {
     "--vary cycle.period_us=1000,1050 --circle": "at cycle.period_us = 1050: step_us = 100.0",
     "--vary bus.nodes=1:9 -o no/such/folder.csv": "there is no folder",
     "--vary bus.nodes=0:9": "bus.nodes 0: must be 1 or more",
+    "--vary bus.nodes=99999999999999999999999": "bus.nodes 99999999999999999999999: must be 1,000,000 or less",
+    "--vary payload.read_bytes=4:1004:#50": "payload.read_bytes 24.408163265306122: expected a whole number",
+    "--vary payload.read_bytes=4:1004:#150": "payload.read_bytes 10.711409395973154: expected a whole number",
+    "--vary payload.read_bytes=4:1000:0.5": "payload.read_bytes 4.5: expected a whole number",
     "": "--vary: nothing to vary",
 }
 

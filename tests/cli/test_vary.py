@@ -34,6 +34,8 @@ def values(spec: str) -> list[object]:
         ("4.0", [4]),
         ("-1:1", [-1, 0, 1]),
         ("7:7", [7]),
+        ("7:7:0.5", [7]),
+        ("99999999999999999999999", [99999999999999999999999]),
     ],
 )
 def test_values(spec: str, expected: list[object]) -> None:

@@ -180,7 +180,12 @@ def check(chunks: list[Chunk], changes: dict[str, Any], line_end: str = "\n") ->
         if not any(change == key or change.startswith(f"{key}.") for change in changes):
             kept = chunk.replace("\n", line_end)
         elif changes.get(key, "") is None:
-            continue  # gone, and its comment with it
+            # Gone, and its comments are there, each on a line of its own.
+            for comment in re.findall(r"# (?:c[0-9]+;|of [0-9.]+)", chunk):
+                alone = re.search(rf"^[ \t]*{re.escape(comment)}\r?$", new[at:], re.MULTILINE)
+                assert alone, f"{comment!r} has no line"
+                at += alone.end()
+            continue
         else:
             comment = re.search(r"# c[0-9]+;", chunk)
             kept = comment.group() if comment else ""
@@ -258,7 +263,7 @@ def test_a_table_that_is_not_there_yet_gets_a_section_at_the_end_where_its_paren
     assert result == f"{text}\n\n[cycle.sync]\nping_us = 1\nping_per_node_us = 2\n"
 
 
-def test_a_new_kind_takes_the_old_keys_away_and_keeps_the_comments_of_the_others() -> None:
+def test_a_new_kind_takes_the_old_keys_away_and_keeps_their_comments() -> None:
     changes = {
         "node.execution.kind": "linear",
         "node.execution.base_us": 30.0,
@@ -268,7 +273,7 @@ def test_a_new_kind_takes_the_old_keys_away_and_keeps_the_comments_of_the_others
     }
     result = edited(Document("x.toml", PLAIN), changes)
     assert result == PLAIN[: PLAIN.index('  kind = "table')] + (
-        '  kind = "linear"\n  base_us = 30.0\n  per_byte_us = 0.35\n'
+        '  kind = "linear"\n  # the smallest\n  # by hand\n  base_us = 30.0\n  per_byte_us = 0.35\n'
     )
 
 

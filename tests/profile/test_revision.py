@@ -1,6 +1,7 @@
 """REV:path is the file that git has there, or one message that says why there is none."""
 
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -229,20 +230,37 @@ def test_a_tree_that_git_cannot_read_is_no_unknown_revision(
         load_revision("HEAD:profiles/line.toml")
 
 
+def old_git(folder: Path) -> Path:
+    """A folder for PATH with a git that does not know how to leave what is missing alone."""
+    git = shutil.which("git")
+    folder.mkdir()
+    (folder / "git").write_text(f'#!/bin/sh\nunset GIT_NO_LAZY_FETCH\nexec {git} "$@"\n', encoding="utf-8")
+    (folder / "git").chmod(0o755)
+    return folder
+
+
+@pytest.mark.parametrize("age", ["new", "old"])
+@pytest.mark.parametrize("missing", ["profiles/line.toml", "profiles", ""])
 def test_no_program_of_a_repository_is_run_to_fetch_what_is_missing(
-    repository: Path, git: Git, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    repository: Path, git: Git, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, missing: str, age: str
 ) -> None:
-    damaged(repository, git, "profiles/line.toml")
+    damaged(repository, git, missing)
     mark = tmp_path / "run"
     git("config", "core.repositoryformatversion", "1")
     git("config", "extensions.partialClone", "origin")
     git("config", "remote.origin.promisor", "true")
-    git("config", "remote.origin.url", "ssh://nowhere.invalid/x")
+    git("config", "protocol.ext.allow", "always")
     git("config", "core.sshCommand", f"touch {mark};")
+    if age == "old":
+        monkeypatch.setenv("PATH", f"{old_git(tmp_path / 'bin')}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.chdir(repository)
-    with pytest.raises(BusplanError):
-        load_revision("HEAD:profiles/line.toml")
-    assert not mark.exists()
+    for url in (f"ext::touch {mark}", "ssh://nowhere.invalid/x"):
+        git("config", "remote.origin.url", url)
+        assert refusal("HEAD:profiles/line.toml") == (
+            "HEAD:profiles/line.toml: an object of it was not fetched into this partial clone, and busplan asks no "
+            "other machine; fetch it with git first"
+        )
+        assert not mark.exists()
 
 
 def test_a_name_of_two_things_is_refused(repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.profile.shipped import load, locate, shipped_folder, shipped_names
+from busplan.profile.shipped import load, locate, locate_measurements, shipped_folder, shipped_names
 from busplan.profile.starter import starter_text
 from busplan.profile.toml import decode, validate
 from busplan.sections.execution import TableExecution
@@ -206,3 +206,10 @@ def test_a_starter_comes_from_a_shipped_profile_only(source: str) -> None:
     with pytest.raises(BusplanError) as caught:
         starter_text(source, name="x")
     assert str(caught.value).startswith(f"--from {source}: no shipped profile; shipped are paper-1ms, ")
+
+
+def test_a_file_called_like_standard_input_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "-").write_bytes(locate("paper-1ms")[0].read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert load("./-").profile.name == "paper-1ms"
+    assert locate_measurements("./-").path == tmp_path / "-"

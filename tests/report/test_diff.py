@@ -15,6 +15,7 @@ from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.changes import shown_value
 from busplan.report.diff import diff_document, diff_lines, diff_markdown, regression_words
+from busplan.report.lines import plain_text
 from busplan.report.text import to_json
 from busplan.sections.profile import Profile
 
@@ -153,7 +154,8 @@ def test_every_figure_has_a_row_and_the_same_profile_has_none(paper: Profile) ->
 
 def test_a_terminal_is_commanded_by_no_argument(paper: Profile) -> None:
     lines = diff_lines(difference(paper, paper), arguments=("\x1b[31m.toml", "b\n.toml"))
-    assert all(line.text.isprintable() for line in lines)
+    assert plain_text(lines).splitlines()[1].startswith("A: \\x1b[31m.toml")
+    assert all(line.isprintable() for line in plain_text(lines).splitlines())
 
 
 def test_why_a_circle_has_no_figures_is_said() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from busplan.report.lines import Line
+from busplan.report.lines import Line, plain_text
 
 
 class Answer(ABC):
@@ -33,7 +33,7 @@ class Answer(ABC):
         return self._report()[0].text
 
     def __str__(self) -> str:
-        return "\n".join(line.text for line in self._report())
+        return plain_text(self._report()).removesuffix("\n")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._headline()}>"

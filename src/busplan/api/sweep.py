@@ -19,7 +19,7 @@ from busplan.profile.kinds import words_of
 from busplan.report.lines import Line
 from busplan.report.sweep.rows import json_footer, json_header, json_rows
 from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
-from busplan.report.text import csv_cell
+from busplan.report.text import spelled
 from busplan.sections.profile import Profile
 
 MOST_POINTS: Final = 2_000_000
@@ -104,7 +104,7 @@ def _rows(block: Block, name: str) -> Array:
 def _spelled(column: Column) -> Array:
     if column.words is None:
         return column.values
-    words: Array = np.array([str(csv_cell(word)) for word in column.words])
+    words: Array = np.array([str(spelled(word)) for word in column.words])
     return words[column.values]
 
 

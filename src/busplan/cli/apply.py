@@ -2,18 +2,22 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from busplan.cli.output import write_file
+from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.profile.document import Document
 
 
 def require_own_file(argument: str) -> None:
-    """Refuse a PROFILE argument that names no file of the user's; to be called before the work.
+    """Refuse a PROFILE argument that names no file of the user's, or one that cannot be changed; before the work.
 
     Raises
     ------
     BusplanError
-        Standard input, or a shipped profile.
+        Standard input, a shipped profile, or a file that is read-only or has hard links.
     """
     from busplan.profile.shipped import shipped_names
 
@@ -24,27 +28,35 @@ def require_own_file(argument: str) -> None:
             f"--apply: {argument} is a shipped profile and stays as it is; busplan init my-machine --from {argument} "
             "writes one of your own"
         )
+    require_changeable(Path(argument))
 
 
-def apply_changes(argument: str, changes: Mapping[str, object], *, notes: Mapping[str, str] | None = None) -> None:
-    """Change values of the profile's file; comments, layout and line ends stay.
+def apply_changes(
+    document: "Document", changes: Mapping[str, object], *, notes: Mapping[str, str] | None = None
+) -> None:
+    """Change values of a profile's file; comments, layout and line ends stay.
 
     Parameters
     ----------
-    argument
-        The PROFILE argument: a file (see `require_own_file`).
+    document
+        The text that the changes are made for, of a file of the user's (see `require_own_file`).
     changes, notes
         As for `profile.edit.edited`.
 
     Raises
     ------
     BusplanError
-        A change that cannot be made, or a file that cannot be written; it is as it was.
+        The file has another text by now, a change that cannot be made, or a file that cannot be written; it is as it
+        was.
     """
     from busplan.profile.edit import edited_file
-    from busplan.profile.toml import read_bytes
+    from busplan.profile.toml import decode, read_bytes
 
-    require_own_file(argument)
-    path = Path(argument)
-    content = edited_file(read_bytes(path, name=argument), changes, name=argument, notes=notes)
-    write_file(path, content, overwrite=True)
+    name = document.name
+    path = Path(name)
+    with changing(path):
+        # Absolute: a file may be called "-", which there means standard input.
+        content = read_bytes(path.absolute(), name=name)
+        if decode(content, name=name) != document:
+            raise BusplanError(f"--apply: {name} was changed meanwhile, and stays as it is now; run the command again")
+        rewrite(path, edited_file(content, changes, name=name, notes=notes))

@@ -7,11 +7,11 @@ import typer
 
 from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.options import (
+    BUS_OPTIONS,
     NO_CHANGES,
     Changes,
     FormatOption,
     ProfileArgument,
-    load_changed,
     takes_bus_options,
     timing_model,
 )
@@ -84,11 +84,12 @@ def calibrate_command(
         require_own_file(profile)
     from busplan.analysis.calibration.calibrate import calibrate
     from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
-    from busplan.profile.shipped import locate_measurements
-    from busplan.profile.toml import read_bytes
+    from busplan.profile.shipped import load, locate_measurements
+    from busplan.profile.toml import override, read_bytes
     from busplan.report import calibration as report
 
-    bench = load_changed(profile, changes)
+    loaded = load(profile)
+    bench = override(loaded.profile, changes, origin=BUS_OPTIONS)
     path, name, shipped = locate_measurements(measurements)
     result = calibrate(
         bench,
@@ -102,8 +103,8 @@ def calibrate_command(
     )
     if apply:
         note = report.provenance(result, source=Path(name).name)
-        apply_changes(profile, report.execution_changes(result.execution), notes={report.SECTION: note})
-        say(f"wrote [{report.SECTION}] of {profile}; comments of yours beside it are as they were")
+        apply_changes(loaded.document, report.execution_changes(result.execution), notes={report.SECTION: note})
+        say(f"wrote [{report.SECTION}] of {profile}; every comment of yours is kept")
     if format_ == "table":
         emit(report.calibration_lines(result, source=name))
         return

@@ -8,6 +8,7 @@ import typer
 
 from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, emit_text, say, write_file
+from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -80,6 +81,8 @@ def check_command(
     """
     if update_baseline and baseline is None:
         raise BusplanError("--update-baseline: needs --baseline FILE")
+    if update_baseline and baseline is not None:
+        require_changeable(baseline)
     from busplan.profile.collect import collect
     from busplan.rules.gate import check_source
 
@@ -95,7 +98,7 @@ def check_command(
         say(*(f"{name}: skipped, claims no schema_version" for name in collection.skipped))
         say(*(f"{file.path}: ok" for file in report.files if file.status == "ok"))
     if update_baseline and baseline is not None:
-        _update_baseline(baseline, recorded or {}, report, quiet=quiet)
+        _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
         from busplan.report.gate.plain import summary_line
 
@@ -129,23 +132,29 @@ def _check(
 def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
     if path is None or (not needed and not path.exists()):
         return None
-    from busplan.rules.baseline import read_baseline
+    from busplan.profile.toml import read_bytes
+    from busplan.rules.baseline import MAX_BASELINE_BYTES, read_baseline
 
+    # Absolute: a file may be called "-", which there means standard input.
+    content = read_bytes(path.absolute(), name=str(path), limit=MAX_BASELINE_BYTES)
+    if len(content) > MAX_BASELINE_BYTES:
+        raise BusplanError(f"{path}: is larger than {MAX_BASELINE_BYTES:,} bytes, so it is no baseline; give another")
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is not UTF-8"
-        raise BusplanError(f"{path}: the baseline cannot be read: {reason}") from None
+        text = content.decode()
+    except UnicodeDecodeError:
+        raise BusplanError(f"{path}: is not UTF-8, so it is no baseline; give another") from None
     return read_baseline(text, name=str(path))
 
 
-def _update_baseline(path: Path, recorded: Recordings, report: "CheckReport", *, quiet: bool) -> None:
+def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
     """Record what was checked; profiles that were not checked keep their record."""
     from busplan.rules.baseline import write_baseline
 
     now = {file.path: file.figures for file in report.files if file.figures}
-    # A path that is no UTF-8 becomes an escape, which reading the JSON takes back.
-    write_file(path, write_baseline({**recorded, **now}).encode("utf-8", "backslashreplace"), overwrite=True)
+    with changing(path):
+        # Read again: another run may have written since the check began.
+        recorded = _read_baseline(path, needed=False) or {}
+        rewrite(path, write_baseline({**recorded, **now}).encode())
     if not quiet:
         say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
 

@@ -1,8 +1,11 @@
 """How --help reads: arguments by plain names, commands in whole sentences, and what the exit codes mean."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, Final
 
 from typer.core import TyperCommand, TyperGroup
+from typer.exceptions import TyperException
 
 FAILURES: Final = "Exits 2 when it could not do its job and says why on standard error, 130 when interrupted."
 """What holds for every command, and stands at the end of its help."""
@@ -38,6 +41,16 @@ class PlainCommand(TyperCommand):
 class PlainGroup(TyperGroup):
     """The program's help: its commands first."""
 
+    def make_context(self, *arguments: Any, **settings: Any) -> Any:
+        """Read the options before the command."""
+        with _usage_as_text():
+            return super().make_context(*arguments, **settings)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Read what follows, and run the command."""
+        with _usage_as_text():
+            return super().invoke(ctx)
+
     def get_params(self, ctx: Any) -> list[Any]:
         """Options, those of typer's completion in words of ours: it adds them behind our back."""
         params: list[Any] = super().get_params(ctx)
@@ -59,6 +72,18 @@ class PlainGroup(TyperGroup):
         """Write commands and options."""
         self.format_commands(ctx, formatter)
         _write_parameters(self, ctx, formatter)
+
+
+@contextmanager
+def _usage_as_text() -> Iterator[None]:
+    """Show what was typed as text: typer escapes control characters in its errors, and no marks of direction."""
+    try:
+        yield
+    except TyperException as error:
+        from busplan.printable import printable_lines
+
+        error.message = printable_lines(error.message)
+        raise
 
 
 def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: Any) -> None:

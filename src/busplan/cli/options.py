@@ -5,6 +5,7 @@ from collections.abc import Callable
 from decimal import Decimal
 from functools import wraps
 from inspect import Parameter, signature
+from math import isinf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
 
@@ -172,13 +173,16 @@ def time_us(text: str, *, option: str) -> float:
     Raises
     ------
     BusplanError
-        No number, or no unit.
+        No number, no unit, or more than a number can hold.
     """
     match = _TIME.fullmatch(text.strip())
     if match is None:
         raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
     # Decimal keeps 0.0003 s the float nearest to 300 us.
-    return float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+    found_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
+    if isinf(found_us):
+        raise BusplanError(f"{option} {text}: is longer than any time; expected one as 4ms, 250us or 0.001s")
+    return found_us
 
 
 def parse_sizes(text: str, *, option: str) -> list[int]:

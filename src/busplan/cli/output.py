@@ -37,11 +37,12 @@ class StoppedError(KeyboardInterrupt):
 
 def say(*messages: str) -> None:
     """Write a summary or errors to stderr, a line each; a closed stderr is no reason to fail."""
+    from busplan.printable import printable  # a run that says nothing need not load it
+
     with suppress(OSError):
         for message in messages:
             # What a user typed or a file is called may hold anything: nothing of it commands the terminal.
-            shown = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in message)
-            print(shown, file=sys.stderr, flush=True)  # noqa: T201 - this is the place that prints
+            print(printable(message), file=sys.stderr, flush=True)  # noqa: T201 - this is the place that prints
 
 
 def emit_text(text: str) -> None:
@@ -72,21 +73,25 @@ def _abandon_stdout() -> None:
 
 def emit(lines: Iterable["Line"]) -> None:
     """Write a report to stdout: with colours on a terminal only, and none under NO_COLOR."""
+    from busplan.report.lines import plain_text
+
     # A pipe gets plain lines, and does not wait for the renderer to load.
     styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or (sys.stdout is not None and sys.stdout.isatty())
-    emit_text(_styled(lines) if styled else "".join(f"{line.text}\n" for line in lines))
+    emit_text((_styled if styled else plain_text)(lines))
 
 
 def _styled(lines: Iterable["Line"]) -> str:
     from rich.console import Console
     from rich.text import Text
 
+    from busplan.printable import printable
+
     buffer = io.StringIO()
     console = Console(file=buffer, force_terminal=True, highlight=False, markup=False, emoji=False)
     # On a terminal too narrow for a sentence, and for the lines of a table, the terminal breaks: no figure is ever cut.
     console.width = max(console.width, _NARROWEST)
     for line in lines:
-        console.print(Text(line.text, style=_STYLES[line.tone]), soft_wrap=line.tone in ("table", "heading"))
+        console.print(Text(printable(line.text), style=_STYLES[line.tone]), soft_wrap=line.tone in ("table", "heading"))
     return buffer.getvalue()
 
 

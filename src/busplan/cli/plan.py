@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, ProfileArgument, bus_changes, periods_us
-from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say, write_file
+from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -103,13 +104,10 @@ def plan_command(
     """
     _check_options(nodes=nodes, axes=axes, apply=apply, output=output, force=force)
     from busplan.analysis.planning.options import plan
-    from busplan.profile.shipped import load, shipped_names
+    from busplan.profile.shipped import load
 
-    if apply and (profile == "-" or profile in shipped_names()):
-        what = "standard input is no file" if profile == "-" else "is a shipped profile"
-        raise BusplanError(
-            f"--apply {profile}: {what}; write a new one with -o NEW.toml, or make your own with busplan init first"
-        )
+    if apply:
+        require_own_file(profile)
     loaded = load(profile)
     wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
     with_circle = circle and loaded.profile.asks_for_circle
@@ -133,7 +131,7 @@ def plan_command(
 
             new.write(profile_text(result.recommended.profile).encode())
     if apply:
-        _apply(loaded, result, path=Path(profile))
+        _apply(loaded, result)
     elif output is not None:
         say(f"wrote {output}")
     _emit(result, format_=format_, with_circle=with_circle)
@@ -170,27 +168,22 @@ def _wanted(
     return wanted  # type: ignore[return-value]
 
 
-def _apply(loaded: "LoadedProfile", result: "Plan", *, path: Path) -> None:
-    """Edit the recommended values into the file, unless it is no longer the one that was planned for."""
-    from busplan.profile.edit import edited_file
-    from busplan.profile.toml import decode, read_bytes
+def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
+    """Edit the recommended values into the file."""
     from busplan.report.plan import settings
 
     if result.recommended is None:
         return
     changes = result.all_changes(result.recommended)
     if not changes:
-        say(f"{path}: nothing to change, left as it is")
+        say(f"{loaded.document.name}: nothing to change, left as it is")
         return
-    content = read_bytes(path, name=str(path))
-    if decode(content, name=str(path)) != loaded.document:
-        raise BusplanError(f"--apply {path}: the file was changed while the plan was made; run the command again")
     # A whole number is written as one.
     values = {
         key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
     }
-    write_file(path, edited_file(content, values, name=str(path)), overwrite=True)
-    say(f"changed {path}: {settings(loaded.profile, changes)}")
+    apply_changes(loaded.document, values)
+    say(f"changed {loaded.document.name}: {settings(loaded.profile, changes)}")
 
 
 def _emit(result: "Plan", *, format_: str, with_circle: bool) -> None:

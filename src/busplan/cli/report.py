@@ -74,8 +74,10 @@ def report_command(
 
     Example: busplan report paper-4ms paper-1ms -o report.html
     """
+    from busplan.printable import commands
+
     chosen = form_of_file(format_, output, forms=_SUFFIXES, default="html")
-    if title is not None and (not title.isprintable() or not title.strip()):
+    if title is not None and (commands(title) or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
     plans = load_each(profiles, partial(_plan, period=period))
     if output is None:

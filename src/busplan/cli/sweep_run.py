@@ -201,7 +201,9 @@ class _TableSink:
         if self._file is None:
             emit(lines)
         else:
-            _write(self._file, "".join(f"{line.text}\n" for line in lines))
+            from busplan.report.lines import plain_text
+
+            _write(self._file, plain_text(lines))
 
 
 class _TextSink:

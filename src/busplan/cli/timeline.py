@@ -185,9 +185,10 @@ def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> No
 def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
     """The document in one of the forms that are text."""
     if chosen == "table":
+        from busplan.report.lines import plain_text
         from busplan.report.timeline.terminal import timeline_lines
 
-        return "".join(f"{line.text}\n" for line in timeline_lines(shown, width=_PIPE_COLUMNS))
+        return plain_text(timeline_lines(shown, width=_PIPE_COLUMNS))
     if chosen == "svg":
         from busplan.report.timeline.svg import timeline_svg
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from busplan.errors import BusplanError
+from busplan.printable import printable
 from busplan.profile.positions import KeyPath, scan
 
 _BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
@@ -98,6 +99,10 @@ class Layout:
         """Start of the line behind that of an offset, or the end of the text."""
         return self.text.find("\n", offset) + 1 or len(self.text)
 
+    def indent(self, line_start: int) -> str:
+        """Blanks that a line begins with."""
+        return self.text[line_start : len(self.text) - len(self.text[line_start:].lstrip(" \t"))]
+
     def refusal(self, path: KeyPath, reason: str) -> BusplanError:
         """Make the error for a change that the layout does not allow."""
         return BusplanError(f"{self.name}: {_key(path)} cannot be changed in place: {reason}")
@@ -151,10 +156,13 @@ class Layout:
         return written(value)
 
     def without(self, path: KeyPath, holder: KeyPath | None) -> str:
-        """The text without a key: without its lines, or without its part of an inline table."""
+        """The text without a key: its comments stay, on lines of their own; beside an inline table they cannot."""
         place = self.places[path]
         if holder is None:
-            return self.spliced(self.line_start(place.key_start), self.next_line(place.value_end), "")
+            start, end = self.line_start(place.key_start), self.next_line(place.value_end)
+            indent = self.indent(start)
+            kept = (self.text[at : self.next_line(at)].rstrip() for at in self.comments if start <= at < end)
+            return self.spliced(start, end, "".join(f"{indent}{comment}{self.line_end}" for comment in kept))
         members = self.members(holder)
         index = members.index(path)
         if index > 0:
@@ -217,8 +225,7 @@ class Layout:
 
     def with_line(self, at: int, like: int, key: KeyPath, value: object) -> str:
         """The text with a new line at an offset, indented as the line that starts at another."""
-        indent = re.compile(r"[ \t]*").match(self.text, like)
-        line = f"{indent.group() if indent else ''}{_key(key)} = {written(value)}{self.line_end}"
+        line = f"{self.indent(like)}{_key(key)} = {written(value)}{self.line_end}"
         before = self.line_end if at and self.text[at - 1] != "\n" else ""
         return self.spliced(at, at, before + line)
 
@@ -235,10 +242,9 @@ class Layout:
             raise self.refusal(table, "there is no such table to write a comment above")
         top = starts[0]
         # A line without control characters; and a suppression stays next to the line it speaks of.
-        shown = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in note)
+        shown = printable(note)
         mark = f"# {shown.partition(':')[0]}:"
-        indent = self.text[top : len(self.text) - len(self.text[top:].lstrip(" \t"))]
-        line = f"{indent}# {shown}{self.line_end}"
+        line = f"{self.indent(top)}# {shown}{self.line_end}"
         while top:
             above = self.line_start(top - 1)
             comment = self.text[above:top].lstrip(" \t")

@@ -9,6 +9,7 @@ from pydantic_core import ErrorDetails
 
 from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
+from busplan.printable import printable
 from busplan.profile.document import Document
 from busplan.profile.kinds import kind_of, may_be_of_a_kind, models_of, profile_model
 from busplan.profile.positions import KeyPath, Place
@@ -62,7 +63,7 @@ def _quoted(part: str) -> str:
     if bare:
         return part
     escaped = part.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in escaped) + '"'
+    return '"' + printable(escaped, write=lambda one: f"\\U{ord(one):08x}") + '"'
 
 
 def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
@@ -229,7 +230,7 @@ def _is_element(found: KeyFinding) -> bool:
 
 
 def _shortened(written: str, limit: int = 40) -> str:
-    line = "".join(character if character.isprintable() else " " for character in written)
+    line = printable(written, write=lambda _: " ")
     return line if len(line) <= limit else f"{line[:limit]}..."
 
 

@@ -19,12 +19,16 @@ _FORM: Final = re.compile(r"(?P<revision>(?:\{[^}]*\}|[^:{])+):(?P<path>.+)", re
 _OBJECT: Final = re.compile(r"(?P<id>[0-9a-f]{40,64}) (?P<kind>\w+) (?P<size>[0-9]+)")
 """How git answers for what is there."""
 _DAMAGED: Final = "git cannot read it here: an object is damaged or was not fetched; git fsck tells"
+_NOT_FETCHED: Final = re.compile(rb"promisor remote|lazy fetching disabled|transport '[^']*' not allowed")
+"""How git speaks of what a partial clone has left at its origin."""
 _NEVER: Final = ("\0", "\n", "\r")
 """What git takes for the end of a name."""
 _KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_NO_REPLACE")
 """Of git's variables, those that say how to work. The others, which git sets for its hooks, name a repository."""
 _AT_HOME: Final = ("-c", "protocol.allow=never", "-c", "core.fsmonitor=false")
 """Reading a page of text from a disk asks no other machine, and runs no program that a repository names."""
+_ALONE: Final = {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": ""}
+"""Likewise. A repository may allow itself a protocol, `protocol.ext.allow`; the variable's empty list comes first."""
 
 
 class _Place(NamedTuple):
@@ -143,7 +147,7 @@ def _git(place: _Place, *arguments: str, names: bytes = b"") -> bytes:
             [git, *_AT_HOME, "-C", str(place.folder), *arguments],
             check=False,
             capture_output=True,
-            env={**kept, "LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1"},
+            env={**kept, **_ALONE},
             input=names,
             timeout=TIMEOUT_S,
         )
@@ -151,6 +155,11 @@ def _git(place: _Place, *arguments: str, names: bytes = b"") -> bytes:
         raise BusplanError(f"{place.argument}: git gave no answer within {TIMEOUT_S:g} s") from None
     except OSError as error:
         raise BusplanError(f"{place.argument}: git cannot be run: {error.strerror}") from None
+    if _NOT_FETCHED.search(done.stderr):
+        raise BusplanError(
+            f"{place.argument}: an object of it was not fetched into this partial clone, and busplan asks no other "
+            "machine; fetch it with git first"
+        )
     if done.returncode:
         raise BusplanError(f"{place.argument}: no such file, and {_refusal(place, done.stderr)}")
     # What git warns of is another revision than the one that was meant: a name of two things, a log that is too short.

@@ -43,12 +43,18 @@ def locate(argument: str) -> tuple[Path, str]:
     shipped = shipped_folder() / f"{argument}.toml"
     if shipped.stem == argument and os.path.lexists(shipped):
         return shipped, shipped.name
-    path = Path(argument)
+    path = _path(argument)
     if not argument or not os.path.lexists(path):
         shown = argument or repr(argument)
         names = ", ".join(shipped_names())
         raise BusplanError(f"{shown}: no such file, and no shipped profile of that name; shipped are {names}")
     return path, argument
+
+
+def _path(argument: str) -> Path:
+    """Path of an argument; ./- is a file, which must not become the "-" of standard input."""
+    path = Path(argument)
+    return path.absolute() if str(path) == "-" else path
 
 
 class MeasurementsFile(NamedTuple):
@@ -74,7 +80,7 @@ def locate_measurements(argument: str) -> MeasurementsFile:
     if argument == "-":
         return MeasurementsFile(Path("-"), "<stdin>", shipped=False)
     if argument and os.path.lexists(argument):
-        return MeasurementsFile(Path(argument), argument, shipped=False)
+        return MeasurementsFile(_path(argument), argument, shipped=False)
     names = sorted(path.name for path in shipped_folder().glob("*.csv"))
     if argument in names:
         return MeasurementsFile(shipped_folder() / argument, argument, shipped=True)

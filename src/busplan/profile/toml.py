@@ -18,6 +18,8 @@ from busplan.sections.profile import Profile
 
 MAX_FILE_BYTES: Final = 100_000
 """A profile is a page of text. More is some other file, and reading it whole would only delay saying so."""
+_OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
+"""Where the pipes are that a shell has opened: <(command) is /dev/fd/N, and has a writer."""
 
 
 class LoadedProfile(NamedTuple):
@@ -85,9 +87,9 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
             if sys.stdin is None:
                 raise BusplanError(f"{name}: standard input is closed")
             return sys.stdin.buffer.read(limit + 1)
-        if path.is_fifo() and not path.is_relative_to("/dev"):
-            # Opening it would wait for a writer, for ever; a shell's <(command) is /dev/fd/N and has one.
-            raise BusplanError(f"{name}: is a named pipe; give a profile file, or - for standard input")
+        if path.is_fifo() and not str(path).startswith(_OPENED):
+            # Opening it would wait for a writer, for ever.
+            raise BusplanError(f"{name}: is a named pipe; give a regular file")
         with path.open("rb") as file:
             return file.read(limit + 1)
     except FileNotFoundError:

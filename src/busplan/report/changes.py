@@ -1,12 +1,12 @@
 """Keys whose values differ between two profiles: what they are, shown so that the difference is seen."""
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import takewhile
 from operator import eq
 from typing import Any, Final
 
 from busplan.analysis.comparison.difference import KeyDifference
+from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
 CHANGE_HEADINGS: Final = ("key", "A", "B")
@@ -78,10 +78,10 @@ def _list(items: tuple[Any, ...], other: tuple[Any, ...]) -> str:
 
 def _text(text: str, other: str) -> str:
     if len(text) <= _MOST_CHARACTERS:
-        return json.dumps(text, ensure_ascii=False)
+        return json_text(text)
     start = max(0, _alike(text, other) - _CONTEXT)
     end = start + _MOST_CHARACTERS
-    piece = json.dumps(text[start:end], ensure_ascii=False)
+    piece = json_text(text[start:end])
     return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
 
 

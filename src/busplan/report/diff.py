@@ -8,7 +8,7 @@ from busplan.analysis.network import bus_of, model_names
 from busplan.report import markdown
 from busplan.report.changes import CHANGE_HEADINGS, change_document, change_rows
 from busplan.report.documents import Document, document
-from busplan.report.lines import BLANK, Line, figure_row, plural, printable, table
+from busplan.report.lines import BLANK, Line, figure_row, plural, table
 from busplan.report.words import period
 from busplan.sections.profile import Profile
 
@@ -33,7 +33,7 @@ _MOST_KEYS: Final = 20
 
 def diff_lines(found: Difference, *, arguments: Arguments) -> list[Line]:
     """The verdict, the keys that differ, and every figure of both."""
-    lines = [_headline(found), *(Line(printable(one)) for one in _sides(found, arguments))]
+    lines = [_headline(found), *map(Line, _sides(found, arguments))]
     if not found.keys:
         return lines
     lines.extend(_notes(found))

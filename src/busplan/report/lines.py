@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, NamedTuple
 
 from busplan.buses.figure import Figure
+from busplan.printable import printable
 
 Tone = Literal["good", "bad", "warning", "heading", "plain", "table"]
 """How a line is meant; "table" and "heading" lines keep their columns, the others may be wrapped."""
@@ -20,6 +21,11 @@ class Line(NamedTuple):
 
 
 BLANK = Line("")
+
+
+def plain_text(lines: Iterable[Line]) -> str:
+    """Write lines without colours, each with its line end; nothing in them commands a terminal."""
+    return "".join(f"{printable(line.text)}\n" for line in lines)
 
 
 class GridRow(NamedTuple):
@@ -112,11 +118,6 @@ def plural(number: int, noun: str) -> str:
     if number == 1:
         return f"1 {noun}"
     return f"{number} {noun.removesuffix('is')}es" if noun.endswith("is") else f"{number} {noun}s"
-
-
-def printable(text: str) -> str:
-    """One line that commands no terminal, whatever a file or key is called."""
-    return "".join(one if one.isprintable() else one.encode("unicode_escape", "surrogatepass").decode() for one in text)
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) -> list[Line]:

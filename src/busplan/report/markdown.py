@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final
 
+from busplan.printable import printable
+
 _INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:$]|(?<=www)\.")
 """Markup inside a line, and what makes a link, a mention or a formula of bare words."""
 _AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=#])")
@@ -21,11 +23,11 @@ def escaped(text: str) -> str:
     >>> escaped("a *b*")
     'a \\*b\\*'
     """
-    return _AT_START.sub(r"\1\\\2", _INSIDE.sub(r"\\\g<0>", " ".join(text.split())))
+    return _AT_START.sub(r"\1\\\2", _INSIDE.sub(r"\\\g<0>", printable(" ".join(text.split()))))
 
 
 def code(text: str) -> str:
-    """Write text as code, as it is: nothing in it is markup, no mention and no link.
+    """Write text as code: nothing in it is markup, no mention and no link, and nothing commands a terminal.
 
     Parameters
     ----------
@@ -37,7 +39,7 @@ def code(text: str) -> str:
     >>> code("bus.nodes"), code("a ` b")
     ('`bus.nodes`', '`` a ` b ``')
     """
-    line = " ".join(text.split())
+    line = printable(" ".join(text.split()))
     longest = max(map(len, re.findall("`+", line)), default=0)
     fence = "`" * (longest + 1)
     # A backtick at an edge would join the fence.

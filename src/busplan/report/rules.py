@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from busplan.buses.rule import Rule
-from busplan.report.lines import table
+from busplan.report.lines import plain_text, table
 from busplan.rules.registry import NEVER_SUPPRESSED
 
 _WIDTH: Final = 88
@@ -28,7 +28,7 @@ def rule_rows(rules: Sequence[Rule]) -> list[dict[str, Any]]:
 def rule_table(rules: Sequence[Rule]) -> str:
     """One line a rule."""
     rows = ([rule.code, rule.name, rule.severity, rule.summary] for rule in rules)
-    return "".join(f"{line.text}\n" for line in table(["code", "rule", "severity", "what is wrong"], rows, left=4))
+    return plain_text(table(["code", "rule", "severity", "what is wrong"], rows, left=4))
 
 
 def rule_page(rule: Rule) -> str:

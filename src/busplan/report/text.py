@@ -2,11 +2,14 @@
 
 import csv
 import io
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from busplan.printable import json_text
+
 _BLOCK: Final = 1 << 16
+_FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
+"""How a text begins that spreadsheets take for a formula: it may run a program, or send the sheet away."""
 
 
 def to_json(document: Mapping[str, Any]) -> str:
@@ -17,7 +20,7 @@ def to_json(document: Mapping[str, Any]) -> str:
     ValueError
         A number is not finite: such a document must not leave the program.
     """
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json_text(document, indent=2) + "\n"
 
 
 def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -52,7 +55,19 @@ def csv_blocks(rows: Iterable[Mapping[str, Any]], *, columns: Sequence[str]) -> 
 
 
 def csv_cell(value: object) -> object:
-    """Write a truth in small letters, and a list as words."""
+    """Make a value what a cell holds: a text that a spreadsheet would run as a formula begins with an apostrophe.
+
+    Examples
+    --------
+    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "gap count"]), csv_cell(True)
+    ("'=1+1", -1.5, 'time gap count', 'true')
+    """
+    cell = spelled(value)
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell
+
+
+def spelled(value: object) -> object:
+    """Write a truth in small letters, and a list as words; anything else stays what it is."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):

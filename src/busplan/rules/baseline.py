@@ -7,9 +7,12 @@ from typing import Any, Final
 
 from busplan.buses.rule import RuleProblem
 from busplan.errors import BusplanError
+from busplan.printable import json_text
 from busplan.rules.finding import Subject
 
 _SCHEMA: Final = 1
+MAX_BASELINE_BYTES: Final = 32_000_000
+"""Two hundred bytes a profile make records of any repository; more is some other file."""
 _ROUNDING: Final = 1e-9
 """Relative allowance for a figure that was written and read again, or computed on another machine."""
 
@@ -78,4 +81,4 @@ def write_baseline(recorded: Mapping[str, Recorded]) -> str:
         "command": "baseline",
         "profiles": {path: dict(recorded[path]) for path in sorted(recorded)},
     }
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json_text(document, indent=2) + "\n"

@@ -121,6 +121,8 @@ def _range(name: str, text: str) -> Values:
 
 
 def _steps(name: str, first: Decimal, step: Decimal, size: int) -> Values:
+    if size == 1:
+        return Listed((_plain(first),))
     decimals = max(0, *(-int(one.normalize().as_tuple().exponent) for one in (first, step)))
     start, stride = (int(one.scaleb(decimals)) for one in (first, step))
     if decimals > _MAX_DECIMALS or max(abs(start), abs(start + stride * size)) >= _EXACT:
@@ -160,4 +162,4 @@ def _number(name: str, part: str) -> Decimal:
 
 def _plain(number: Decimal) -> int | float:
     """A whole number as one, so that it may stand for a count; any other as the nearest float."""
-    return int(number) if number == number.to_integral_value() and abs(number) < 2**63 else float(number)
+    return int(number) if number == number.to_integral_value() else float(number)

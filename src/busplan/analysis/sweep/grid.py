@@ -231,7 +231,7 @@ def _require_read(profile: Profile, key: str, *, name: str, circle_option: str |
 
 
 def _samples(axis: Values) -> list[Any]:
-    """Values to check: each, or the extremes of many."""
+    """Values to check: each, or of many the extremes and a fraction if there is one; whole numbers may be counts."""
     if isinstance(axis, Listed):
         if axis.size <= _CHECKED_EACH:
             return list(dict.fromkeys(axis.values))
@@ -240,8 +240,10 @@ def _samples(axis: Values) -> list[Any]:
         fractions = [one for one in numbers if isinstance(one, float)][:1]
         words = set(axis.values) - set(numbers)
         return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *fractions, *words))]
-    chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, axis.size - 1)
-    return [axis.part(index, index + 1).item() for index in chosen]
+    # Of equal steps from a whole number the first that is a fraction is the second value.
+    chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, 1, axis.size - 1)
+    values = (axis.part(index, index + 1).item() for index in chosen)
+    return [int(value) if isinstance(value, float) and value.is_integer() else value for value in values]
 
 
 def _least(values: list[Any]) -> Any:

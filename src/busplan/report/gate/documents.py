@@ -1,8 +1,8 @@
 """Findings as JSON: our own document, and GitLab's code quality report."""
 
-import json
 from pathlib import PurePath
 
+from busplan.printable import json_text
 from busplan.report.documents import document
 from busplan.report.text import to_json
 from busplan.rules.report import CheckReport
@@ -34,4 +34,4 @@ def as_gitlab(report: CheckReport) -> str:
         }
         for one in report.located
     ]
-    return json.dumps(issues, indent=2, ensure_ascii=False) + "\n"
+    return json_text(issues, indent=2) + "\n"

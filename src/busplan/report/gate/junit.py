@@ -4,8 +4,8 @@ import re
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from busplan.printable import printable_lines
 from busplan.report.gate.plain import finding_line
-from busplan.report.lines import printable
 from busplan.rules.gate import FileResult
 from busplan.rules.report import CheckReport
 
@@ -38,4 +38,4 @@ def _case(suite: Element, file: FileResult) -> None:
 
 
 def _clean(text: str) -> str:
-    return _NO_XML.sub("?", "\n".join(map(printable, text.split("\n"))))
+    return _NO_XML.sub("?", printable_lines(text))

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 from unicodedata import category, east_asian_width
 
-from busplan.report.lines import printable
+from busplan.printable import printable
 from busplan.rules.finding import Finding
 from busplan.rules.report import CheckReport
 
@@ -51,7 +51,7 @@ def _full(report: CheckReport) -> Iterator[str]:
 
 def _shown(source: str, offset: int) -> tuple[str, str]:
     """Give a line as it is shown, and what of it stands before an offset."""
-    harmless = "".join(one if one.isprintable() or one == "\t" else " " for one in source)
+    harmless = "\t".join(printable(part, write=lambda _: " ") for part in source.split("\t"))
     if len(harmless) <= _WIDEST:
         return harmless, harmless[:offset]
     start = max(0, min(offset - _WIDEST // 2, len(harmless) - _WIDEST))

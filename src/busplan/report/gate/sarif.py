@@ -5,7 +5,6 @@ References
 OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0.
 """
 
-import json
 import os
 from pathlib import Path, PurePath
 from typing import Any, Final
@@ -13,6 +12,7 @@ from urllib.parse import quote
 
 from busplan import __version__
 from busplan.buses.rule import Rule
+from busplan.printable import json_text
 from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport, Located
 
@@ -42,7 +42,7 @@ def as_sarif(report: CheckReport) -> str:
         "results": [_result(one) for one in report.located],
     }
     document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(document, indent=2) + "\n"
 
 
 def _rule(rule: Rule) -> dict[str, Any]:

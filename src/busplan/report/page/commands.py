@@ -5,6 +5,7 @@ import shlex
 
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.overview import Overview
+from busplan.printable import commands
 from busplan.report import documents
 from busplan.report.explain import figure_document
 from busplan.report.page.content import SourceCommand
@@ -22,7 +23,7 @@ def shell_word(text: str) -> str:
     if text.startswith("-") and text != "-":
         # No shell quoting keeps a program from taking it for an option.
         text = f"./{text}"
-    if text.isprintable():
+    if not commands(text):
         return shlex.quote(text)
     # Bytes that no page can show; bash, zsh and POSIX of 2024 read them in this form.
     return f"$'{''.join(map(_escaped, os.fsencode(text)))}'"

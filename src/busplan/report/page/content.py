@@ -1,9 +1,9 @@
 """What a page is made of in any form: figures that know where they come from, tables, parts and chapters."""
 
-import json
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple
 
+from busplan.printable import json_text
 from busplan.report.documents import Document
 
 Tone = Literal["good", "bad", "warning", "plain"]
@@ -24,7 +24,7 @@ class ShownFigure(NamedTuple):
     @property
     def exact(self) -> str:
         """The value in JSON."""
-        return json.dumps(self.value, allow_nan=False, ensure_ascii=False)
+        return json_text(self.value)
 
 
 class SourceCommand(NamedTuple):

@@ -3,7 +3,6 @@
 A value is written once for all the rows that share it: that, and one join a row, is what makes millions of rows quick.
 """
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from math import isnan
 from typing import Any, Final, Literal
@@ -12,6 +11,7 @@ import numpy as np
 
 from busplan.analysis.sweep.blocks import Block, Column
 from busplan.analysis.sweep.grid import Array, Grid
+from busplan.printable import json_text
 from busplan.report.documents import Document, document
 from busplan.report.text import csv_cell
 
@@ -28,12 +28,12 @@ def csv_header(columns: Sequence[str]) -> str:
 def jsonl_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
     """First line of a sweep's JSON lines: what the rows are, and how many make it whole."""
     facts = {**_facts(profile, grid, timing_models), "rows": grid.points * len(timing_models)}
-    return json.dumps(facts, ensure_ascii=False) + "\n"
+    return json_text(facts) + "\n"
 
 
 def json_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
     """Beginning of a sweep's JSON document, up to its first row."""
-    facts = json.dumps(_facts(profile, grid, timing_models), ensure_ascii=False)
+    facts = json_text(_facts(profile, grid, timing_models))
     return facts.removesuffix("}") + ', "rows": [\n'
 
 
@@ -45,7 +45,7 @@ def json_rows(block: Block, columns: Sequence[str]) -> str:
 
 def json_footer(*, complete: bool) -> str:
     """End of a sweep's JSON document: it is valid JSON even where the sweep was stopped, and says so."""
-    return f'\n], "complete": {json.dumps(complete)}}}\n'
+    return f'\n], "complete": {json_text(complete)}}}\n'
 
 
 def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> Document:
@@ -85,7 +85,7 @@ def _rows(block: Block, model: int, columns: Sequence[str], style: Style) -> Ite
     for name in columns:
         own = _texts(block.columns(name)[model], style)
         if style == "jsonl":
-            own = f"{json.dumps(name)}: " + own
+            own = f"{json_text(name)}: " + own
         # Neighbours that vary alike, and less than the rows do, are one cell.
         if cells and cells[-1].shape == own.shape and own.size < block.chunk.points:
             cells[-1] = cells[-1] + separator + own
@@ -107,7 +107,7 @@ def _texts(column: Column, style: Style) -> Array:
 
 def _writer(column: Column, style: Style) -> Callable[[Any], str]:
     if column.words is not None:
-        words = [json.dumps(word) if style == "jsonl" else str(csv_cell(word)) for word in column.words]
+        words = [json_text(word) if style == "jsonl" else str(csv_cell(word)) for word in column.words]
         return words.__getitem__
     if column.values.dtype == bool:
         return ("false", "true").__getitem__
