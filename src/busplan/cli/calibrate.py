@@ -7,7 +7,7 @@ import typer
 
 from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, NodesOption, ProfileArgument, bus_changes
-from busplan.cli.output import emit, emit_text, say
+from busplan.cli.output import emit, emit_document, say
 from busplan.errors import BusplanError
 
 
@@ -100,7 +100,7 @@ def calibrate_command(
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))
         if format_ == "json"
         else text.to_csv(documents.with_profile(bench.name, report.calibration_rows(result)))

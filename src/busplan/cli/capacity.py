@@ -12,7 +12,7 @@ from busplan.cli.options import (
     periods_us,
     timing_models,
 )
-from busplan.cli.output import emit, emit_text
+from busplan.cli.output import emit, emit_document
 
 
 def capacity_command(
@@ -48,7 +48,7 @@ def capacity_command(
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(documents.capacity_document(result, verdicts(result)))
         if format_ == "json"
         else text.to_csv(documents.with_profile(plan.name, documents.capacity_rows(result)))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from busplan.cli.options import complete_profile, output_option
-from busplan.cli.output import PlanFailsError, emit_text, say, write_file
+from busplan.cli.output import PlanFailsError, document_bytes, emit_text, say, write_document, write_file
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -142,8 +142,7 @@ def _update_baseline(path: Path, recorded: Recordings, report: "CheckReport", *,
     from busplan.rules.baseline import write_baseline
 
     now = {file.path: file.figures for file in report.files if file.figures}
-    # A path that is no UTF-8 becomes an escape, which reading the JSON takes back.
-    write_file(path, write_baseline({**recorded, **now}).encode("utf-8", "backslashreplace"), overwrite=True)
+    write_file(path, document_bytes(write_baseline({**recorded, **now})), overwrite=True)
     if not quiet:
         say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
 
@@ -157,10 +156,10 @@ def _write(
     from busplan.report.gate import render
 
     text = render(report, file_format=format_)
-    if output is not None:
-        write_file(output, text.encode("utf-8", "backslashreplace"), overwrite=True)
-    else:
+    if output is None and format_ in {"text", "full"}:
         emit_text(text)
+    else:
+        write_document(text, output, quiet=True)
     if format_ == "github":
         # GitHub shows ten annotations of a kind a step: the log has them all.
         say(*render(report, file_format="text").splitlines())

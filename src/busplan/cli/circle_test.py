@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 import typer
 
 from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
-from busplan.cli.output import NewFile, PlanFailsError, emit, emit_text, new_file, say
+from busplan.cli.output import NewFile, PlanFailsError, emit, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -153,7 +153,7 @@ def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(documents.circle_document(test, with_contributions=contributions))
         if format_ == "json"
         else text.to_csv(

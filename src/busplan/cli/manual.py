@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from busplan.cli.options import form_of_file, output_option
-from busplan.cli.output import emit_text, say, write_file
+from busplan.cli.output import write_document
 
 
 def manual_command(
@@ -40,8 +40,4 @@ def manual_command(
         from busplan.report.manual.markdown import markdown_page
 
         text = markdown_page(manual)
-    if output is None:
-        emit_text(text)
-    else:
-        write_file(output, text.encode(), overwrite=True)
-        say(f"wrote {output}")
+    write_document(text, output)

@@ -10,8 +10,6 @@ from errno import EISDIR
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -45,35 +43,67 @@ def say(*messages: str) -> None:
 
 
 def emit_text(text: str) -> None:
-    """Write the document to stdout.
+    """Write words for a reader to stdout, in the encoding of the terminal, with escapes for what it lacks.
 
     Raises
     ------
     BusplanError
         stdout is closed, or cannot take it all.
     """
-    if sys.stdout is None:
-        raise BusplanError("standard output is closed")
-    try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader has seen enough; Python's own flush at exit must not complain either.
-        _abandon_stdout()
-        raise typer.Exit(CANNOT) from None
-    except OSError as error:
-        _abandon_stdout()
-        raise BusplanError(f"standard output cannot be written: {error.strerror}") from None
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
-def _abandon_stdout() -> None:
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def emit_document(document: str | bytes) -> None:
+    """Write what a program reads to stdout: its text is UTF-8, whatever the terminal's encoding.
+
+    Raises
+    ------
+    BusplanError
+        As `emit_text`.
+    """
+    sys.stdout.flush()
+    sys.stdout.buffer.write(document_bytes(document))
+    sys.stdout.buffer.flush()
+
+
+def document_bytes(document: str | bytes) -> bytes:
+    """Bytes of a document, on every way out; a path that is no UTF-8 becomes escapes, which reading JSON takes back."""
+    return document.encode("utf-8", "backslashreplace") if isinstance(document, str) else document
+
+
+def refuse_terminal(form: str) -> None:
+    """Refuse to write bytes that are no text to a terminal.
+
+    Raises
+    ------
+    BusplanError
+        stdout is one.
+    """
+    if sys.stdout.isatty():
+        raise BusplanError(f"--format {form}: is no text for a terminal; give -o FILE.{form}, or send it down a pipe")
+
+
+def write_document(document: str | bytes, output: Path | None, *, quiet: bool = False) -> None:
+    """Write a document to its file, and say so; or to stdout, where no file is asked for.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be written.
+    """
+    if output is None:
+        emit_document(document)
+        return
+    write_file(output, document_bytes(document), overwrite=True)
+    if not quiet:
+        say(f"wrote {output}")
 
 
 def emit(lines: Iterable["Line"]) -> None:
     """Write a report to stdout: with colours on a terminal only, and none under NO_COLOR."""
     # A pipe gets plain lines, and does not wait for the renderer to load.
-    styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or (sys.stdout is not None and sys.stdout.isatty())
+    styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()
     emit_text(_styled(lines) if styled else "".join(f"{line.text}\n" for line in lines))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, ProfileArgument, bus_changes, periods_us
-from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say, write_file
+from busplan.cli.output import PlanFailsError, emit, emit_document, new_file, say, write_file
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -201,7 +201,7 @@ def _emit(result: "Plan", *, format_: str, with_circle: bool) -> None:
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(report.plan_document(result))
         if format_ == "json"
         else text.to_csv(documents.with_profile(result.profile.name, report.plan_csv_rows(result)))

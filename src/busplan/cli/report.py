@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.options import complete_profile, form_of_file, output_option, time_us
-from busplan.cli.output import emit_text, new_file, say
+from busplan.cli.output import document_bytes, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
@@ -79,11 +79,11 @@ def report_command(
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
     plans = load_each(profiles, partial(_plan, period=period))
     if output is None:
-        emit_text(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))
+        emit_document(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))
         return
     # Opened before the simulation: a path that cannot be written is said at once.
     with new_file(output, overwrite=True) as file:
-        file.write(_written(_page(profiles, plans, title, period=period, circle=circle), chosen).encode())
+        file.write(document_bytes(_written(_page(profiles, plans, title, period=period, circle=circle), chosen)))
     say(f"wrote {output}")
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
+from busplan.cli.output import refuse_terminal
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def sweep_command(
         typer.Option(
             "--format",
             help="Form of the document: a table of the top rows, or every row as csv, json (one document), jsonl (a "
-            "JSON object a line, the first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the "
+            "JSON object a line, the first describes the sweep) or npz (NumPy columns, no text).  [default: by the "
             "ending of -o, else table]",
             show_default=False,
         ),
@@ -156,7 +157,7 @@ def sweep_command(
 def _require_sense(format_: SweepFormat, *, output: Path | None, sort: str | None, top: int | None) -> None:
     """Refuse options that the format cannot follow."""
     if format_ == "npz" and output is None:
-        raise BusplanError("--format npz: is no text for a terminal; give -o FILE.npz")
+        refuse_terminal("npz")
     for option, value in (("--sort", sort), ("--top", top)):
         if value is not None and format_ != "table":
             raise BusplanError(f"{option}: goes with --format table; {format_} has every row in the order of the grid")

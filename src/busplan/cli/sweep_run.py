@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final, NamedTuple, Protocol
 
 from busplan.cli.interrupt import ctrl_c_noted
-from busplan.cli.output import StoppedError, emit, emit_text, new_file, partial_path, say
+from busplan.cli.output import StoppedError, emit, emit_document, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -178,7 +178,7 @@ def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> Iterator[_Sin
             yield _NpzSink(job, file, columns)
     else:
         sink = _JsonSink if job.format_ == "json" else _TextSink
-        yield sink(job, emit_text if file is None else lambda text: _write(file, text))
+        yield sink(job, emit_document if file is None else lambda text: _write(file, text))
 
 
 def _write(file: BinaryIO, text: str) -> None:

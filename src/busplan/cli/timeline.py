@@ -18,7 +18,7 @@ from busplan.cli.options import (
     periods_us,
     time_us,
 )
-from busplan.cli.output import emit, emit_text, say, write_file
+from busplan.cli.output import emit, refuse_terminal, write_document
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def timeline_command(
         TimelineFormat | None,
         typer.Option(
             "--format",
-            help="Form of the document. png needs -o, and the extra plot (matplotlib).  "
+            help="Form of the document. png is for a file or a pipe, and needs the extra plot (matplotlib).  "
             "[default: by the ending of -o, else table]",
             show_default=False,
         ),
@@ -136,7 +136,7 @@ def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineForm
     chosen = form_of_file(format_, output, forms=_SUFFIXES, default="table")
     if chosen == "png":
         if output is None:
-            raise BusplanError("--format png: a picture does not go to standard output; give -o FILE.png")
+            refuse_terminal("png")
         from busplan.report.plot import require_matplotlib
 
         require_matplotlib("--format png")
@@ -157,17 +157,12 @@ def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> No
         from busplan.report.timeline.terminal import timeline_lines
 
         emit(timeline_lines(shown, width=_columns()))
-    elif output is None:
-        emit_text(_text(shown, chosen))
-    else:
-        if chosen == "png":
-            from busplan.report.timeline.png import timeline_png
+    elif chosen == "png":
+        from busplan.report.timeline.png import timeline_png
 
-            content = timeline_png(shown)
-        else:
-            content = _text(shown, chosen).encode()
-        write_file(output, content, overwrite=True)
-        say(f"wrote {output}")
+        write_document(timeline_png(shown), output)
+    else:
+        write_document(_text(shown, chosen), output)
 
 
 def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
@@ -192,7 +187,7 @@ def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
 
 def _columns() -> int:
     """Width of the terminal; in a pipe the drawing is the same wherever it runs."""
-    if sys.stdout is None or not sys.stdout.isatty():
+    if not sys.stdout.isatty():
         return _PIPE_COLUMNS
     from shutil import get_terminal_size
 
