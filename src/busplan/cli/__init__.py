@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from busplan import __version__
+from busplan.cli.interrupt import signals_end_the_run
 from busplan.cli.lazy import SETTINGS, LazyGroup
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
 from busplan.cli.streams import mend_streams
@@ -23,7 +24,8 @@ app = typer.Typer(
 
     Example: busplan capacity paper-4ms
     """,
-    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted.",
+    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted, 143 terminated, "
+    "129 hung up.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -50,10 +52,11 @@ def _options(
 
 
 def run() -> None:
-    """Run the command line and exit: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted."""
+    """Run the command line and exit, with the codes of its epilog."""
     mend_streams()
     try:
-        app(prog_name="busplan")
+        with signals_end_the_run():
+            app(prog_name="busplan")
     except SystemExit as leaving:
         # Typer exits by itself, with 2 for usage and 130 for Ctrl-C. Its 1 is a closed pipe or worse, and no verdict.
         sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)

@@ -109,17 +109,17 @@ def check_command(
 def _check(sources: "Sequence[Source]", one: "Callable[[Source], FileResult]", *, jobs: int) -> "CheckReport":
     from busplan.rules.report import CheckReport
 
-    workers = min(jobs, len(sources))
-    if workers <= 1:
+    number = min(jobs, len(sources))
+    if number <= 1:
         return CheckReport(tuple(map(one, sources)))
-    from concurrent.futures import ProcessPoolExecutor
+    from busplan.cli.workers import workers
 
     # Only this process has the standard input.
     own = {source: one(source) for source in sources if str(source.path) == "-"}
     others = [source for source in sources if source not in own]
-    with ProcessPoolExecutor(workers) as pool:
+    with workers(number) as map_:
         # A process costs more than some files do: each gets a fair number of them.
-        results = pool.map(one, others, chunksize=max(1, len(others) // (4 * workers)))
+        results = map_(one, others, chunksize=max(1, len(others) // (4 * number)))
         found = own | dict(zip(others, results, strict=True))
     return CheckReport(tuple(found[source] for source in sources))
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Protocol, Self
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -18,6 +18,19 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep import Block
 
 _COPIED_AT_ONCE: Final = 1 << 20
+
+
+class Archive(Protocol):
+    """Where an archive is written."""
+
+    def write(self, data: bytes, /) -> int:
+        """Take more bytes."""
+
+    def flush(self) -> None:
+        """Hold nothing back."""
+
+    def close(self) -> None:
+        """Take no more."""
 
 
 class NpzColumns:
@@ -28,10 +41,10 @@ class NpzColumns:
     columns
         Which columns of a block.
     folder
-        Where there is room for them.
+        Where there is room for them; None for the folder of temporary files.
     """
 
-    def __init__(self, columns: Sequence[str], *, folder: Path) -> None:
+    def __init__(self, columns: Sequence[str], *, folder: Path | None) -> None:
         self._columns, self._folder = columns, folder
         self._stack = ExitStack()
         self._files: dict[str, BinaryIO] = {}
@@ -78,7 +91,7 @@ class NpzColumns:
         ]
         return np.stack(columns, axis=1).ravel()
 
-    def write(self, file: BinaryIO, facts: Mapping[str, object]) -> None:
+    def write(self, file: Archive, facts: Mapping[str, object]) -> None:
         """Put the archive together.
 
         Parameters

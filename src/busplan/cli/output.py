@@ -10,6 +10,7 @@ from errno import EISDIR
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from busplan.cli.interrupt import StoppedError
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -27,10 +28,6 @@ _STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "headin
 
 class PlanFailsError(Exception):
     """The answer is out, and it is that the plan does not hold: exit with `PLAN_FAILS`."""
-
-
-class StoppedError(KeyboardInterrupt):
-    """Ctrl-C, noted between two steps: what stands in the file so far is whole in itself, and may be kept."""
 
 
 def say(*messages: str) -> None:

@@ -1,21 +1,21 @@
 """A sweep on its way: blocks are computed, written and counted one by one."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, Final, NamedTuple, Protocol
 
-from busplan.cli.interrupt import ctrl_c_noted
-from busplan.cli.output import StoppedError, emit, emit_document, new_file, partial_path, say
+from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
+from busplan.cli.output import CANNOT, document_bytes, emit, emit_document, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
-from busplan.errors import BusplanError
+from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
     from busplan.analysis.grid import Grid
     from busplan.analysis.sweep import Block
     from busplan.analysis.sweep_circle import CircleTask, Figures
-    from busplan.cli.npz import NpzColumns
+    from busplan.cli.npz import Archive, NpzColumns
     from busplan.cli.sweep import SweepFormat
     from busplan.profile.model import Profile
     from busplan.report.sweep.figure import FigureData
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from busplan.timing import TimingModelName
 
 _CIRCLES_AT_ONCE: Final = 4
-"""Points that each process tests between two looks at Ctrl-C."""
+"""Points that each process tests between two looks at signals."""
 
 
 class SweepJob(NamedTuple):
@@ -70,7 +70,7 @@ def run_sweep(job: SweepJob) -> None:
     BusplanError
         A file that cannot be written, a figure that cannot be drawn, or a point without a circle test.
     StoppedError
-        Ctrl-C; what was written is valid, and says that it is partial.
+        Ctrl-C, SIGTERM, SIGHUP or a lost worker; what was written is valid, and says that it is partial.
     """
     from busplan.report.sweep.top import Tally
 
@@ -79,32 +79,48 @@ def run_sweep(job: SweepJob) -> None:
         _require_circles(job)
     tally, expected = Tally(job.timing_models), job.grid.points
     with ExitStack() as stack:
-        with ctrl_c_noted() as stopped:
+        with signals_noted() as noted:
             # Opened before the work: a path that cannot be written is said at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
             sink = stack.enter_context(_sink(job, file, tally))
             takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-            with progress_bar("sweep") as progress, _blocks(job) as blocks:
-                for block in blocks:
-                    for take in takers:
-                        take(block)
-                    progress(tally.points, expected)
-                    if stopped():
-                        break
+            lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.format_ != "table" or file is not None:
             say(*(line.text for line in tally.lines(job.profile.name, expected=expected)))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
-            say(f"interrupted after {tally.points:,} of {expected:,} points{kept}")
-            raise StoppedError
+            say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
+            signal = noted()
+            raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_format is not None:
             plot_file.write(drawing.draw(job.profile.name, file_format=job.plot_format))
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")
+
+
+def _work(
+    job: SweepJob,
+    takers: "Sequence[Callable[[Block], None]]",
+    *,
+    progress: Callable[[], tuple[int, int]],
+    stopped: Callable[[], bool],
+) -> WorkerLostError | None:
+    """Hand each block to all takers, until all are done, or what stops it; gives the error of a lost worker."""
+    try:
+        with progress_bar("sweep") as report, _blocks(job) as blocks:
+            for block in blocks:
+                for take in takers:
+                    take(block)
+                report(*progress())
+                if stopped():
+                    break
+    except WorkerLostError as error:
+        return error
+    return None
 
 
 def _drawing(job: SweepJob) -> "FigureData | None":
@@ -147,23 +163,15 @@ def _blocks(job: SweepJob) -> "Iterator[Iterable[Block]]":
 @contextmanager
 def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iterable[list[Figures]]]]":
     """Give a function that runs circle tests here, or in other processes."""
-    import signal
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
     from busplan.analysis.sweep_circle import run_task
 
     if jobs == 1:
         yield lambda tasks: map(run_task, tasks)
         return
-    # Fresh processes: a fork would take this one's threads by surprise. Ctrl-C is for the one that hands the work out.
-    with ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
-    ) as pool:
-        try:
-            yield lambda tasks: pool.map(run_task, tasks)
-        finally:
-            pool.shutdown(cancel_futures=True)
+    from busplan.cli.workers import workers
+
+    with workers(jobs) as map_:
+        yield lambda tasks: map_(run_task, tasks)
 
 
 @contextmanager
@@ -171,18 +179,33 @@ def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> Iterator[_Sin
     """Where the document goes."""
     if job.format_ == "table":
         yield _TableSink(job, file, tally)
-    elif job.format_ == "npz" and file is not None and job.output is not None:
+    elif job.format_ == "npz":
         from busplan.cli.npz import NpzColumns
 
-        with NpzColumns(job.columns, folder=Path(os.path.realpath(job.output)).parent) as columns:
-            yield _NpzSink(job, file, columns)
+        folder = Path(os.path.realpath(job.output)).parent if job.output else None
+        with NpzColumns(job.columns, folder=folder) as columns:
+            yield _NpzSink(job, file or _Pipe(), columns)
     else:
         sink = _JsonSink if job.format_ == "json" else _TextSink
         yield sink(job, emit_document if file is None else lambda text: _write(file, text))
 
 
 def _write(file: BinaryIO, text: str) -> None:
-    file.write(text.encode())
+    file.write(document_bytes(text))
+
+
+class _Pipe:
+    """Standard output as a file that cannot go back, for an archive."""
+
+    def write(self, data: bytes, /) -> int:
+        emit_document(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def close(self) -> None:
+        """It stays open for others."""
 
 
 class _TableSink:
@@ -251,7 +274,7 @@ class _JsonSink:
 class _NpzSink:
     """Collects columns, for an archive at the end."""
 
-    def __init__(self, job: SweepJob, file: BinaryIO, columns: "NpzColumns") -> None:
+    def __init__(self, job: SweepJob, file: "Archive", columns: "NpzColumns") -> None:
         self._job, self._file, self._columns = job, file, columns
         self.add = columns.add
 
