@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, document_bytes, emit_text, say, write_document, write_file
 from busplan.errors import BusplanError
@@ -84,6 +85,7 @@ def check_command(
     from busplan.rules.gate import check_source
 
     collection = collect(paths, stdin_name=stdin_filename)
+    _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
     recorded = _read_baseline(baseline, needed=not update_baseline)
     one = partial(
         check_source, recorded=None if update_baseline else recorded, with_circle=circle, record=update_baseline
@@ -104,6 +106,13 @@ def check_command(
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
         raise PlanFailsError
+
+
+def _require_apart(sources: "Sequence[Source]", *, output: Path | None, baseline: Path | None, updated: bool) -> None:
+    read = [source.path for source in sources if source.failure is None]
+    if baseline is not None and not updated:
+        read.append(baseline)
+    require_apart({"--output": output, "--baseline": baseline if updated else None}, inputs=read)
 
 
 def _check(sources: "Sequence[Source]", one: "Callable[[Source], FileResult]", *, jobs: int) -> "CheckReport":

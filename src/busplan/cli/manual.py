@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file, output_option
 from busplan.cli.output import write_document
 
@@ -28,6 +29,7 @@ def manual_command(
 
     Example: busplan manual --format man -o busplan.1
     """
+    require_apart({"--output": output})
     from busplan.cli.tree import manual_of
 
     chosen = form_of_file(format_, output, forms={".1": "man", ".md": "markdown"}, default="markdown")

@@ -168,6 +168,9 @@ def plot_format(path: Path) -> str:
     return file_format
 
 
+STANDARD_OUTPUT: Final = Path("-")
+
+
 def output_option(words: str) -> Any:
     """Make the option that sends a document to a file.
 

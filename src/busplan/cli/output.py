@@ -23,6 +23,8 @@ CANNOT: int = 2
 
 _NARROWEST = 40
 _LONG_NAME = 200
+_NEW_MODE = 0o666
+"""Permissions of a new file, less what the user's umask takes."""
 _STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "heading": "bold", "plain": "", "table": ""}
 
 
@@ -170,6 +172,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
         with _named(path, target):
             file.flush()
             os.fsync(file.fileno())
+            _give_name(file.fileno(), temporary)
             file.close()
             if mode is not None:
                 temporary.chmod(mode)
@@ -186,8 +189,7 @@ class _Raw(io.FileIO):
 
     def __init__(self, temporary: Path, *, path: Path, target: Path) -> None:
         self._names = path, target
-        # "x" gives the file the permissions that any new file of the user has.
-        super().__init__(temporary, "xb")
+        super().__init__(temporary, "xb", opener=_opened)
 
     def write(self, data: Any, /) -> int:
         with _named(*self._names):
@@ -202,6 +204,27 @@ class NewFile(io.BufferedWriter):
     def abandon(self) -> None:
         """Leave what was there before as it is: nothing takes its name at the end."""
         self.abandoned = True
+
+
+def _opened(temporary: str, flags: int) -> int:
+    """Open a file that has no name yet, where the system has such: a process that is killed leaves nothing of it."""
+    if hasattr(os, "O_TMPFILE") and Path("/proc/self/fd").is_dir():
+        with suppress(OSError):
+            return os.open(Path(temporary).parent, os.O_TMPFILE | os.O_WRONLY, _NEW_MODE)
+    return os.open(temporary, flags, _NEW_MODE)
+
+
+def _give_name(descriptor: int, temporary: Path) -> None:
+    if os.fstat(descriptor).st_nlink:
+        return
+    nameless = f"/proc/self/fd/{descriptor}"
+    try:
+        # A descriptor for the folder, though the path begins at the root: only so does Python follow the link.
+        os.link(nameless, temporary, src_dir_fd=descriptor)
+    except OSError:  # a file system without hard links
+        from shutil import copyfile
+
+        copyfile(nameless, temporary)
 
 
 def _close(file: NewFile) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import complete_profile, form_of_file, output_option, time_us
 from busplan.cli.output import document_bytes, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
@@ -77,6 +78,7 @@ def report_command(
     chosen = form_of_file(format_, output, forms=_SUFFIXES, default="html")
     if title is not None and (not title.isprintable() or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
+    require_apart({"--output": output}, inputs=profile_files(*profiles))
     plans = load_each(profiles, partial(_plan, period=period))
     if output is None:
         emit_document(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))

@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
-from busplan.cli.output import refuse_terminal
+from busplan.cli.output import partial_path, refuse_terminal
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -121,6 +122,9 @@ def sweep_command(
     # Every command pays for what stands at the top of this module.
     from busplan.cli.vary import parse_axes
 
+    kept = None if output is None else partial_path(output)
+    outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
+    require_apart(outputs, inputs=profile_files(profile))
     axes = parse_axes(vary or [])
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.grid import checked_grid

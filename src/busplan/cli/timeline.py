@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     BUS_OPTIONS,
     GapCountOption,
@@ -118,6 +119,7 @@ def timeline_command(
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
+    require_apart({"--output": output}, inputs=profile_files(profile))
     from busplan.analysis.schedule import schedule, zoom
     from busplan.profile.shipped import load
     from busplan.profile.toml import override
