@@ -127,9 +127,7 @@ def _check(sources: "Sequence[Source]", one: "Callable[[Source], FileResult]", *
     own = {source: one(source) for source in sources if str(source.path) == "-"}
     others = [source for source in sources if source not in own]
     with workers(number) as map_:
-        # A process costs more than some files do: each gets a fair number of them.
-        results = map_(one, others, chunksize=max(1, len(others) // (4 * number)))
-        found = own | dict(zip(others, results, strict=True))
+        found = own | dict(zip(others, map_(one, others), strict=True))
     return CheckReport(tuple(found[source] for source in sources))
 
 

@@ -30,7 +30,7 @@ def require_apart(outputs: Mapping[str, Path | None], *, inputs: Iterable[Path] 
     asked = {option: path for option, path in outputs.items() if path is not None}
     if not asked:
         return
-    read = {_identity(path): path for path in inputs}
+    read = {_identity(path): "standard input" if str(path) == "-" else path for path in inputs}
     written: dict[object, str] = {}
     for option, path in asked.items():
         if str(path) == "-":
