@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from busplan.cli.workers import workers
+
 PROFILE = Path(__file__).parents[2] / "profiles" / "paper-1ms.toml"
 SWEEP = ("sweep", "p.toml", "--vary", "servo.position_gain_per_s=100:400", "--circle", "--jobs", "2")
 # Whoever runs the tests may ignore signals, and children inherit that.
@@ -177,3 +179,23 @@ def test_a_worker_that_is_killed_is_said(folder: Path, name: str) -> None:
     if name == "sweep":
         assert "kept in c.partial.csv" in said
         assert rows(folder / "c.partial.csv") > 0
+
+
+def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
+    waiting = "import time; from busplan.cli.workers import workers\n"
+    waiting += "with workers(1) as map_:\n    map_(time.sleep, [60])"
+    with subprocess.Popen([sys.executable, "-c", waiting], cwd=tmp_path, text=True) as process:
+        assert until(lambda: workers_of(process))
+        started = workers_of(process)
+        time.sleep(0.2)
+        process.kill()
+        process.wait()
+    assert until(lambda: not any(map(alive, started)), seconds=5)
+
+
+def test_workers_answer_in_order_and_pass_on_what_went_wrong() -> None:
+    with workers(2) as map_:
+        assert map_(abs, [-3, -1, -2]) == [3, 1, 2]
+        assert map_(abs, []) == []
+        with pytest.raises(FileNotFoundError, match="nowhere"):
+            map_(os.stat, ["nowhere", "."])

@@ -107,8 +107,8 @@ def sweep_command(
     """Compute capacity over a grid: any keys of the profile, every combination, both timing models.
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
-    points take seconds, and writing them as text some minutes. Ctrl-C keeps the rows so far in FILE.partial.csv (or
-    .json, .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
+    points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
+    FILE.partial.csv (or .json, .jsonl, .npz) and leave FILE as it was. A report: it exits 0 whatever fits.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
