@@ -25,6 +25,9 @@ WRITERS = {
     "the manual": ("manual",),
     "a schema": ("schema",),
     "a profile": ("plan", "paper-1ms", "--no-circle", "-o", "-"),
+    "a derivation": ("explain", "paper-4ms", "required_us"),
+    "a comparison": ("diff", "paper-4ms", "paper-1ms", "--no-circle", "--format", "markdown"),
+    "the rules": ("rule",),
     "the help": ("--help",),
     "the help of a command": ("sweep", "--help"),
 }
