@@ -4,22 +4,21 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
-from busplan.cli.output import CANNOT, document_bytes, emit, emit_document, new_file, partial_path, say
+from busplan.cli.output import CANNOT, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
+from busplan.cli.sweep_sinks import opened_sink
 from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
     from busplan.analysis.grid import Grid
     from busplan.analysis.sweep import Block
     from busplan.analysis.sweep_circle import CircleTask, Figures
-    from busplan.cli.npz import Archive, NpzColumns
     from busplan.cli.sweep import SweepFormat
     from busplan.profile.model import Profile
     from busplan.report.sweep.figure import FigureData
-    from busplan.report.sweep.top import Tally
     from busplan.timing import TimingModelName
 
 _CIRCLES_AT_ONCE: Final = 4
@@ -45,16 +44,6 @@ class SweepJob(NamedTuple):
     """Processes for circle tests; None without them."""
     force: bool
     """Whether their number does not matter."""
-
-
-class _Sink(Protocol):
-    """Where blocks go."""
-
-    def add(self, block: "Block") -> None:
-        """Take one more block."""
-
-    def finish(self, *, complete: bool) -> None:
-        """End the document; without all blocks it is a partial one."""
 
 
 def available_processors() -> int:
@@ -83,7 +72,7 @@ def run_sweep(job: SweepJob) -> None:
             # Opened before the work: a path that cannot be written is said at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
-            sink = stack.enter_context(_sink(job, file, tally))
+            sink = stack.enter_context(opened_sink(job, file, tally))
             takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
             lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected
@@ -172,115 +161,3 @@ def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iter
 
     with workers(jobs) as map_:
         yield lambda tasks: map_(run_task, tasks)
-
-
-@contextmanager
-def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> Iterator[_Sink]:
-    """Where the document goes."""
-    if job.format_ == "table":
-        yield _TableSink(job, file, tally)
-    elif job.format_ == "npz":
-        from busplan.cli.npz import NpzColumns
-
-        folder = Path(os.path.realpath(job.output)).parent if job.output else None
-        with NpzColumns(job.columns, folder=folder) as columns:
-            yield _NpzSink(job, file or _Pipe(), columns)
-    else:
-        sink = _JsonSink if job.format_ == "json" else _TextSink
-        yield sink(job, emit_document if file is None else lambda text: _write(file, text))
-
-
-def _write(file: BinaryIO, text: str) -> None:
-    file.write(document_bytes(text))
-
-
-class _Pipe:
-    """Standard output as a file that cannot go back, for an archive."""
-
-    def write(self, data: bytes, /) -> int:
-        emit_document(data)
-        return len(data)
-
-    def flush(self) -> None:
-        """Nothing is held back."""
-
-    def close(self) -> None:
-        """It stays open for others."""
-
-
-class _TableSink:
-    """Keeps the rows at the top, for a table at the end."""
-
-    def __init__(self, job: SweepJob, file: BinaryIO | None, tally: "Tally") -> None:
-        from busplan.report.sweep.top import TopRows
-
-        self._job, self._file, self._tally = job, file, tally
-        self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
-        self.add = self._rows.add
-
-    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - the tally knows
-        """Write the table."""
-        lines = self._rows.lines(self._tally, self._job.profile.name, expected=self._job.grid.points)
-        if self._file is None:
-            emit(lines)
-        else:
-            _write(self._file, "".join(f"{line.text}\n" for line in lines))
-
-
-class _TextSink:
-    """Writes every row as it comes, and each ends itself."""
-
-    def __init__(self, job: SweepJob, write: Callable[[str], None]) -> None:
-        from busplan.report.sweep.rows import csv_header, jsonl_header
-
-        self._job, self._write = job, write
-        if job.format_ == "csv":
-            write(csv_header(job.columns))
-        else:
-            write(jsonl_header(job.profile.name, job.grid, job.timing_models))
-
-    def add(self, block: "Block") -> None:
-        """Write one more block."""
-        from busplan.report.sweep.rows import block_text
-
-        self._write(block_text(block, self._job.columns, style="csv" if self._job.format_ == "csv" else "jsonl"))
-
-    def finish(self, *, complete: bool) -> None:
-        """Nothing is left to write."""
-
-
-class _JsonSink:
-    """Writes one document, row by row."""
-
-    def __init__(self, job: SweepJob, write: Callable[[str], None]) -> None:
-        from busplan.report.sweep.rows import json_header
-
-        self._columns, self._write = job.columns, write
-        write(json_header(job.profile.name, job.grid, job.timing_models))
-
-    def add(self, block: "Block") -> None:
-        """Write one more block."""
-        from busplan.report.sweep.rows import json_rows
-
-        self._write(json_rows(block, self._columns))
-
-    def finish(self, *, complete: bool) -> None:
-        """Close the document; one that is not whole says so, and is still JSON."""
-        from busplan.report.sweep.rows import json_footer
-
-        self._write(json_footer(complete=complete))
-
-
-class _NpzSink:
-    """Collects columns, for an archive at the end."""
-
-    def __init__(self, job: SweepJob, file: "Archive", columns: "NpzColumns") -> None:
-        self._job, self._file, self._columns = job, file, columns
-        self.add = columns.add
-
-    def finish(self, *, complete: bool) -> None:
-        """Write the archive, with what a reader must know of it."""
-        from busplan.report.documents import document
-
-        facts = document("sweep", profile=self._job.profile.name, points=self._job.grid.points, complete=complete)
-        self._columns.write(self._file, facts)
