@@ -19,6 +19,10 @@ class BusplanError(Exception):
         self.problems = problems
 
 
+class WorkerLostError(BusplanError):
+    """A worker process ended in the middle of its work."""
+
+
 ProblemKind = Literal[
     "syntax", "unknown-key", "missing-key", "wrong-type", "out-of-range", "inconsistent", "execution-unknown"
 ]

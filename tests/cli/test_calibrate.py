@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -133,8 +134,9 @@ def test_a_kill_while_writing_leaves_the_profile_whole(bench: Path, moment: str)
     )
     assert run.returncode == -signal.SIGKILL
     assert bench.read_bytes() == before
+    # What was being written had no name yet, where the system has such files.
     left = [path.name for path in bench.parent.iterdir() if path.name.startswith(".bench.toml.")]
-    assert len(left) == 1  # it did come as far as writing
+    assert len(left) == (0 if hasattr(os, "O_TMPFILE") and moment in {"half-written", "not yet on the disk"} else 1)
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,10 @@ def test_it_says_what_the_exit_codes_mean(name: str) -> None:
         assert re.search(r"\b[Ee]xits 0\b", said)
         assert said.endswith(FAILURES)
     else:
-        assert said.endswith("Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted.")
+        assert said.endswith(
+            "Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted, 143 terminated, "
+            "129 hung up."
+        )
 
 
 @EVERY_COMMAND

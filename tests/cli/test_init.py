@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from busplan.cli.output import write_file
+from busplan.cli.output import new_file, write_file
 from busplan.errors import BusplanError
 
 Run = Callable[..., Any]
@@ -167,7 +167,7 @@ def test_a_name_taken_a_moment_ago_is_not_overwritten(tmp_path: Path, monkeypatc
 def test_a_file_system_without_hard_links_is_written_to_and_still_not_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def no_links(_source: Path, _target: Path) -> None:
+    def no_links(_source: Path, _target: Path, **_options: int) -> None:
         raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
 
     monkeypatch.setattr(os, "link", no_links)
@@ -175,6 +175,20 @@ def test_a_file_system_without_hard_links_is_written_to_and_still_not_over(
     with pytest.raises(BusplanError, match="already there"):
         write_file(tmp_path / "x", b"two", overwrite=False)
     assert files(tmp_path) == {"x": b"one"}
+
+
+@pytest.mark.parametrize("nameless", [True, False])
+def test_a_new_file_has_the_permissions_of_any_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nameless: bool
+) -> None:
+    if not nameless:  # another system, or a network's file system
+        monkeypatch.delattr(os, "O_TMPFILE", raising=False)
+    (tmp_path / "other").touch()
+    with new_file(tmp_path / "x", overwrite=False) as file:
+        assert len(list(tmp_path.iterdir())) == (1 if nameless and hasattr(os, "O_TMPFILE") else 2)
+        file.write(b"one")
+    assert (tmp_path / "x").stat().st_mode == (tmp_path / "other").stat().st_mode
+    assert files(tmp_path) == {"other": b"", "x": b"one"}
 
 
 def test_a_link_stays_a_link_and_its_target_is_written(tmp_path: Path) -> None:

@@ -33,7 +33,8 @@ per_byte_us = 0.35
 RUN = "from busplan.cli import run; run()"
 KILLED_WHILE_WRITING = f"import os; os.fsync = lambda _: os.kill(os.getpid(), 9); {RUN}"
 KILLED_BEFORE_RENAME = (
-    f"import os, pathlib; kill = lambda *_: os.kill(os.getpid(), 9); pathlib.Path.replace = kill; os.link = kill; {RUN}"
+    "import os, pathlib; kill = lambda *_, **__: os.kill(os.getpid(), 9); "
+    f"pathlib.Path.replace = kill; os.link = kill; {RUN}"
 )
 
 

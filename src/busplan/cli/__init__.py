@@ -1,17 +1,16 @@
 """The command line: parse, call, render, exit. One module a command; heavy imports stand inside the commands."""
 
-import codecs
-import os
 import sys
-from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from busplan import __version__
+from busplan.cli.interrupt import signals_end_the_run
 from busplan.cli.lazy import SETTINGS, LazyGroup
 from busplan.cli.output import CANNOT, PLAN_FAILS, PlanFailsError, say
+from busplan.cli.streams import mend_streams
 from busplan.errors import BusplanError
 
 app = typer.Typer(
@@ -25,7 +24,8 @@ app = typer.Typer(
 
     Example: busplan capacity paper-4ms
     """,
-    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted.",
+    epilog="Exit codes: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted, 143 terminated, "
+    "129 hung up.",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -52,10 +52,11 @@ def _options(
 
 
 def run() -> None:
-    """Run the command line and exit: 0 done, 1 the plan fails, 2 could not do the job, 130 interrupted."""
-    _mend_streams()
+    """Run the command line and exit, with the codes of its epilog."""
+    mend_streams()
     try:
-        app(prog_name="busplan")
+        with signals_end_the_run():
+            app(prog_name="busplan")
     except SystemExit as leaving:
         # Typer exits by itself, with 2 for usage and 130 for Ctrl-C. Its 1 is a closed pipe or worse, and no verdict.
         sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)
@@ -64,27 +65,16 @@ def run() -> None:
     except BusplanError as error:
         say(*error.problems)
     except OSError as error:
-        say(f"cannot write: {error.strerror}")
+        say(_in_words(error))
     except Exception as error:  # noqa: BLE001 - the last net: Python's own exit code 1 would read as a verdict
         say(f"busplan itself failed ({type(error).__name__}: {error}); please report this")
     sys.exit(CANNOT)
 
 
-def _mend_streams() -> None:
-    """Make standard streams that can be written to, whatever the caller closed and whatever its encoding."""
-    if sys.stderr is None:
-        # Errors have nowhere to go; they must not go to stdout.
-        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115 - open until the process ends
-    codecs.register_error("busplan", _escaped)
-    for stream in (sys.stdout, sys.stderr):
-        # A terminal without UTF-8 gets escapes instead of a failure.
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="busplan")
-
-
-def _escaped(error: UnicodeError) -> tuple[str, int]:
-    """Escape what an encoding lacks as JSON does: a document is JSON on every stream."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2)), error.end
+def _in_words(error: OSError) -> str:
+    """What the operating system refused, and where."""
+    try:
+        Path.cwd()
+    except OSError:
+        return "the working folder is no longer there; change into one that is"
+    return ": ".join(str(part) for part in (error.filename, error.strerror or error) if part)

@@ -15,7 +15,7 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_model,
 )
-from busplan.cli.output import emit, emit_text, say
+from busplan.cli.output import emit, emit_document, say
 from busplan.errors import BusplanError
 
 
@@ -110,7 +110,7 @@ def calibrate_command(
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))
         if format_ == "json"
         else text.to_csv(documents.with_profile(bench.name, report.calibration_rows(result)))

@@ -12,7 +12,7 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_models,
 )
-from busplan.cli.output import emit, emit_text
+from busplan.cli.output import emit, emit_document
 
 
 @takes_bus_options
@@ -46,7 +46,7 @@ def capacity_command(
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(documents.capacity_document(result, verdicts(result)))
         if format_ == "json"
         else text.to_csv(documents.with_profile(plan.name, documents.capacity_rows(result)))

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
-from busplan.cli.output import PlanFailsError, emit_text, say, write_file
+from busplan.cli.output import PlanFailsError, emit_text, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
 
@@ -87,6 +88,7 @@ def check_command(
     from busplan.rules.gate import check_source
 
     collection = collect(paths, stdin_name=stdin_filename)
+    _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
     recorded = _read_baseline(baseline, needed=not update_baseline)
     one = partial(
         check_source, recorded=None if update_baseline else recorded, with_circle=circle, record=update_baseline
@@ -109,23 +111,30 @@ def check_command(
         raise PlanFailsError
 
 
+def _require_apart(
+    sources: "Sequence[ProfileSource]", *, output: Path | None, baseline: Path | None, updated: bool
+) -> None:
+    read = [source.path for source in sources if source.failure is None]
+    if baseline is not None and not updated:
+        read.append(baseline)
+    require_apart({"--output": output, "--baseline": baseline if updated else None}, inputs=read)
+
+
 def _check(
     sources: "Sequence[ProfileSource]", one: "Callable[[ProfileSource], FileResult]", *, jobs: int
 ) -> "CheckReport":
     from busplan.rules.report import CheckReport
 
-    workers = min(jobs, len(sources))
-    if workers <= 1:
+    number = min(jobs, len(sources))
+    if number <= 1:
         return CheckReport(tuple(map(one, sources)))
-    from concurrent.futures import ProcessPoolExecutor
+    from busplan.cli.workers import workers
 
     # Only this process has the standard input.
     own = {source: one(source) for source in sources if str(source.path) == "-"}
     others = [source for source in sources if source not in own]
-    with ProcessPoolExecutor(workers) as pool:
-        # A process costs more than some files do: each gets a fair number of them.
-        results = pool.map(one, others, chunksize=max(1, len(others) // (4 * workers)))
-        found = own | dict(zip(others, results, strict=True))
+    with workers(number) as map_:
+        found = own | dict(zip(others, map_(one, others), strict=True))
     return CheckReport(tuple(found[source] for source in sources))
 
 
@@ -168,10 +177,10 @@ def _write(
     from busplan.report.gate import render
 
     text = render(report, file_format=format_)
-    if output is not None:
-        write_file(output, text.encode("utf-8", "backslashreplace"), overwrite=True)
-    else:
+    if output is None and format_ in {"text", "full"}:
         emit_text(text)
+    else:
+        write_document(text, output, quiet=True)
     if format_ == "github":
         # GitHub shows ten annotations of a kind a step: the log has them all.
         say(*render(report, file_format="text").splitlines())

@@ -1,14 +1,14 @@
 """`busplan circle-test`."""
 
-import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
-from busplan.cli.output import NewFile, PlanFailsError, emit, emit_text, new_file, say
+from busplan.cli.output import NewFile, PlanFailsError, emit, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -84,7 +84,7 @@ def circle_test_command(
         raise BusplanError("--every: goes with --trace FILE.csv")
     if every is not None and every < 1:
         raise BusplanError(f"--every {every}: must be 1 or more")
-    _require_two_files(trace, plot)
+    require_apart({"--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.circle.roundness import circle_test
     from busplan.profile.shipped import load
@@ -112,11 +112,6 @@ def circle_test_command(
     _emit(test, format_=format_, contributions=contributions)
     if not test.passed:
         raise PlanFailsError
-
-
-def _require_two_files(trace: Path | None, plot: Path | None) -> None:
-    if trace and plot and os.path.realpath(trace) == os.path.realpath(plot):
-        raise BusplanError(f"--trace {trace} and --plot {plot}: the same file; give two names")
 
 
 def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
@@ -153,7 +148,7 @@ def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(documents.circle_document(test, with_contributions=contributions))
         if format_ == "json"
         else text.to_csv(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from busplan.cli.options import ALL_MODELS, TimingOption, complete_profile, timing_models
-from busplan.cli.output import PlanFailsError, emit, emit_text, say
+from busplan.cli.output import PlanFailsError, emit, emit_document, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
@@ -120,6 +120,6 @@ def _emit(found: "Difference", arguments: tuple[str, str], *, format_: str) -> N
     if format_ == "table":
         emit(diff.diff_lines(found, arguments=arguments))
     elif format_ == "markdown":
-        emit_text(diff.diff_markdown(found, arguments=arguments))
+        emit_document(diff.diff_markdown(found, arguments=arguments))
     else:
-        emit_text(text.to_json(diff.diff_document(found, arguments=arguments)))
+        emit_document(text.to_json(diff.diff_document(found, arguments=arguments)))

@@ -15,7 +15,7 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_models,
 )
-from busplan.cli.output import emit, emit_text
+from busplan.cli.output import emit, emit_document
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -130,9 +130,9 @@ def _list(plan: "Profile", format_: ExplainFormat) -> None:
     if format_ == "text":
         emit(report.figure_lines(plan, found))
     elif format_ == "json":
-        emit_text(text.to_json(report.figure_document(plan, found)))
+        emit_document(text.to_json(report.figure_document(plan, found)))
     else:
-        emit_text(report.figure_markdown(plan, found))
+        emit_document(report.figure_markdown(plan, found))
 
 
 def _write(found: "Explanation", format_: ExplainFormat) -> None:
@@ -143,6 +143,6 @@ def _write(found: "Explanation", format_: ExplainFormat) -> None:
     if format_ == "text":
         emit(report.explain_lines(found))
     elif format_ == "json":
-        emit_text(text.to_json(report.explain_document(found)))
+        emit_document(text.to_json(report.explain_document(found)))
     else:
-        emit_text(report.explain_markdown(found))
+        emit_document(report.explain_markdown(found))

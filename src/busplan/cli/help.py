@@ -7,7 +7,10 @@ from typing import Any, Final
 from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
 
-FAILURES: Final = "Exits 2 when it could not do its job and says why on standard error, 130 when interrupted."
+FAILURES: Final = (
+    "Exits 2 when it could not do its job and says why on standard error, 130 when interrupted, 143 when terminated, "
+    "129 when hung up."
+)
 """What holds for every command, and stands at the end of its help."""
 _OFFER: Final = 60
 """Characters of help beside an offer of the shell's completion."""

@@ -15,7 +15,7 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_models,
 )
-from busplan.cli.output import emit, emit_text
+from busplan.cli.output import emit, emit_document
 
 
 @takes_bus_options
@@ -57,7 +57,7 @@ def latency_command(
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(documents.latency_document(result))
         if format_ == "json"
         else text.to_csv(documents.with_profile(plan.name, documents.latency_rows(result)))

@@ -5,8 +5,9 @@ from typing import Annotated, Literal
 
 import typer
 
+from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file, output_option
-from busplan.cli.output import emit_text, say, write_file
+from busplan.cli.output import write_document
 
 
 def manual_command(
@@ -28,6 +29,7 @@ def manual_command(
 
     Example: busplan manual --format man -o busplan.1
     """
+    require_apart({"--output": output})
     from busplan.cli.tree import manual_of
 
     chosen = form_of_file(format_, output, forms={".1": "man", ".md": "markdown"}, default="markdown")
@@ -40,8 +42,4 @@ def manual_command(
         from busplan.report.manual.markdown import markdown_page
 
         text = markdown_page(manual)
-    if output is None:
-        emit_text(text)
-    else:
-        write_file(output, text.encode(), overwrite=True)
-        say(f"wrote {output}")
+    write_document(text, output)

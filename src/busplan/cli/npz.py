@@ -6,11 +6,13 @@ needs a column's length before the column.
 
 import shutil
 import zipfile
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, Self
+from tempfile import TemporaryFile, gettempdir
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Protocol, Self
+
+from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -18,6 +20,19 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
 
 _COPIED_AT_ONCE: Final = 1 << 20
+
+
+class Archive(Protocol):
+    """Where an archive is written."""
+
+    def write(self, data: bytes, /) -> int:
+        """Take more bytes."""
+
+    def flush(self) -> None:
+        """Hold nothing back."""
+
+    def close(self) -> None:
+        """Take no more."""
 
 
 class NpzColumns:
@@ -28,10 +43,10 @@ class NpzColumns:
     columns
         Which columns of a block.
     folder
-        Where there is room for them.
+        Where there is room for them; None for the folder of temporary files.
     """
 
-    def __init__(self, columns: Sequence[str], *, folder: Path) -> None:
+    def __init__(self, columns: Sequence[str], *, folder: Path | None) -> None:
         self._columns, self._folder = columns, folder
         self._stack = ExitStack()
         self._files: dict[str, BinaryIO] = {}
@@ -40,14 +55,16 @@ class NpzColumns:
         self._rows = 0
 
     def __enter__(self) -> Self:
-        for name in self._columns:
-            self._files[name] = self._stack.enter_context(TemporaryFile(dir=self._folder))
+        with self._named():
+            for name in self._columns:
+                self._files[name] = self._stack.enter_context(TemporaryFile(dir=self._folder))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: "TracebackType | None"
     ) -> None:
-        self._stack.close()
+        with suppress(OSError):  # what was not written is not wanted any more
+            self._stack.close()
 
     def add(self, block: "Block") -> None:
         """Append a block's rows to each column."""
@@ -59,8 +76,18 @@ class NpzColumns:
             if words[0] is not None:
                 values = self._places(name, values, words, models=len(block.models))
             self._types.setdefault(name, values.dtype)
-            self._files[name].write(np.ascontiguousarray(values).data)
+            with self._named():
+                self._files[name].write(np.ascontiguousarray(values).data)
         self._rows += block.chunk.points * len(block.models)
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        """Say whose disk is full."""
+        try:
+            yield
+        except OSError as error:
+            folder = self._folder or gettempdir()
+            raise BusplanError(f"columns in {folder}: cannot be written: {error.strerror}") from None
 
     def _places(self, name: str, values: Any, words: Sequence[Any], *, models: int) -> Any:
         """Places of a column's words in one list of them for all blocks and models."""
@@ -78,7 +105,7 @@ class NpzColumns:
         ]
         return np.stack(columns, axis=1).ravel()
 
-    def write(self, file: BinaryIO, facts: Mapping[str, object]) -> None:
+    def write(self, file: Archive, facts: Mapping[str, object]) -> None:
         """Put the archive together.
 
         Parameters
@@ -101,7 +128,8 @@ class NpzColumns:
                     dtype = np.lib.format.dtype_to_descr(self._types.get(name, np.dtype(float)))
                     header = {"descr": dtype, "fortran_order": False, "shape": (self._rows,)}
                     np.lib.format.write_array_header_1_0(member, header)
-                    column.seek(0)
+                    with self._named():
+                        column.seek(0)
                     shutil.copyfileobj(column, member, _COPIED_AT_ONCE)
 
 

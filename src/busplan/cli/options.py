@@ -254,6 +254,9 @@ def plot_format(path: Path) -> str:
     return file_format
 
 
+STANDARD_OUTPUT: Final = Path("-")
+
+
 def output_option(words: str) -> Any:
     """Make the option that sends a document to a file.
 
@@ -262,8 +265,12 @@ def output_option(words: str) -> Any:
     words
         What is written where, without the full stop.
     """
-    help_ = f"{words}; an old file is replaced.  [default: standard output]"
-    return typer.Option("--output", "-o", metavar="FILE", help=help_, show_default=False)
+    help_ = f"{words}; an old file is replaced; - is standard output.  [default: standard output]"
+    return typer.Option("--output", "-o", metavar="FILE", parser=_file_unless_dash, help=help_, show_default=False)
+
+
+def _file_unless_dash(text: str) -> Path | None:
+    return None if text == "-" else Path(text)
 
 
 def form_of_file(given: Form | None, output: Path | None, *, forms: "Mapping[str, Form]", default: Form) -> Form:

@@ -10,8 +10,7 @@ from errno import EISDIR
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
+from busplan.cli.interrupt import StoppedError
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -24,15 +23,13 @@ CANNOT: int = 2
 
 _NARROWEST = 40
 _LONG_NAME = 200
+_NEW_MODE = 0o666
+"""Permissions of a new file, less what the user's umask takes."""
 _STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "heading": "bold", "plain": "", "table": ""}
 
 
 class PlanFailsError(Exception):
     """The answer is out, and it is that the plan does not hold: exit with `PLAN_FAILS`."""
-
-
-class StoppedError(KeyboardInterrupt):
-    """Ctrl-C, noted between two steps: what stands in the file so far is whole in itself, and may be kept."""
 
 
 def say(*messages: str) -> None:
@@ -46,29 +43,61 @@ def say(*messages: str) -> None:
 
 
 def emit_text(text: str) -> None:
-    """Write the document to stdout.
+    """Write words for a reader to stdout, in the encoding of the terminal, with escapes for what it lacks.
 
     Raises
     ------
     BusplanError
         stdout is closed, or cannot take it all.
     """
-    if sys.stdout is None:
-        raise BusplanError("standard output is closed")
-    try:
-        sys.stdout.write(text)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # The reader has seen enough; Python's own flush at exit must not complain either.
-        _abandon_stdout()
-        raise typer.Exit(CANNOT) from None
-    except OSError as error:
-        _abandon_stdout()
-        raise BusplanError(f"standard output cannot be written: {error.strerror}") from None
+    sys.stdout.write(text)
+    sys.stdout.flush()
 
 
-def _abandon_stdout() -> None:
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def emit_document(document: str | bytes) -> None:
+    """Write what a program reads to stdout: its text is UTF-8, whatever the terminal's encoding.
+
+    Raises
+    ------
+    BusplanError
+        As `emit_text`.
+    """
+    sys.stdout.flush()
+    sys.stdout.buffer.write(document_bytes(document))
+    sys.stdout.buffer.flush()
+
+
+def document_bytes(document: str | bytes) -> bytes:
+    """Bytes of a document, on every way out; a path that is no UTF-8 becomes escapes, which reading JSON takes back."""
+    return document.encode("utf-8", "backslashreplace") if isinstance(document, str) else document
+
+
+def refuse_terminal(form: str) -> None:
+    """Refuse to write bytes that are no text to a terminal.
+
+    Raises
+    ------
+    BusplanError
+        stdout is one.
+    """
+    if sys.stdout.isatty():
+        raise BusplanError(f"--format {form}: is no text for a terminal; give -o FILE.{form}, or send it down a pipe")
+
+
+def write_document(document: str | bytes, output: Path | None, *, quiet: bool = False) -> None:
+    """Write a document to its file, and say so; or to stdout, where no file is asked for.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be written.
+    """
+    if output is None:
+        emit_document(document)
+        return
+    write_file(output, document_bytes(document), overwrite=True)
+    if not quiet:
+        say(f"wrote {output}")
 
 
 def emit(lines: Iterable["Line"]) -> None:
@@ -76,7 +105,7 @@ def emit(lines: Iterable["Line"]) -> None:
     from busplan.report.lines import plain_text
 
     # A pipe gets plain lines, and does not wait for the renderer to load.
-    styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or (sys.stdout is not None and sys.stdout.isatty())
+    styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()
     emit_text((_styled if styled else plain_text)(lines))
 
 
@@ -148,6 +177,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
         with _named(path, target):
             file.flush()
             os.fsync(file.fileno())
+            _give_name(file.fileno(), temporary)
             file.close()
             if mode is not None:
                 temporary.chmod(mode)
@@ -164,8 +194,7 @@ class _Raw(io.FileIO):
 
     def __init__(self, temporary: Path, *, path: Path, target: Path) -> None:
         self._names = path, target
-        # "x" gives the file the permissions that any new file of the user has.
-        super().__init__(temporary, "xb")
+        super().__init__(temporary, "xb", opener=_opened)
 
     def write(self, data: Any, /) -> int:
         with _named(*self._names):
@@ -180,6 +209,27 @@ class NewFile(io.BufferedWriter):
     def abandon(self) -> None:
         """Leave what was there before as it is: nothing takes its name at the end."""
         self.abandoned = True
+
+
+def _opened(temporary: str, flags: int) -> int:
+    """Open a file that has no name yet, where the system has such: a process that is killed leaves nothing of it."""
+    if hasattr(os, "O_TMPFILE") and Path("/proc/self/fd").is_dir():
+        with suppress(OSError):
+            return os.open(Path(temporary).parent, os.O_TMPFILE | os.O_WRONLY, _NEW_MODE)
+    return os.open(temporary, flags, _NEW_MODE)
+
+
+def _give_name(descriptor: int, temporary: Path) -> None:
+    if os.fstat(descriptor).st_nlink:
+        return
+    nameless = f"/proc/self/fd/{descriptor}"
+    try:
+        # A descriptor for the folder, though the path begins at the root: only so does Python follow the link.
+        os.link(nameless, temporary, src_dir_fd=descriptor)
+    except OSError:  # a file system without hard links
+        from shutil import copyfile
+
+        copyfile(nameless, temporary)
 
 
 def _close(file: NewFile) -> None:

@@ -1,7 +1,7 @@
 """`busplan paper`."""
 
 from busplan.cli.options import FormatOption
-from busplan.cli.output import emit, emit_text
+from busplan.cli.output import emit, emit_document
 from busplan.cli.progress import progress_bar
 
 
@@ -29,7 +29,7 @@ def paper_command(format_: FormatOption = "table") -> None:
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(documents.paper_document(sections))
         if format_ == "json"
         else text.to_csv(documents.paper_rows(sections))

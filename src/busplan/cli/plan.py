@@ -7,8 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.options import BUS_OPTIONS, FormatOption, GapCountOption, ProfileArgument, bus_changes, periods_us
-from busplan.cli.output import PlanFailsError, emit, emit_text, new_file, say
+from busplan.cli.options import (
+    BUS_OPTIONS,
+    STANDARD_OUTPUT,
+    FormatOption,
+    GapCountOption,
+    ProfileArgument,
+    bus_changes,
+    periods_us,
+)
+from busplan.cli.output import PlanFailsError, emit, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -83,7 +91,8 @@ def plan_command(
             "--output",
             "-o",
             metavar="NEW.toml",
-            help="Write the recommended profile as a new file, without comments.  [default: no file]",
+            help="Write the recommended profile as a new file, without comments; - is standard output, and the report "
+            "goes to standard error.  [default: no file]",
         ),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
@@ -102,7 +111,7 @@ def plan_command(
 
     Example: busplan plan paper-1ms --axes 16
     """
-    _check_options(nodes=nodes, axes=axes, apply=apply, output=output, force=force)
+    _check_options(nodes=nodes, axes=axes, apply=apply, output=output, force=force, format_=format_)
     from busplan.analysis.planning.options import plan
     from busplan.profile.shipped import load
 
@@ -110,10 +119,11 @@ def plan_command(
         require_own_file(profile)
     loaded = load(profile)
     wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
+    piped = output == STANDARD_OUTPUT
     with_circle = circle and loaded.profile.asks_for_circle
     with ExitStack() as files:
         # Opened before the search: a path that cannot be written is said at once.
-        new = files.enter_context(new_file(output, overwrite=force)) if output else None
+        new = files.enter_context(new_file(output, overwrite=force)) if output and not piped else None
         with progress_bar("circle tests") as progress:
             check = None
             if with_circle:
@@ -122,27 +132,32 @@ def plan_command(
                 check = CircleCheck(progress=progress, expected=max_circles)
             result = plan(loaded.profile, wanted=wanted, circle=check, max_circles=max_circles)
         if result.recommended is None:
-            _emit(result, format_=format_, with_circle=with_circle)
+            _emit(result, format_=format_, with_circle=with_circle, piped=piped)
             if apply or output:
                 say(f"{profile if apply else output}: not written, for there is no plan")
             raise PlanFailsError
-        if new is not None:
+        if output is not None:
             from busplan.profile.write import profile_text
 
-            new.write(profile_text(result.recommended.profile).encode())
+            write = emit_document if new is None else new.write
+            write(profile_text(result.recommended.profile).encode())
     if apply:
         _apply(loaded, result)
-    elif output is not None:
+    elif new is not None:
         say(f"wrote {output}")
-    _emit(result, format_=format_, with_circle=with_circle)
+    _emit(result, format_=format_, with_circle=with_circle, piped=piped)
 
 
-def _check_options(*, nodes: int | None, axes: int | None, apply: bool, output: Path | None, force: bool) -> None:
+def _check_options(
+    *, nodes: int | None, axes: int | None, apply: bool, output: Path | None, force: bool, format_: str
+) -> None:
     problems = []
     if nodes is not None and axes is not None:
         problems.append(f"--nodes {nodes} and --axes {axes}: give one of them")
     if apply and output is not None:
         problems.append(f"--apply and -o {output}: give one of them; -o leaves PROFILE as it is")
+    if output == STANDARD_OUTPUT and format_ != "table":
+        problems.append(f"--format {format_} and -o -: standard output takes one document; give -o a file")
     if force and output is None:
         problems.append("--force: goes with -o NEW.toml")
     if problems:
@@ -186,15 +201,19 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     say(f"changed {loaded.document.name}: {settings(loaded.profile, changes)}")
 
 
-def _emit(result: "Plan", *, format_: str, with_circle: bool) -> None:
+def _emit(result: "Plan", *, format_: str, with_circle: bool, piped: bool) -> None:
+    """Write the report; where standard output takes the profile, as a summary."""
     from busplan.report import plan as report
 
+    if piped:
+        say(*(line.text for line in report.plan_lines(result, with_circle=with_circle)))
+        return
     if format_ == "table":
         emit(report.plan_lines(result, with_circle=with_circle))
         return
     from busplan.report import documents, text
 
-    emit_text(
+    emit_document(
         text.to_json(report.plan_document(result))
         if format_ == "json"
         else text.to_csv(documents.with_profile(result.profile.name, report.plan_csv_rows(result)))

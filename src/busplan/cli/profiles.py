@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from busplan.cli.output import emit, emit_text
+from busplan.cli.output import emit, emit_document
 
 
 def profiles_command(
@@ -28,6 +28,6 @@ def profiles_command(
 
         emit(profiles_lines(rows))
     elif format_ == "json":
-        emit_text(text.to_json(documents.document("profiles", profiles=rows)))
+        emit_document(text.to_json(documents.document("profiles", profiles=rows)))
     else:
-        emit_text(text.to_csv(rows))
+        emit_document(text.to_csv(rows))

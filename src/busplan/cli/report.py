@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import complete_profile, form_of_file, output_option, time_us
-from busplan.cli.output import emit_text, new_file, say
+from busplan.cli.output import document_bytes, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
@@ -79,13 +80,14 @@ def report_command(
     chosen = form_of_file(format_, output, forms=_SUFFIXES, default="html")
     if title is not None and (commands(title) or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
+    require_apart({"--output": output}, inputs=profile_files(*profiles))
     plans = load_each(profiles, partial(_plan, period=period))
     if output is None:
-        emit_text(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))
+        emit_document(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))
         return
     # Opened before the simulation: a path that cannot be written is said at once.
     with new_file(output, overwrite=True) as file:
-        file.write(_written(_page(profiles, plans, title, period=period, circle=circle), chosen).encode())
+        file.write(document_bytes(_written(_page(profiles, plans, title, period=period, circle=circle), chosen)))
     say(f"wrote {output}")
 
 

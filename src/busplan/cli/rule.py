@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from busplan.cli.output import emit_text
+from busplan.cli.output import emit_document, emit_text
 from busplan.errors import BusplanError
 
 
@@ -39,6 +39,6 @@ def rule_command(
         raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")
     chosen = list(rules.values()) if code is None else [rules[code.upper()]]
     if format_ == "json":
-        emit_text(text.to_json(documents.document("rule", rules=rule_rows(chosen))))
+        emit_document(text.to_json(documents.document("rule", rules=rule_rows(chosen))))
     else:
         emit_text(rule_table(chosen) if code is None else rule_page(chosen[0]))

@@ -1,6 +1,6 @@
 """`busplan schema`."""
 
-from busplan.cli.output import emit_text
+from busplan.cli.output import emit_document
 
 
 def schema_command() -> None:
@@ -14,4 +14,4 @@ def schema_command() -> None:
     from busplan.profile.schema import profile_schema
     from busplan.report.text import to_json
 
-    emit_text(to_json(profile_schema()))
+    emit_document(to_json(profile_schema()))

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
+from busplan.cli.output import partial_path, refuse_terminal
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ def sweep_command(
         typer.Option(
             "--format",
             help="Form of the document: a table of the top rows, or every row as csv, json (one document), jsonl (a "
-            "JSON object a line, the first describes the sweep) or npz (NumPy columns, needs -o).  [default: by the "
+            "JSON object a line, the first describes the sweep) or npz (NumPy columns, no text).  [default: by the "
             "ending of -o, else table]",
             show_default=False,
         ),
@@ -107,8 +109,8 @@ def sweep_command(
     """Compute capacity over a grid: any keys of the profile, every combination, both timing models.
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
-    points take seconds, and writing them as text some minutes. Ctrl-C keeps the rows so far in FILE.partial.csv (or
-    .json, .jsonl, .npz) and leaves FILE as it was. A report: it exits 0 whatever fits, and 130 when interrupted.
+    points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
+    FILE.partial.csv (or .json, .jsonl, .npz) and leave FILE as it was. A report: it exits 0 whatever fits.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
@@ -122,6 +124,9 @@ def sweep_command(
     # Every command pays for what stands at the top of this module.
     from busplan.cli.vary import parse_axes
 
+    kept = None if output is None else partial_path(output)
+    outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
+    require_apart(outputs, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.sweep.grid import checked_grid
     from busplan.cli.sweep_run import SweepJob, available_processors, run_sweep
@@ -158,7 +163,7 @@ def sweep_command(
 def _require_sense(format_: SweepFormat, *, output: Path | None, sort: str | None, top: int | None) -> None:
     """Refuse options that the format cannot follow."""
     if format_ == "npz" and output is None:
-        raise BusplanError("--format npz: is no text for a terminal; give -o FILE.npz")
+        refuse_terminal("npz")
     for option, value in (("--sort", sort), ("--top", top)):
         if value is not None and format_ != "table":
             raise BusplanError(f"{option}: goes with --format table; {format_} has every row in the order of the grid")

@@ -1,28 +1,27 @@
 """A sweep on its way: blocks are computed, written and counted one by one."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from busplan.cli.interrupt import ctrl_c_noted
-from busplan.cli.output import StoppedError, emit, emit_text, new_file, partial_path, say
+from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
+from busplan.cli.output import CANNOT, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
-from busplan.errors import BusplanError
+from busplan.cli.sweep_sinks import opened_sink
+from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.analysis.sweep.grid import Grid
-    from busplan.cli.npz import NpzColumns
     from busplan.cli.sweep import SweepFormat
     from busplan.report.sweep.figure import FigureData
-    from busplan.report.sweep.top import Tally
     from busplan.sections.profile import Profile
 
 _CIRCLES_AT_ONCE: Final = 4
-"""Points that each process tests between two looks at Ctrl-C."""
+"""Points that each process tests between two looks at signals."""
 
 
 class SweepJob(NamedTuple):
@@ -46,16 +45,6 @@ class SweepJob(NamedTuple):
     """Whether their number does not matter."""
 
 
-class _Sink(Protocol):
-    """Where blocks go."""
-
-    def add(self, block: "Block") -> None:
-        """Take one more block."""
-
-    def finish(self, *, complete: bool) -> None:
-        """End the document; without all blocks it is a partial one."""
-
-
 def available_processors() -> int:
     """Processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -69,7 +58,7 @@ def run_sweep(job: SweepJob) -> None:
     BusplanError
         A file that cannot be written, a figure that cannot be drawn, or a point without a circle test.
     StoppedError
-        Ctrl-C; what was written is valid, and says that it is partial.
+        Ctrl-C, SIGTERM, SIGHUP or a lost worker; what was written is valid, and says that it is partial.
     """
     from busplan.analysis.network import bus_of
     from busplan.report.sweep.top import Tally
@@ -79,32 +68,48 @@ def run_sweep(job: SweepJob) -> None:
         _require_circles(job)
     tally, expected = Tally(bus_of(job.profile), job.timing_models), job.grid.points
     with ExitStack() as stack:
-        with ctrl_c_noted() as stopped:
+        with signals_noted() as noted:
             # Opened before the work: a path that cannot be written is said at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
-            sink = stack.enter_context(_sink(job, file, tally))
+            sink = stack.enter_context(opened_sink(job, file, tally))
             takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-            with progress_bar("sweep") as progress, _blocks(job) as blocks:
-                for block in blocks:
-                    for take in takers:
-                        take(block)
-                    progress(tally.points, expected)
-                    if stopped():
-                        break
+            lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.format_ != "table" or file is not None:
             say(*(line.text for line in tally.lines(job.profile.name, expected=expected)))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
-            say(f"interrupted after {tally.points:,} of {expected:,} points{kept}")
-            raise StoppedError
+            say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
+            signal = noted()
+            raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_format is not None:
             plot_file.write(drawing.draw(job.profile.name, file_format=job.plot_format))
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")
+
+
+def _work(
+    job: SweepJob,
+    takers: "Sequence[Callable[[Block], None]]",
+    *,
+    progress: Callable[[], tuple[int, int]],
+    stopped: Callable[[], bool],
+) -> WorkerLostError | None:
+    """Hand each block to all takers, until all are done, or what stops it; gives the error of a lost worker."""
+    try:
+        with progress_bar("sweep") as report, _blocks(job) as blocks:
+            for block in blocks:
+                for take in takers:
+                    take(block)
+                report(*progress())
+                if stopped():
+                    break
+    except WorkerLostError as error:
+        return error
+    return None
 
 
 def _drawing(job: SweepJob) -> "FigureData | None":
@@ -147,119 +152,12 @@ def _blocks(job: SweepJob) -> "Iterator[Iterable[Block]]":
 @contextmanager
 def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iterable[list[Figures]]]]":
     """Give a function that runs circle tests here, or in other processes."""
-    import signal
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
     from busplan.analysis.sweep.circles import run_task
 
     if jobs == 1:
         yield lambda tasks: map(run_task, tasks)
         return
-    # Fresh processes: a fork would take this one's threads by surprise. Ctrl-C is for the one that hands the work out.
-    with ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
-    ) as pool:
-        try:
-            yield lambda tasks: pool.map(run_task, tasks)
-        finally:
-            pool.shutdown(cancel_futures=True)
+    from busplan.cli.workers import workers
 
-
-@contextmanager
-def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> Iterator[_Sink]:
-    """Where the document goes."""
-    if job.format_ == "table":
-        yield _TableSink(job, file, tally)
-    elif job.format_ == "npz" and file is not None and job.output is not None:
-        from busplan.cli.npz import NpzColumns
-
-        with NpzColumns(job.columns, folder=Path(os.path.realpath(job.output)).parent) as columns:
-            yield _NpzSink(job, file, columns)
-    else:
-        sink = _JsonSink if job.format_ == "json" else _TextSink
-        yield sink(job, emit_text if file is None else lambda text: _write(file, text))
-
-
-def _write(file: BinaryIO, text: str) -> None:
-    file.write(text.encode())
-
-
-class _TableSink:
-    """Keeps the rows at the top, for a table at the end."""
-
-    def __init__(self, job: SweepJob, file: BinaryIO | None, tally: "Tally") -> None:
-        from busplan.report.sweep.top import TopRows
-
-        self._job, self._file, self._tally = job, file, tally
-        self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
-        self.add = self._rows.add
-
-    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - the tally knows
-        """Write the table."""
-        lines = self._rows.lines(self._tally, self._job.profile.name, expected=self._job.grid.points)
-        if self._file is None:
-            emit(lines)
-        else:
-            from busplan.report.lines import plain_text
-
-            _write(self._file, plain_text(lines))
-
-
-class _TextSink:
-    """Writes every row as it comes, and each ends itself."""
-
-    def __init__(self, job: SweepJob, write: Callable[[str], None]) -> None:
-        from busplan.report.sweep.rows import csv_header, jsonl_header
-
-        self._job, self._write = job, write
-        if job.format_ == "csv":
-            write(csv_header(job.columns))
-        else:
-            write(jsonl_header(job.profile.name, job.grid, job.timing_models))
-
-    def add(self, block: "Block") -> None:
-        """Write one more block."""
-        from busplan.report.sweep.rows import block_text
-
-        self._write(block_text(block, self._job.columns, style="csv" if self._job.format_ == "csv" else "jsonl"))
-
-    def finish(self, *, complete: bool) -> None:
-        """Nothing is left to write."""
-
-
-class _JsonSink:
-    """Writes one document, row by row."""
-
-    def __init__(self, job: SweepJob, write: Callable[[str], None]) -> None:
-        from busplan.report.sweep.rows import json_header
-
-        self._columns, self._write = job.columns, write
-        write(json_header(job.profile.name, job.grid, job.timing_models))
-
-    def add(self, block: "Block") -> None:
-        """Write one more block."""
-        from busplan.report.sweep.rows import json_rows
-
-        self._write(json_rows(block, self._columns))
-
-    def finish(self, *, complete: bool) -> None:
-        """Close the document; one that is not whole says so, and is still JSON."""
-        from busplan.report.sweep.rows import json_footer
-
-        self._write(json_footer(complete=complete))
-
-
-class _NpzSink:
-    """Collects columns, for an archive at the end."""
-
-    def __init__(self, job: SweepJob, file: BinaryIO, columns: "NpzColumns") -> None:
-        self._job, self._file, self._columns = job, file, columns
-        self.add = columns.add
-
-    def finish(self, *, complete: bool) -> None:
-        """Write the archive, with what a reader must know of it."""
-        from busplan.report.documents import document
-
-        facts = document("sweep", profile=self._job.profile.name, points=self._job.grid.points, complete=complete)
-        self._columns.write(self._file, facts)
+    with workers(jobs) as map_:
+        yield lambda tasks: map_(run_task, tasks)

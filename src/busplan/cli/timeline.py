@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     NO_CHANGES,
     Changes,
@@ -19,7 +20,7 @@ from busplan.cli.options import (
     time_us,
     timing_model,
 )
-from busplan.cli.output import emit, emit_text, say, write_file
+from busplan.cli.output import emit, refuse_terminal, write_document
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def timeline_command(
         TimelineFormat | None,
         typer.Option(
             "--format",
-            help="Form of the document. png needs -o, and the extra plot (matplotlib).  "
+            help="Form of the document. png is for a file or a pipe, and needs the extra plot (matplotlib).  "
             "[default: by the ending of -o, else table]",
             show_default=False,
         ),
@@ -120,6 +121,7 @@ def timeline_command(
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
+    require_apart({"--output": output}, inputs=profile_files(profile))
     from busplan.analysis.timeline.schedule import schedule, zoom
     from busplan.profile.toml import override
 
@@ -143,7 +145,7 @@ def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineForm
     chosen = form_of_file(format_, output, forms=_SUFFIXES, default="table")
     if chosen == "png":
         if output is None:
-            raise BusplanError("--format png: a picture does not go to standard output; give -o FILE.png")
+            refuse_terminal("png")
         from busplan.report.plot import require_matplotlib
 
         require_matplotlib("--format png")
@@ -169,17 +171,12 @@ def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> No
         from busplan.report.timeline.terminal import timeline_lines
 
         emit(timeline_lines(shown, width=_columns()))
-    elif output is None:
-        emit_text(_text(shown, chosen))
-    else:
-        if chosen == "png":
-            from busplan.report.timeline.png import timeline_png
+    elif chosen == "png":
+        from busplan.report.timeline.png import timeline_png
 
-            content = timeline_png(shown)
-        else:
-            content = _text(shown, chosen).encode()
-        write_file(output, content, overwrite=True)
-        say(f"wrote {output}")
+        write_document(timeline_png(shown), output)
+    else:
+        write_document(_text(shown, chosen), output)
 
 
 def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
@@ -205,7 +202,7 @@ def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
 
 def _columns() -> int:
     """Width of the terminal; in a pipe the drawing is the same wherever it runs."""
-    if sys.stdout is None or not sys.stdout.isatty():
+    if not sys.stdout.isatty():
         return _PIPE_COLUMNS
     from shutil import get_terminal_size
 

@@ -1,0 +1,139 @@
+"""Where the blocks of a sweep go: a table, rows as text, one JSON document or an archive of columns."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Protocol
+
+from busplan.cli.output import document_bytes, emit, emit_document
+
+if TYPE_CHECKING:
+    from busplan.analysis.sweep.blocks import Block
+    from busplan.cli.npz import Archive, NpzColumns
+    from busplan.cli.sweep_run import SweepJob
+    from busplan.report.sweep.top import Tally
+
+
+class Sink(Protocol):
+    """Where blocks go."""
+
+    def add(self, block: "Block") -> None:
+        """Take one more block."""
+
+    def finish(self, *, complete: bool) -> None:
+        """End the document; without all blocks it is a partial one."""
+
+
+@contextmanager
+def opened_sink(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Iterator[Sink]:
+    """Where the document goes."""
+    if job.format_ == "table":
+        yield _TableSink(job, file, tally)
+    elif job.format_ == "npz":
+        from busplan.cli.npz import NpzColumns
+
+        folder = Path(os.path.realpath(job.output)).parent if job.output else None
+        with NpzColumns(job.columns, folder=folder) as columns:
+            yield _NpzSink(job, file or _Pipe(), columns)
+    else:
+        sink = _JsonSink if job.format_ == "json" else _TextSink
+        yield sink(job, emit_document if file is None else lambda text: _write(file, text))
+
+
+def _write(file: BinaryIO, text: str) -> None:
+    file.write(document_bytes(text))
+
+
+class _Pipe:
+    """Standard output as a file that cannot go back, for an archive."""
+
+    def write(self, data: bytes, /) -> int:
+        emit_document(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+    def close(self) -> None:
+        """It stays open for others."""
+
+
+class _TableSink:
+    """Keeps the rows at the top, for a table at the end."""
+
+    def __init__(self, job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> None:
+        from busplan.report.sweep.top import TopRows
+
+        self._job, self._file, self._tally = job, file, tally
+        self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
+        self.add = self._rows.add
+
+    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - the tally knows
+        """Write the table."""
+        lines = self._rows.lines(self._tally, self._job.profile.name, expected=self._job.grid.points)
+        if self._file is None:
+            emit(lines)
+        else:
+            from busplan.report.lines import plain_text
+
+            _write(self._file, plain_text(lines))
+
+
+class _TextSink:
+    """Writes every row as it comes, and each ends itself."""
+
+    def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
+        from busplan.report.sweep.rows import csv_header, jsonl_header
+
+        self._job, self._write = job, write
+        if job.format_ == "csv":
+            write(csv_header(job.columns))
+        else:
+            write(jsonl_header(job.profile.name, job.grid, job.timing_models))
+
+    def add(self, block: "Block") -> None:
+        """Write one more block."""
+        from busplan.report.sweep.rows import block_text
+
+        self._write(block_text(block, self._job.columns, style="csv" if self._job.format_ == "csv" else "jsonl"))
+
+    def finish(self, *, complete: bool) -> None:
+        """Nothing is left to write."""
+
+
+class _JsonSink:
+    """Writes one document, row by row."""
+
+    def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
+        from busplan.report.sweep.rows import json_header
+
+        self._columns, self._write = job.columns, write
+        write(json_header(job.profile.name, job.grid, job.timing_models))
+
+    def add(self, block: "Block") -> None:
+        """Write one more block."""
+        from busplan.report.sweep.rows import json_rows
+
+        self._write(json_rows(block, self._columns))
+
+    def finish(self, *, complete: bool) -> None:
+        """Close the document; one that is not whole says so, and is still JSON."""
+        from busplan.report.sweep.rows import json_footer
+
+        self._write(json_footer(complete=complete))
+
+
+class _NpzSink:
+    """Collects columns, for an archive at the end."""
+
+    def __init__(self, job: "SweepJob", file: "Archive", columns: "NpzColumns") -> None:
+        self._job, self._file, self._columns = job, file, columns
+        self.add = columns.add
+
+    def finish(self, *, complete: bool) -> None:
+        """Write the archive, with what a reader must know of it."""
+        from busplan.report.documents import document
+
+        facts = document("sweep", profile=self._job.profile.name, points=self._job.grid.points, complete=complete)
+        self._columns.write(self._file, facts)

@@ -1,0 +1,194 @@
+"""Every way to standard output, on descriptors that take a part of what they are given, and in UTF-8."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Run = Callable[..., Any]
+
+WRITERS = {
+    "a document": ("capacity", "paper-4ms", "--format", "json"),
+    "a table": ("latency", "paper-4ms"),
+    "a page": ("report", "paper-1ms", "--no-circle"),
+    "streamed rows": ("sweep", "paper-1ms", "--vary", "bus.nodes=1:60", "--format", "csv"),
+    "columns": ("sweep", "paper-1ms", "--vary", "bus.nodes=1:60", "--format", "npz"),
+    "events": ("timeline", "paper-4ms", "--format", "svg"),
+    "the gate": ("check", "paper-4ms", "--no-circle", "--format", "sarif"),
+    "the manual": ("manual",),
+    "a schema": ("schema",),
+    "a profile": ("plan", "paper-1ms", "--no-circle", "-o", "-"),
+    "a derivation": ("explain", "paper-4ms", "required_us"),
+    "a comparison": ("diff", "paper-4ms", "paper-1ms", "--no-circle", "--format", "markdown"),
+    "the rules": ("rule",),
+    "the help": ("--help",),
+    "the help of a command": ("sweep", "--help"),
+}
+LIMITED = """
+import resource, sys
+from busplan.__main__ import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))
+main()
+"""
+NON_BLOCKING = """
+import os
+from busplan.__main__ import main
+os.set_blocking(1, False)
+main()
+"""
+MIXED = """\
+schema_version = 1
+name = "Fräse 日本"
+bus = { kind = "ieee1394", speed = "S400", nodes = 2 }
+cycle.period_us = 4000
+payload = { read_bytes = 12, write_bytes = 12 }
+node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 } }
+"""
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_file_that_takes_a_part_ends_with_exit_2_and_a_message(run: Run, tmp_path: Path, name: str) -> None:
+    with (tmp_path / "out").open("wb") as file:
+        done = run(*WRITERS[name], python=("-c", LIMITED), env={"PYTHONUNBUFFERED": "1"}, stdout=file)
+    assert done.returncode == 2
+    assert "cannot be written: File too large\n" in done.stderr
+    assert (tmp_path / "out").stat().st_size == 512
+
+
+@pytest.mark.parametrize("name", ["a page", "streamed rows", "columns", "the manual"])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_slow_reader_of_a_pipe_that_does_not_block_gets_every_byte(
+    tmp_path: Path, name: str, unbuffered: str
+) -> None:
+    program = [sys.executable, "-c", NON_BLOCKING, *WRITERS[name]]
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    whole = subprocess.run(program, check=True, capture_output=True, cwd=tmp_path).stdout
+    with subprocess.Popen(
+        program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path, env=environment
+    ) as process:
+        assert process.stdout is not None
+        got = b""
+        while piece := process.stdout.read(8192):
+            got += piece
+            time.sleep(0.001)
+    assert process.returncode == 0
+    assert got == whole
+
+
+def test_a_document_that_is_larger_than_a_pipe_is_tried(run: Run) -> None:
+    assert len(run(*WRITERS["a page"]).stdout) > 1 << 16
+
+
+# --- encodings --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("capacity", "-", "--format", "csv"),
+        ("sweep", "-", "--vary", "bus.nodes=1:2", "--format", "jsonl"),
+        ("report", "-", "--no-circle"),
+        ("report", "-", "--no-circle", "--format", "markdown"),
+        ("timeline", "-", "--format", "svg"),
+        ("explain", "-", "required_us", "--format", "markdown"),
+        ("diff", "-", "paper-4ms", "--no-circle", "--format", "markdown"),
+        *(("check", "-", "--stdin-filename", "größe.toml", "--format", form) for form in ("json", "github", "gitlab")),
+        *(("check", "-", "--stdin-filename", "größe.toml", "--format", form) for form in ("junit", "sarif")),
+    ],
+    ids=" ".join,
+)
+def test_a_document_is_utf_8_whatever_the_locale(run: Run, arguments: tuple[str, ...], encoding: str) -> None:
+    mine, theirs = (run(*arguments, stdin=MIXED, env={"PYTHONIOENCODING": one}) for one in ("utf-8", encoding))
+    assert mine.stdout == theirs.stdout
+    assert (
+        "Fräse 日本" in mine.stdout or "größe" in mine.stdout or arguments[-1] in {"csv", "github", "gitlab", "sarif"}
+    )
+    assert "\\x" not in mine.stdout
+    if arguments[-1] in {"junit", "svg"}:
+        ET.fromstring(theirs.stdout.encode())
+    if arguments[-1] in {"json", "gitlab", "sarif"}:
+        json.loads(theirs.stdout)
+
+
+@pytest.mark.parametrize("arguments", [("check", "-", "--format", "text"), ("capacity", "-"), ("rule",)], ids=" ".join)
+def test_words_for_a_reader_keep_to_the_terminal(run: Run, arguments: tuple[str, ...]) -> None:
+    name = ("--stdin-filename", "größe.toml") if arguments[0] == "check" else ()
+    broken = MIXED.replace("nodes = 2", "nodes = 0") if name else MIXED
+    done = run(*arguments, *name, stdin=broken, env={"PYTHONIOENCODING": "ascii"})
+    assert done.stdout.isascii()
+    assert "\\u00e4" in done.stdout or "\\u00f6" in done.stdout or arguments == ("rule",)
+
+
+def test_a_path_that_is_no_utf_8_is_escaped_in_every_document(run: Run, tmp_path: Path) -> None:
+    odd = os.fsdecode(b"odd-\xff.toml")
+    (tmp_path / odd).write_text(MIXED, encoding="utf-8")
+    for output in ("-", "page.html"):
+        assert run("report", odd, "--no-circle", "--format", "html", "-o", output, cwd=tmp_path).returncode == 0
+    found = run("check", odd, "--no-circle", "--format", "json", cwd=tmp_path).stdout
+    assert json.loads(found)["files"][0]["path"] == odd
+
+
+# --- standard output by its name --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("manual", "--format", "man"),
+        ("report", "paper-4ms", "--no-circle"),
+        ("check", "paper-4ms", "--no-circle", "--format", "json"),
+        ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "--format", "csv"),
+        ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3"),
+        ("timeline", "paper-4ms", "--format", "mermaid"),
+    ],
+    ids=" ".join,
+)
+def test_a_dash_is_standard_output(run: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    named, left_out = run(*arguments, "-o", "-", cwd=tmp_path), run(*arguments, cwd=tmp_path)
+    assert (named.returncode, named.stdout, named.stderr) == (0, left_out.stdout, left_out.stderr)
+    assert named.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_plan_sends_the_profile_down_the_pipe_and_the_report_past_it(run: Run, tmp_path: Path) -> None:
+    asked = ("plan", "paper-1ms", "--no-circle")
+    piped = run(*asked, "-o", "-", cwd=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert run(*asked, "-o", "new.toml", cwd=tmp_path).returncode == piped.returncode == 0
+    assert piped.stdout == (tmp_path / "new.toml").read_text(encoding="utf-8")
+    assert piped.stderr == run(*asked, cwd=tmp_path).stdout
+
+
+def test_no_bytes_go_to_a_terminal(on_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
+    sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "--format", "npz", "-o", "-")
+    for form, arguments in (("npz", sweep), ("png", ("timeline", "paper-4ms", "--format", "png"))):
+        code, shown = on_terminal(*arguments, cwd=tmp_path)
+        said = f"--format {form}: is no text for a terminal; give -o FILE.{form}, or send it down a pipe\n"
+        assert (code, shown) == (2, said)
+
+
+def test_a_working_folder_that_is_gone_is_said(run: Run, tmp_path: Path) -> None:
+    gone = "import os; from busplan.__main__ import main; os.rmdir(os.getcwd()); main()"
+    sweep = ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "-o", "rows.csv")
+    for number, arguments in enumerate((sweep, ("init", "x"))):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        done = run(*arguments, cwd=folder, python=("-c", gone))
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr == "the working folder is no longer there; change into one that is\n"
+
+
+def test_columns_that_find_no_room_say_where(run: Run, tmp_path: Path) -> None:
+    rows = ("sweep", "paper-1ms", "--vary", "bus.nodes=1:60", "--vary", "bus.max_hops=1:60", "-o", "rows.npz")
+    done = run(*rows, cwd=tmp_path, python=("-c", LIMITED))
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"columns in {tmp_path}: cannot be written: File too large\n"
+    assert list(tmp_path.iterdir()) == []
