@@ -24,8 +24,9 @@ def _escape(character: str) -> str:
     return character.encode("unicode_escape").decode()
 
 
-def _json_escape(character: str) -> str:
-    units = character.encode("utf-16-be", "surrogatepass")
+def json_escape(text: str) -> str:
+    """Write every character of a text as JSON escapes it."""
+    units = text.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
 
 
@@ -73,4 +74,4 @@ def json_text(value: Any, *, indent: int | None = None) -> str:
     "\u009b \u202e ä"
     """
     # Inside a text JSON escapes line ends itself: those that are left are the layout's.
-    return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=_json_escape)
+    return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=json_escape)

@@ -7,6 +7,7 @@ alike. They branch on words, never on numbers.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, NODES, PAYLOAD_BYTES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
@@ -156,10 +157,14 @@ class BusCycle(ABC):
     network: Network
     model: str
 
-    @property
     @abstractmethod
-    def terms(self) -> tuple[Term, ...]:
+    def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire: every term always, 0.0 where it is off."""
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """The terms, computed once: a derivation names the very numbers that are added up."""
+        return self.computed_terms()
 
     @property
     def required_us(self) -> Number:

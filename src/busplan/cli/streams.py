@@ -88,5 +88,6 @@ def _escaped(error: UnicodeError) -> tuple[str, int]:
     """Escape what an encoding lacks as JSON does."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
-    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2)), error.end
+    from busplan.printable import json_escape  # a stream that lacks nothing need not load it
+
+    return json_escape(error.object[error.start : error.end]), error.end

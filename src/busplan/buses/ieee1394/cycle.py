@@ -141,8 +141,7 @@ class Ieee1394Cycle(BusCycle):
         sync = self.network.profile.cycle.sync
         return sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
 
-    @cached_property
-    def terms(self) -> tuple[Term, ...]:
+    def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
         own = [(one.nodes, one.phases) for one in self.exchanges]
         return (

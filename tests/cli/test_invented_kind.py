@@ -1,0 +1,354 @@
+"""A small invented kind of bus, defined here alone, is asked every question in every form.
+
+What it shows: a kind is its own section, terms, events, limits, settings, rules and figures, and no room outside
+`buses` knows it.
+"""
+
+import csv
+import json
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from io import StringIO
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+from jsonschema import Draft202012Validator
+from pydantic import Field
+
+import busplan
+from busplan.analysis.capacity.cycle import cycle_of, fits_in
+from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.buses import registered
+from busplan.buses.bus import (
+    Bus,
+    BusCycle,
+    BusEvent,
+    EventKind,
+    Limit,
+    PayloadRange,
+    Setting,
+    Term,
+    TimingModel,
+)
+from busplan.buses.figure import NONPERIODIC, Figure, capacity_figures
+from busplan.buses.network import Network
+from busplan.buses.rule import Rule, RuleProblem, RuleSubject
+from busplan.elementwise import Number, rounded_up, total
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.sections.cycle import BusSection
+from busplan.sections.profile import Profile
+
+Run = Callable[..., Any]
+
+RATES = (1.0, 2.0, 4.0)
+MOST_STATIONS = 40
+SHARED = 3
+"""Stations that one token serves: the token's share of the cycle is no polynomial of their number."""
+
+
+class RingSection(BusSection):
+    """Section [bus] of the invented kind."""
+
+    kind: Literal["ring"] = Field(description="Kind of bus", examples=["ring"])
+    nodes: int = Field(ge=1, description="Stations", examples=[5])
+    rate_mbit_s: float = Field(default=1.0, gt=0, description="Data rate [Mbit/s]", examples=[1])
+    token_us: float = Field(default=5.0, ge=0, description="One round of the token [us]", examples=[5])
+    timing_model: Literal["plain"] = Field(default="plain", description="Timing model", examples=["plain"])
+
+
+class RingProfile(Profile):
+    """A profile of the invented kind."""
+
+    bus: RingSection = Field(description="The bus")
+
+
+DATA = Figure("cycle_data_us", "data", "ring", "all data of a cycle", "data", ink="request", letter="D")
+TOKEN = Figure("cycle_token_us", "token", "ring", "all rounds of the token", "token", ink="contention", letter="T")
+ROUNDS = Figure("rounds", "n_r", "ring", "rounds of the token", "rounds of the token", "rounds", "count")
+
+
+class RingCycle(BusCycle):
+    """Data of every station, and a round of the token for every few of them."""
+
+    def __init__(self, network: Network, model: str) -> None:
+        self.network, self.model = network, model
+
+    @cached_property
+    def rounds(self) -> Number:
+        return rounded_up(self.network.nodes / SHARED)
+
+    def computed_terms(self) -> tuple[Term, ...]:
+        bus = self.network.profile.bus
+        sizes = (group.nodes * (group.read_bytes + group.write_bytes) for group in self.network.groups)
+        return (
+            Term("cycle_data_us", 8 * total(sizes) / bus.rate_mbit_s),
+            Term("cycle_token_us", self.rounds * bus.token_us),
+            Term("nonperiodic_us", self.network.nonperiodic_us),
+        )
+
+    def events(self) -> Iterator[BusEvent]:
+        bus, (group,) = self.network.profile.bus, self.network.groups
+        for node in range(1, group.nodes + 1):
+            if node % SHARED == 1:
+                yield BusEvent("token", "cycle_token_us", bus.token_us, "token")
+            for kind, size in (("in", group.read_bytes), ("out", group.write_bytes)):
+                yield BusEvent(kind, "cycle_data_us", 8 * size / bus.rate_mbit_s, f"data {kind}", node, "turn")
+        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "window")
+
+    def figures(self) -> Mapping[str, Number]:
+        return {"rounds": self.rounds}
+
+
+def slow(subject: RuleSubject) -> Iterator[RuleProblem]:
+    rate = getattr(subject.profile.bus, "rate_mbit_s")  # noqa: B009 - a key of this kind alone
+    if rate < RATES[0]:
+        yield RuleProblem("bus.rate_mbit_s", f"{rate:g} Mbit/s is slower than any station")
+
+
+class Ring(Bus):
+    """The invented kind."""
+
+    kind = "ring"
+    title = "Token ring"
+    timing_models = (TimingModel("plain", "as it is", is_conservative=True),)
+    term_figures = (DATA, TOKEN, NONPERIODIC)
+    capacity_figures = capacity_figures(term_figures, own=(ROUNDS,))
+    table_figures = (ROUNDS,)
+    limits = (
+        Limit(
+            "nodes",
+            "{value:.0f} stations are over the {most:.0f} of a ring",
+            lambda network: network.nodes,
+            lambda _network: MOST_STATIONS,
+            way_out="a second ring has room",
+        ),
+    )
+    rules = (Rule("RG101", "slow-ring", "error", "the ring is slower than its stations", "Take a faster one.", slow),)
+    event_kinds = (
+        EventKind("token", "token", "ring", "T", "contention"),
+        EventKind("in", "data in", "ring", "<", "response"),
+        EventKind("out", "data out", "ring", ">", "request"),
+        EventKind("nonperiodic", "window", "profile", "N", "reserve"),
+    )
+    stretch_kinds = (EventKind("turn", "turns", "", "#", "in"),)
+
+    def profile_model(self) -> type[Profile]:
+        return RingProfile
+
+    def cycle(self, network: Network, *, model: str) -> RingCycle:
+        return RingCycle(network, model)
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:
+        faster = tuple(rate for rate in RATES if rate > network.profile.bus.rate_mbit_s)
+        return (Setting("bus.rate_mbit_s", "rate", RATES[-1], faster, "rate"),)
+
+    def payloads(self, network: Network) -> PayloadRange:  # noqa: ARG002 - the same for any ring
+        return PayloadRange(1, 64, "frame")
+
+
+TEXT = """\
+schema_version = 1
+name = "ring"
+
+[bus]
+kind = "ring"
+nodes = 5
+
+[cycle]
+period_us = 1500
+slice_ratio = 0.5
+
+[payload]
+read_bytes = 8
+write_bytes = 8
+
+[node]
+axes = 2
+
+[node.execution]
+kind = "linear"
+base_us = 0
+per_byte_us = 0
+
+[servo]
+position_gain_per_s = 100
+
+[circle]
+radius_mm = 20
+feed_mm_per_min = 2000
+"""
+NEEDED_US = 5 * 8 * 16 + 2 * 5.0
+"""Required time of that profile, by hand: five stations of 16 bytes at 1 Mbit/s, and two rounds of the token."""
+
+
+@pytest.fixture
+def ring(tmp_path: Path) -> Iterator[Path]:
+    """A profile of the invented kind, in a folder of its own."""
+    path = tmp_path / "ring.toml"
+    path.write_text(TEXT.replace("period_us = 1500", "period_us = 1500"), encoding="utf-8")
+    with registered(Ring()):
+        yield path
+
+
+FORMS = {
+    "capacity": ("table", "json", "csv"),
+    "latency": ("table", "json", "csv"),
+    "plan": ("table", "json", "csv"),
+    "timeline": ("table", "json", "csv", "mermaid", "svg"),
+    "circle-test": ("table", "json", "csv"),
+    "report": ("html", "markdown"),
+    "check": ("text", "full", "json", "github", "gitlab", "junit", "sarif"),
+}
+
+
+@pytest.mark.parametrize(("command", "form"), [(one, form) for one, forms in FORMS.items() for form in forms])
+def test_every_question_is_answered_in_every_form(run: Run, ring: Path, command: str, form: str) -> None:
+    done = run(command, ring.name, "--format", form, cwd=ring.parent)
+    assert done.returncode == 0, done
+    # SARIF lists the rules of every kind.
+    assert form == "sarif" or "1394" not in done.stdout
+    assert form == "sarif" or "gap count" not in done.stdout
+    if form == "json":
+        assert json.loads(done.stdout)["schema"] == 1
+    if form == "csv":
+        assert len(list(csv.DictReader(StringIO(done.stdout)))) >= 1
+
+
+@pytest.mark.parametrize("form", ["text", "json", "markdown"])
+@pytest.mark.parametrize("figure", ["required_us", "rounds", "max_nodes", "text", "latency.cycle_token_us", None])
+def test_every_figure_is_explained(run: Run, ring: Path, figure: str | None, form: str) -> None:
+    asked = () if figure is None else (figure,)
+    done = run("explain", ring.name, *asked, "--format", form, cwd=ring.parent)
+    assert done.returncode == 0, done
+    if figure == "required_us" and form == "text":
+        assert "n_r = ceil(N / 3)" in done.stdout
+        assert "token = n_r token_us" in done.stdout
+        assert "T_need = data + token + T_npd" in done.stdout
+
+
+@pytest.mark.parametrize("form", ["table", "csv", "json", "jsonl"])
+def test_it_is_swept(run: Run, ring: Path, form: str) -> None:
+    vary = ("--vary", "bus.nodes=1:45:4", "--vary", "cycle.period_us=100,700,1500,20000")
+    done = run("sweep", ring.name, *vary, "--format", form, cwd=ring.parent)
+    assert done.returncode == 0, done
+    if form != "csv":
+        return
+    profile = busplan.load_profile(ring)
+    for row in csv.DictReader(StringIO(done.stdout)):
+        point = override(
+            profile, {"bus.nodes": int(row["bus.nodes"]), "cycle.period_us": float(row["cycle.period_us"])}
+        )
+        (one,) = busplan.capacity(point).results
+        assert (float(row["required_us"]), int(row["max_nodes"]), row["limited_by"], row["fits"]) == (
+            one.required_us,
+            one.max_nodes,
+            one.limited_by,
+            str(one.fits).lower(),
+        )
+
+
+@pytest.mark.parametrize("form", ["table", "json", "markdown"])
+@pytest.mark.parametrize(
+    "others", [("ring.toml", "other.toml"), ("ring.toml", "paper-1ms"), ("paper-1ms", "ring.toml")]
+)
+def test_it_is_compared_with_its_kind_and_with_another(
+    run: Run, ring: Path, others: tuple[str, str], form: str
+) -> None:
+    other = TEXT.replace("nodes = 5", "nodes = 5\nrate_mbit_s = 2.0")
+    (ring.parent / "other.toml").write_text(other, encoding="utf-8")
+    done = run("diff", *others, "--no-circle", "--format", form, cwd=ring.parent)
+    assert done.returncode == 0, done
+    if form == "json" and others[1] == "other.toml":
+        found = {(one["part"], one["figure"]): one for one in json.loads(done.stdout)["figures"]}
+        assert (found["plain", "cycle_data_us"]["a"], found["plain", "cycle_data_us"]["b"]) == (640, 320)
+        assert found["plain", "required_us"]["judgement"] == "better"
+
+
+def test_its_figures_are_those_by_hand(ring: Path) -> None:
+    (one,) = busplan.capacity(ring).results
+    assert (one.required_us, one.rounds, one.cycle_token_us) == (NEEDED_US, 2, 10)
+    assert one.timing_model == "plain"
+    assert one.fits
+    assert [term.name for term in one.terms] == ["data", "token", "nonperiodic"]
+
+
+def test_its_events_add_up_to_its_terms(ring: Path) -> None:
+    answer = busplan.timeline(ring)
+    sums: dict[str, float] = {}
+    for event in answer.cycle_events:
+        sums[event.term] = sums.get(event.term, 0.0) + event.duration_us
+    assert {term.key: term.us for term in answer.figures.terms if term.us} == {
+        key: pytest.approx(us) for key, us in sums.items() if key
+    }
+
+
+@pytest.mark.parametrize("period_us", [1, 100, 266, 276, 277, 1500, 5000, 10_000, 12_000, 1e6])
+def test_the_most_stations_are_those_that_a_count_finds(ring: Path, period_us: float) -> None:
+    profile = override(busplan.load_profile(ring), {"cycle.period_us": period_us})
+    fitting = [
+        nodes
+        for nodes in range(1, MOST_STATIONS + 1)
+        if fits_in(cycle_of(profile, model="plain", nodes=nodes).required_us, available_us=period_us / 2)
+    ]
+    most, limit = largest_nodes(profile, model="plain")
+    assert most == len(fitting)
+    assert limit == ("nodes" if most == MOST_STATIONS else "time")
+
+
+def test_a_plan_turns_its_setting_and_advice_names_it(run: Run, ring: Path) -> None:
+    answer = busplan.plan(ring, nodes=10, with_circle=False)
+    assert answer.recommended_changes == {"bus.nodes": 10, "bus.rate_mbit_s": 2.0}
+    ring.write_text(TEXT.replace("period_us = 1500", "period_us = 800"), encoding="utf-8")
+    (verdict,) = busplan.capacity(ring).verdicts
+    assert verdict.change is not None
+    assert verdict.change.changes == {"bus.rate_mbit_s": 2.0}
+    done = run("check", ring.name, "--no-circle", cwd=ring.parent)
+    assert "cheapest cure: bus.rate_mbit_s = 2.0" in done.stdout
+
+
+def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> None:
+    slower = TEXT.replace("nodes = 5", "nodes = 41\nrate_mbit_s = 0.5")
+    ring.write_text(slower, encoding="utf-8")
+    done = run("check", ring.name, "--no-circle", cwd=ring.parent)
+    assert done.returncode == 1
+    assert "ring.toml:7:1: RG101 bus.rate_mbit_s: 0.5 Mbit/s is slower than any station" in done.stdout
+    assert "41 stations are over the 40 of a ring" in run("capacity", ring.name, cwd=ring.parent).stdout
+    assert "RG101" in run("rule", cwd=ring.parent).stdout
+
+
+def test_an_unknown_kind_is_answered_with_the_known_ones_at_its_line(run: Run, ring: Path) -> None:
+    ring.write_text(TEXT.replace('"ring"\nnodes', '"rung"\nnodes').replace("period_us = 1500", "period_us = -1"))
+    done = run("capacity", ring.name, cwd=ring.parent)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        'ring.toml:5:1: bus.kind = "rung": expected "ieee1394" or "ring"',
+        "ring.toml:9:1: cycle.period_us = -1: must be 0.001 or more",
+    ]
+
+
+def test_its_wrong_keys_are_told_as_those_of_any_kind(run: Run, ring: Path) -> None:
+    ring.write_text(TEXT.replace("nodes = 5", "nodes = 5\ngap_count = 5\nrate_mbit_s = 0"), encoding="utf-8")
+    done = run("capacity", ring.name, cwd=ring.parent)
+    assert done.stderr.splitlines() == [
+        "ring.toml:7:1: bus.gap_count: unknown key; known here: kind, nodes, rate_mbit_s, token_us, timing_model",
+        "ring.toml:8:1: bus.rate_mbit_s = 0: must be greater than 0",
+    ]
+
+
+def test_one_schema_serves_all_kinds_and_names_the_key(run: Run, ring: Path) -> None:
+    schema = Draft202012Validator(json.loads(run("schema", cwd=ring.parent).stdout))
+    ours = busplan.load_profile(ring).model_dump(exclude_unset=True)
+    paper = load("paper-1ms").profile.model_dump(mode="json", exclude_unset=True)
+    assert not list(schema.iter_errors(ours))
+    assert not list(schema.iter_errors(paper))
+    wrong = {**ours, "bus": {**ours["bus"], "rate_mbit_s": -1}}
+    assert ["bus", "rate_mbit_s"] in [list(one.absolute_path) for one in schema.iter_errors(wrong)]
+
+
+def test_the_register_is_as_before_without_it(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "ring.toml").write_text(TEXT, encoding="utf-8")
+    done = run("capacity", "ring.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert 'bus.kind = "ring": expected "ieee1394"' in done.stderr
