@@ -1,20 +1,20 @@
 """`busplan sweep`: its options, and what of them goes together."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
 from busplan.cli.output import partial_path, refuse_terminal
+from busplan.cli.sweep_job import SweepFormat, SweepJob
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-SweepFormat = Literal["table", "csv", "json", "jsonl", "npz"]
 _ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".npz": "npz"}
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "max_axes"
@@ -129,7 +129,7 @@ def sweep_command(
     require_apart(outputs, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.sweep.grid import checked_grid
-    from busplan.cli.sweep_run import SweepJob, available_processors, run_sweep
+    from busplan.cli.sweep_run import available_processors, run_sweep
     from busplan.profile.shipped import load
 
     loaded = load(profile).profile

@@ -3,8 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
 from busplan.cli.output import CANNOT, new_file, partial_path, say
@@ -15,34 +14,11 @@ from busplan.errors import BusplanError, WorkerLostError
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.analysis.sweep.circles import CircleTask, Figures
-    from busplan.analysis.sweep.grid import Grid
-    from busplan.cli.sweep import SweepFormat
+    from busplan.cli.sweep_job import SweepJob
     from busplan.report.sweep.figure import FigureData
-    from busplan.sections.profile import Profile
 
 _CIRCLES_AT_ONCE: Final = 4
 """Points that each process tests between two looks at signals."""
-
-
-class SweepJob(NamedTuple):
-    """What is asked for, each value checked."""
-
-    profile: "Profile"
-    grid: "Grid"
-    timing_models: tuple[str, ...]
-    columns: tuple[str, ...]
-    format_: "SweepFormat"
-    output: Path | None
-    top: int
-    sort_by: str | None
-    ascending: bool
-    plot: Path | None
-    plot_format: str | None
-    figure: str
-    jobs: int | None
-    """Processes for circle tests; None without them."""
-    force: bool
-    """Whether their number does not matter."""
 
 
 def available_processors() -> int:
@@ -50,7 +26,7 @@ def available_processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def run_sweep(job: SweepJob) -> None:
+def run_sweep(job: "SweepJob") -> None:
     """Compute, write and draw a sweep.
 
     Raises
@@ -92,7 +68,7 @@ def run_sweep(job: SweepJob) -> None:
 
 
 def _work(
-    job: SweepJob,
+    job: "SweepJob",
     takers: "Sequence[Callable[[Block], None]]",
     *,
     progress: Callable[[], tuple[int, int]],
@@ -112,7 +88,7 @@ def _work(
     return None
 
 
-def _drawing(job: SweepJob) -> "FigureData | None":
+def _drawing(job: "SweepJob") -> "FigureData | None":
     if job.plot is None:
         return None
     from busplan.report.sweep.figure import FigureData, require_drawable
@@ -121,7 +97,7 @@ def _drawing(job: SweepJob) -> "FigureData | None":
     return FigureData(job.grid, figure=job.figure, timing_models=job.timing_models)
 
 
-def _require_circles(job: SweepJob) -> None:
+def _require_circles(job: "SweepJob") -> None:
     from busplan.analysis.sweep.circles import MAX_CIRCLES, require_circles
 
     if job.grid.points > MAX_CIRCLES and not job.force:
@@ -133,7 +109,7 @@ def _require_circles(job: SweepJob) -> None:
 
 
 @contextmanager
-def _blocks(job: SweepJob) -> "Iterator[Iterable[Block]]":
+def _blocks(job: "SweepJob") -> "Iterator[Iterable[Block]]":
     """Blocks of a size that suits what is done with them."""
     from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
     from busplan.report.sweep.rows import TEXT_POINTS

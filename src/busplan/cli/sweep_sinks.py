@@ -11,7 +11,7 @@ from busplan.cli.output import document_bytes, emit, emit_document
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.cli.npz import Archive, NpzColumns
-    from busplan.cli.sweep_run import SweepJob
+    from busplan.cli.sweep_job import SweepJob
     from busplan.report.sweep.top import Tally
 
 

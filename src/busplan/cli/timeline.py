@@ -109,10 +109,10 @@ def timeline_command(
 ) -> None:
     """Show one communication cycle as events, node by node and to scale.
 
-    The synchronous packet, a read and then a write of every node with each arbitration, packet, acknowledge, execution
-    and gap, the non-periodic window, and what is left of the slice. It is the second way to the time that `busplan
-    capacity` gives in closed form. A cycle that overruns its slice is drawn whole, and said. Every node is charged the
-    hops of the farthest. Times are in us. A report: it exits 0 whatever the figures are.
+    Everything that takes time on the wire in its order, the non-periodic window, and what is left of the slice. It is
+    the second way to the time that `busplan capacity` gives in closed form. A cycle that overruns its slice is drawn
+    whole, and said. Every node is charged the way of the farthest. Times are in us. A report: it exits 0 whatever the
+    figures are.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """

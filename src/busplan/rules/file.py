@@ -46,7 +46,7 @@ BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
         "error",
         "the value is outside its range",
         "Every quantity has a range in which it means something; the README's reference and `busplan schema` list "
-        "them. What only the bus standard forbids (payload, nodes, hops) has rules of its own.",
+        "them. What only the bus standard forbids has rules of its own.",
     ),
     "inconsistent": Rule(
         "BP006",

@@ -39,8 +39,8 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     --------
     >>> from busplan.profile.shipped import load
     >>> steps = node_steps(load("paper-1ms").profile, model="paper")
-    >>> steps.max_axes(1000.0), steps.limited_by
-    (16, 'hops')
+    >>> steps.max_axes(1000.0)
+    16
     """
     most, limit = largest_nodes(override(profile, {"cycle.period_us": MAX_TIME_US}), model=model)
     ratio = profile.cycle.slice_ratio

@@ -184,8 +184,8 @@ def difference(
     --------
     >>> from busplan.profile.shipped import load
     >>> found = difference(load("paper-1ms").profile, load("paper-optimal-gap").profile, timing_models=["standard"])
-    >>> [one.key for one in found.keys if one.key.startswith("bus.")]
-    ['bus.gap_count', 'bus.timing_model']
+    >>> "bus.timing_model" in [one.key for one in found.keys]
+    True
     >>> found.judged("worse")
     []
     """

@@ -67,10 +67,10 @@ def written(operand: Operand, *, in_numbers: bool) -> str:
 
     Examples
     --------
-    >>> hops = Traced(2, given=Input("H", "bus.nodes", 2, "hops", "given", "profile", "cable hops"))
-    >>> delay = 0.25 * (hops + 1)
+    >>> nodes = Traced(2, given=Input("N", "bus.nodes", 2, "", "given", "profile", "nodes"))
+    >>> delay = 0.25 * (nodes + 1)
     >>> written(delay, in_numbers=False), written(delay, in_numbers=True), delay.value
-    ('0.25 (H + 1)', '0.25 * (2 + 1)', 0.75)
+    ('0.25 (N + 1)', '0.25 * (2 + 1)', 0.75)
     """
     operand = _unwrapped(operand)
     if isinstance(operand, Traced) and not operand.operation:

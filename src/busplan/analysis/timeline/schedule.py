@@ -117,8 +117,8 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     --------
     >>> from busplan.profile.shipped import load
     >>> plan = schedule(load("paper-two-node").profile)
-    >>> [event.kind for event in plan.events][:4]
-    ['sync', 'arbitration', 'request_data', 'acknowledge']
+    >>> [event.kind for event in plan.events][2:5]
+    ['request_data', 'acknowledge', 'execution']
     >>> abs(plan.used_us - plan.figures.required_us) < 1e-9
     True
     """
