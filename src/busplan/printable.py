@@ -4,7 +4,6 @@ A file may be called anything. An escape sequence, a DEL, a C1 control or a mark
 would be obeyed by the terminal, the log or the editor that shows the name.
 """
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -73,5 +72,7 @@ def json_text(value: Any, *, indent: int | None = None) -> str:
     >>> print(json_text("\x9b \u202e \u00e4"))
     "\u009b \u202e ä"
     """
+    import json  # most runs write none
+
     # Inside a text JSON escapes line ends itself: those that are left are the layout's.
     return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=json_escape)
