@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import strategies as st
 
+from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.sections.profile import Profile
 
 # By hand from the standard's gap-count table, 1 to 23 hops.
@@ -66,7 +67,7 @@ def make_profile(**changes: Any) -> Profile:
         for name in tables:
             table = table[name]
         table[last] = value
-    return Profile.model_validate(data)
+    return Ieee1394Profile.model_validate(data)
 
 
 @st.composite

@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 
 from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.network import network_of
 from busplan.analysis.planning.cures import MAX_ADVISED_RATIO, Change, change_for_more, change_to_fit
 from busplan.buses.ieee1394.constants import safe_gap_count
+from busplan.buses.ieee1394.cycle import gap_count_of, hops_of
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
@@ -20,8 +22,8 @@ BOTH: tuple[TimingModelName, ...] = tuple(TIMING_MODELS)
 
 
 def is_safe(profile: Profile, change: Change) -> bool:
-    bus = override(profile, dict(change.changes)).bus
-    return bus.gap_count_for(change.nodes) >= safe_gap_count(bus.hops(change.nodes))
+    network = network_of(override(profile, dict(change.changes))).with_nodes(change.nodes)
+    return bool(gap_count_of(network) >= safe_gap_count(hops_of(network)))
 
 
 @settings(max_examples=300, deadline=None)

@@ -10,8 +10,11 @@ from hypothesis import strategies as st
 from scipy.stats import theilslopes
 
 from busplan.analysis.calibration.calibrate import Calibration, calibrate
-from busplan.analysis.latency import phases
-from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TimingModelName
+from busplan.analysis.latency import with_payload
+from busplan.analysis.network import network_of
+from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, Phases, TimingModelName, TransactionKind
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement, parse_measurements
 from busplan.profile.shipped import load, locate_measurements
@@ -20,6 +23,13 @@ from busplan.sections.profile import Profile
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")
+
+
+def phases(profile: Profile, kind: TransactionKind, *, model: TimingModelName, payload_bytes: int) -> Phases:
+    """Phases of one transaction of the farthest node."""
+    cycle = Ieee1394Cycle(network_of(with_payload(profile, payload_bytes)), model)
+    (found,) = (one.phases for one in cycle.exchanges if one.kind == kind)
+    return found
 
 
 def table_1() -> tuple[Measurement, ...]:
@@ -75,7 +85,8 @@ def test_latencies_of_a_profile_give_its_own_execution_time(
 ) -> None:
     profile = data.draw(any_profile)
     model = data.draw(st.sampled_from(MODELS))
-    sizes = data.draw(st.lists(st.integers(1, profile.bus.max_payload_bytes), min_size=2, max_size=8, unique=True))
+    most = int(MAX_PAYLOAD_BYTES[profile.bus.speed])
+    sizes = data.draw(st.lists(st.integers(1, most), min_size=2, max_size=8, unique=True))
     measurements = [
         Measurement(line, kind, size, phases(profile, kind, model=model, payload_bytes=size).latency_us, None)
         for line, (size, kind) in enumerate(((size, kind) for size in sizes for kind in TRANSACTION_KINDS), start=2)

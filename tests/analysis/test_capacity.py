@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity.cycle import cycle, fits_in
+from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures
 from busplan.analysis.capacity.node_limit import largest_nodes
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
@@ -50,7 +50,7 @@ def test_a_cycle_that_fits_exactly_fits(
     data: st.DataObject, model: TimingModelName, nodes: int, any_profile: st.SearchStrategy[Profile]
 ) -> None:
     drawn = data.draw(any_profile)
-    required_us = cycle(drawn, model=model, nodes=nodes).required_us
+    required_us = cycle_of(drawn, model=model, nodes=nodes).required_us
     exact_fit = drawn.model_copy(
         update={"cycle": drawn.cycle.model_copy(update={"period_us": required_us / drawn.cycle.slice_ratio})}
     )

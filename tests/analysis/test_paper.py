@@ -3,7 +3,8 @@
 import pytest
 
 from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, Comparison, paper_sections, published
+from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections, published
+from busplan.buses.published import Comparison
 from busplan.profile.shipped import load
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.

@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from busplan.analysis.capacity.cycle import broken_limits
 from busplan.analysis.capacity.figures import figures
+from busplan.analysis.network import network_of
 from busplan.analysis.planning.cures import MAX_ADVISED_RATIO
 from busplan.analysis.planning.options import plan
+from busplan.buses.ieee1394.cycle import gap_count_of, hops_of
 from busplan.buses.ieee1394.timing import TIMING_MODELS
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load, shipped_names
@@ -28,17 +30,17 @@ KEYS = {"gap": "bus.gap_count", "ratio": "cycle.slice_ratio", "period": "cycle.p
 
 def working_kinds(profile: Profile, exact: Exact) -> Iterator[tuple[str, ...]]:
     """Kinds of change of which some value works, by trying them all in exact arithmetic."""
-    bus, cycle = profile.bus, profile.cycle
-    hops = bus.hops(bus.nodes)
+    bus, cycle, network = profile.bus, profile.cycle, network_of(profile)
+    hops, own_gap_count = hops_of(network), gap_count_of(network)
     rounding = 1 + Fraction(1, 10**12)
     required = {
         gap_count: max(
             exact(override(profile, {"bus.gap_count": gap_count}), model, bus.nodes) for model in TIMING_MODELS
         )
-        for gap_count in (bus.gap_count_for(bus.nodes), *range(SAFE[hops - 1], 64))
+        for gap_count in (own_gap_count, *range(SAFE[hops - 1], 64))
     }
     for kind in KINDS:
-        gap_counts = range(64) if "gap" in kind else [bus.gap_count_for(bus.nodes)]
+        gap_counts = range(64) if "gap" in kind else [own_gap_count]
         ratios: Sequence[Fraction] = (
             [Fraction(n, 100) for n in range(1, 91)] if "ratio" in kind else [Fraction(cycle.slice_ratio)]
         )

@@ -11,9 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.latency import BOTH_MODELS, phases
+from busplan.analysis.network import network_of
 from busplan.analysis.timeline.schedule import MOST_NODES, schedule, totals, zoom
-from busplan.buses.ieee1394.timing import TRANSACTION_KINDS
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.timing import TIMING_MODELS
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load, shipped_names
 from busplan.sections.profile import Profile
@@ -30,7 +31,7 @@ def test_the_last_event_ends_at_the_closed_forms_required_time(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile], exact: Exact
 ) -> None:
     profile = data.draw(any_profile)
-    for model in BOTH_MODELS:
+    for model in TIMING_MODELS:
         plan = schedule(profile, model=model)
         assert plan.figures == figures(profile, model=model)
         assert plan.figures.required_us < MOST_REQUIRED_US
@@ -59,7 +60,7 @@ def test_events_touch_and_cover_the_slice_or_overrun_it(
         assert idle[0].duration_us == pytest.approx(plan.figures.margin_us, abs=1e-9)
 
 
-@pytest.mark.parametrize("model", BOTH_MODELS)
+@pytest.mark.parametrize("model", TIMING_MODELS)
 @pytest.mark.parametrize("name", shipped_names())
 def test_every_phase_of_a_shipped_profile_stands_in_the_order_of_the_protocol(name: str, model: Any) -> None:
     profile = load(name).profile
@@ -82,7 +83,7 @@ def test_every_phase_of_a_shipped_profile_stands_in_the_order_of_the_protocol(na
         wanted.append(("nonperiodic", None, None, None))
     wanted.append(("idle", None, None, None))
     assert [one[:4] for one in plan.events] == wanted
-    read = phases(profile, "read", model=model, payload_bytes=profile.payload.read_bytes)
+    read, _ = (one.phases for one in Ieee1394Cycle(network_of(profile), model).exchanges)
     first = plan.events[1:10]
     assert sum(one.duration_us for one in first[:7]) == pytest.approx(read.latency_us)
     assert sum(one.duration_us for one in first[7:]) == pytest.approx(read.gaps_us)
@@ -105,9 +106,8 @@ def test_figure_4_of_the_paper_by_hand(make: Maker) -> None:
 @pytest.mark.parametrize("nodes", [62, MOST_NODES])
 def test_no_rounding_builds_up_over_many_events(make: Maker, nodes: int) -> None:
     profile = make(bus__nodes=nodes, bus__max_hops=7, cycle__period_us=1e6)
-    lengths = [profile.cycle.sync.sync_us(nodes)]
-    for kind in TRANSACTION_KINDS:
-        one = phases(profile, kind, model="paper", payload_bytes=12)
+    lengths = [0.3 + 0.1 * (nodes - 1)]
+    for one in (each.phases for each in Ieee1394Cycle(network_of(profile), "paper").exchanges):
         both = (one.arbitration_us, one.acknowledge_us) * 2
         single = (one.request_data_us, one.execution_us, one.response_data_us)
         lengths += nodes * [*both, *single, one.subaction_gap_us, one.arbitration_reset_gap_us]

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity.cycle import cycle
-from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.sweep.blocks import sweep
+from busplan.analysis.capacity.cycle import cycle_of
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.sweep.blocks import figure_names, sweep
 from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
@@ -55,11 +55,11 @@ def assert_rows_are_those_of_capacity(profile: Profile, grid: Grid, *, chunk_poi
             variant = override(profile, block.chunk.point(index))
             for number, model in enumerate(BOTH):
                 expected = figures(variant, model=model)
-                row = block.row(len(BOTH) * index + number, CapacityFigures._fields)
+                row = block.row(len(BOTH) * index + number, figure_names(profile))
                 # Bit for bit: they are the same operations in the same order. As text, so that 4 is not 4.0.
                 assert {name: repr(found) for name, found in row.items()} == {
                     name: repr(list(wanted) if name == "exceeded" else wanted)
-                    for name, wanted in expected._asdict().items()
+                    for name, wanted in expected.by_key().items()
                 }
     assert points == grid.points
 
@@ -88,7 +88,7 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
 ) -> None:
     profile = data.draw(any_profile)
     ratio = profile.cycle.slice_ratio
-    exact_us = cycle(profile, model=model, nodes=nodes).required_us / ratio
+    exact_us = cycle_of(profile, model=model, nodes=nodes).required_us / ratio
     around = (
         exact_us,
         exact_us * (1 + 1e-12),

@@ -9,7 +9,7 @@ from busplan.errors import BusplanError
 
 
 def test_a_float_that_is_whole_may_stand_for_a_count() -> None:
-    found = listed([1.0, 2.5, 3, 2.0**60, "optimal"], name="nodes").values
+    found = listed([1.0, 2.5, 3, 2.0**60, "optimal"], name="nodes", words=("optimal",)).values
     assert found == (1, 2.5, 3, 2.0**60, "optimal")
     assert [type(one) for one in found] == [int, float, int, float, str]
 
@@ -22,6 +22,7 @@ def test_a_float_that_is_whole_may_stand_for_a_count() -> None:
         ([float("nan")], "nodes: nan is no finite number"),
         ([float("inf")], "nodes: inf is no finite number"),
         (["best"], "nodes: 'best' is no finite number"),
+        (["optimal"], "nodes: 'optimal' is no finite number"),
         ([None], "nodes: None is no finite number"),
         ([[1]], "nodes: [1] is no finite number"),
         ([1, 2, 1.0], "nodes: 1.0 is there twice"),
