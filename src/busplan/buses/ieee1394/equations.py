@@ -534,4 +534,4 @@ def published_request_and_acknowledge_us(payload_bytes: float) -> float:
     >>> round(published_request_and_acknowledge_us(1024), 2)
     23.94
     """
-    return EQ15_CONSTANT_US + BITS_PER_BYTE * payload_bytes / DATA_RATE_MBIT_S["S400"]
+    return EQ15_CONSTANT_US + BITS_PER_BYTE * payload_bytes / float(DATA_RATE_MBIT_S["S400"])
