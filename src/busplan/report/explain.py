@@ -41,7 +41,7 @@ def equation_rows() -> list[Row]:
             "function": name,
             "source": one.source,
         }
-        for name, one in EQUATIONS.items()
+        for name, one in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
     ]
 
 

@@ -10,7 +10,7 @@ from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
 from busplan.buses.bus import BusCycle, Term
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, larger
+from busplan.elementwise import Number, choose
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -172,7 +172,7 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "required_time_slice_us": required_time_slice_us(required_us, nodes=nodes),
         "utilisation": required_us / given_us,
         # What fits by rounding alone has no margin, and no negative one either.
-        "margin_us": choose(fits_in(required_us, available_us=given_us), larger(spare_us, 0.0), spare_us),
+        "margin_us": choose(spare_us < 0, choose(fits_in(required_us, available_us=given_us), 0.0, spare_us), spare_us),
         "min_period_us": required_us / ratio,
         "min_slice_ratio": required_us / period_us,
     }
