@@ -12,7 +12,9 @@ from busplan.errors import BusplanError
 _PROFILE: Final = ".toml"
 
 
-def require_apart(outputs: Mapping[str, Path | None], *, inputs: Iterable[Path] = ()) -> None:
+def require_apart(
+    outputs: Mapping[str, Path | None], *, inputs: Iterable[Path] = (), of_profiles: bool = False
+) -> None:
     """Refuse to destroy a file: to be called before any work.
 
     Parameters
@@ -21,11 +23,13 @@ def require_apart(outputs: Mapping[str, Path | None], *, inputs: Iterable[Path] 
         Files to write, by the options that name them.
     inputs
         Files that are read; "-" is standard input.
+    of_profiles
+        Whether profiles are what is written; nothing else may have a profile's name.
 
     Raises
     ------
     BusplanError
-        An output that is an input or another output, by whatever name or link; or a profile's file.
+        An output that is an input or another output, by whatever name or link; or a profile's name for what is none.
     """
     asked = {option: path for option, path in outputs.items() if path is not None}
     if not asked:
@@ -40,7 +44,7 @@ def require_apart(outputs: Mapping[str, Path | None], *, inputs: Iterable[Path] 
             raise BusplanError(f"{option} {path}: would overwrite {read[place]}, which is read; give another name")
         if place in written:
             raise BusplanError(f"{written[place]} and {option} {path}: the same file; give two names")
-        if any(name.lower().endswith(_PROFILE) for name in (path.name, _real(path).name)):
+        if not of_profiles and any(name.lower().endswith(_PROFILE) for name in (path.name, _real(path).name)):
             raise BusplanError(f"{option} {path}: {_PROFILE} is a profile's name, and no profile is written there")
         written[place] = f"{option} {path}"
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.apply import apply_changes, require_own_file
+from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     BUS_OPTIONS,
     STANDARD_OUTPUT,
@@ -120,6 +121,7 @@ def plan_command(
     loaded = load(profile)
     wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
     piped = output == STANDARD_OUTPUT
+    require_apart({"--output": None if piped else output}, inputs=profile_files(profile), of_profiles=True)
     with_circle = circle and loaded.profile.asks_for_circle
     with ExitStack() as files:
         # Opened before the search: a path that cannot be written is said at once.
