@@ -72,7 +72,7 @@ def json_text(value: Any, *, indent: int | None = None) -> str:
     >>> print(json_text("\x9b \u202e \u00e4"))
     "\u009b \u202e ä"
     """
-    import json  # most runs write none
+    import json  # noqa: PLC0415 - most runs write none
 
     # Inside a text JSON escapes line ends itself: those that are left are the layout's.
     return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=json_escape)

@@ -14,7 +14,8 @@ from busplan.analysis.latency import with_payload
 from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, Phases, TimingModelName, TransactionKind
+from busplan.buses.ieee1394.timing import Phases, TimingModelName
+from busplan.buses.network import TRANSACTION_KINDS, TransactionKind
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement, parse_measurements
 from busplan.profile.shipped import load, locate_measurements

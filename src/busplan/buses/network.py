@@ -1,8 +1,11 @@
 """What a cycle is computed from: groups of nodes, the period, and the kind's own keys."""
 
-from typing import Any, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.elementwise import Number, total
+
+TransactionKind = Literal["read", "write"]
+TRANSACTION_KINDS: Final[tuple[TransactionKind, ...]] = ("read", "write")
 
 
 class Group(NamedTuple):

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from typing import Final, NamedTuple
 
-from busplan.buses.ieee1394.timing import TRANSACTION_KINDS, TransactionKind
+from busplan.buses.network import TRANSACTION_KINDS, TransactionKind
 from busplan.errors import PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import Lines
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US

@@ -16,14 +16,12 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.timing import (
     TIMING_MODELS,
-    TRANSACTION_KINDS,
     Link,
     Phases,
     TimingModelName,
-    TransactionKind,
     transaction,
 )
-from busplan.buses.network import Group, Network
+from busplan.buses.network import TRANSACTION_KINDS, Group, Network, TransactionKind
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, SpecialNumber, alike, larger, named, total, worded
 

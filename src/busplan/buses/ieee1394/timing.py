@@ -23,11 +23,10 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
+from busplan.buses.network import TransactionKind
 from busplan.elementwise import Number, alike, choose, worded
 
 TimingModelName = Literal["paper", "standard"]
-TransactionKind = Literal["read", "write"]
-TRANSACTION_KINDS: Final[tuple[TransactionKind, ...]] = ("read", "write")
 
 
 class PacketSizes(NamedTuple):
