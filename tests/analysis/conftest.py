@@ -110,3 +110,9 @@ def exact() -> Callable[[Profile, str, int], Fraction]:
 def any_profile() -> st.SearchStrategy[Profile]:
     """Random profiles."""
     return profiles()
+
+
+@pytest.fixture(scope="session")
+def profiles_by_kind() -> dict[str, st.SearchStrategy[Profile]]:
+    """Random profiles of every kind of bus; a new kind is tried on all that holds of any by a line here."""
+    return {"ieee1394": profiles()}

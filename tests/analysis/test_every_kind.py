@@ -1,0 +1,109 @@
+"""What holds of the cycle of every kind of bus, on random profiles of each."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.capacity.cycle import cycle_of, limits_with_time
+from busplan.analysis.capacity.node_limit import most_nodes
+from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial
+from busplan.analysis.derivation.trace import Traced
+from busplan.analysis.network import bus_of, model_names, network_of
+from busplan.buses import kind_names
+from busplan.sections.profile import Profile
+
+Profiles = Mapping[str, st.SearchStrategy[Profile]]
+SOME = settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+KINDS = pytest.mark.parametrize("kind", kind_names())
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_terms_are_those_that_the_kind_declares_and_events_add_up_to_each(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    bus = bus_of(profile)
+    for model in model_names(profile):
+        cycle = cycle_of(profile, model=model)
+        assert [term.key for term in cycle.terms] == [figure.key for figure in bus.term_figures]
+        assert all(term.us >= 0 for term in cycle.terms)
+        of_events: dict[str, float] = defaultdict(float)
+        for event in cycle.events():
+            assert bus.event_kind(event.kind).key == event.kind
+            of_events[event.term] += event.us
+        for term in cycle.terms:
+            assert of_events.pop(term.key, 0.0) == pytest.approx(term.us, rel=1e-12, abs=1e-12)
+        assert not of_events
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_an_array_of_nodes_gives_what_each_number_gives(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    network, nodes = network_of(profile), np.arange(1, 70)
+    for model in model_names(profile):
+        together = bus_of(profile).cycle(network.with_nodes(nodes), model=model)
+        for term in together.terms:
+            alone = [
+                {one.key: one.us for one in cycle_of(profile, model=model, nodes=int(count)).terms}[term.key]
+                for count in nodes
+            ]
+            assert np.broadcast_to(term.us, nodes.shape).tolist() == alone
+        for limit in limits_with_time(network, model=model):
+            truths = np.broadcast_to(limit.is_broken(network.with_nodes(nodes)), nodes.shape)
+            assert truths.tolist() == [bool(limit.is_broken(network.with_nodes(int(one)))) for one in nodes]
+            # Once broken, a limit stays broken: the search by halves rests on that.
+            assert sorted(truths.tolist()) == truths.tolist()
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_the_most_nodes_are_those_that_a_count_finds(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    network = network_of(profile)
+    for model in model_names(profile):
+        limits = limits_with_time(network, model=model)
+        found = most_nodes(network, model=model)
+        count = 0
+        while not any(one.is_broken(network.with_nodes(count + 1)) for one in limits):
+            count += 1
+        assert int(found.nodes) == count
+        assert limits[int(found.limit)].is_broken(network.with_nodes(count + 1))
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_a_number_that_remembers_and_a_polynomial_have_the_same_value(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    network = network_of(profile)
+    nodes = data.draw(st.integers(1, 100))
+    for model in model_names(profile):
+        bus = bus_of(profile)
+        plain = bus.cycle(network.with_nodes(nodes), model=model).required_us
+        traced = bus.cycle(network.with_nodes(Traced(float(nodes))), model=model).required_us
+        assert traced.value == plain
+        try:
+            whole = bus.cycle(network.with_nodes(NODES), model=model).required_us
+        except NoPolynomialError:
+            continue  # then the most nodes are searched, and compared with a count above
+        assert isinstance(whole, Polynomial)
+        assert whole.at(nodes) == pytest.approx(plain, rel=1e-12)
+
+
+def test_every_kind_is_tried(profiles_by_kind: Profiles) -> None:
+    assert set(profiles_by_kind) == set(kind_names())
