@@ -23,8 +23,8 @@ def test_the_largest_within_a_bound_is_the_one_that_fits_and_its_successor_does_
     assert largest == 0 or one.at(largest) <= most
 
 
-@given(c1=st.integers(1, 50), c2=WHOLE, nodes=st.integers(1, 100_000))
-def test_a_bound_that_is_met_exactly_is_kept(c1: int, c2: int, nodes: int) -> None:
+@given(c1=st.floats(0.01, 50), c2=st.floats(0, 50), nodes=st.integers(1, 100_000))
+def test_a_bound_that_is_met_exactly_is_kept(c1: float, c2: float, nodes: int) -> None:
     one = Polynomial(0, c1, c2)
     assert one.largest_within(one.at(nodes)) == nodes
 
