@@ -84,20 +84,20 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a period without end": (lambda: busplan.capacity("paper-4ms", periods_us=[np.inf]), "period inf: must be finite"),
     "no model": (lambda: busplan.capacity("paper-4ms", timing_models=[]), "timing_models: no values"),
     "one model as a word": (
-        lambda: busplan.capacity("paper-4ms", timing_models="paper"),  # type: ignore[arg-type]
+        lambda: busplan.capacity("paper-4ms", timing_models="paper"),
         "timing_models 'paper': expected several values, as a list",
     ),
     "another model": (
-        lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, timing_models=["both"]),  # type: ignore[list-item]
-        "timing_models ['both']: expected 'paper', 'standard' or both, in a list",
+        lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, timing_models=["both"]),
+        "timing_models ['both']: expected 'paper' or 'standard', each once, in a list",
     ),
     "a model twice": (
         lambda: busplan.latency("paper-4ms", timing_models=["paper", "paper"]),
-        "timing_models ['paper', 'paper']: expected 'paper', 'standard' or both, in a list",
+        "timing_models ['paper', 'paper']: expected 'paper' or 'standard', each once, in a list",
     ),
     "another model of a timeline": (
-        lambda: busplan.timeline("paper-4ms", timing_model="both"),  # type: ignore[arg-type]
-        "timing_models ['both']: expected 'paper', 'standard' or both, in a list",
+        lambda: busplan.timeline("paper-4ms", timing_model="both"),
+        "timing_models ['both']: expected 'paper' or 'standard', each once, in a list",
     ),
     "no payload": (
         lambda: busplan.latency("paper-4ms", payloads_bytes=[0]),

@@ -5,7 +5,6 @@ from typing import Any, assert_type
 from numpy.typing import NDArray
 
 import busplan
-from busplan.analysis.capacity.cycle import Term
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.planning.options import Option
 from busplan.rules.report import Located
@@ -17,9 +16,9 @@ def test_the_types_are_seen_through_the_lazy_names() -> None:
     assert_type(busplan.capacity("paper-4ms"), busplan.CapacityAnswer)
     assert_type(busplan.capacity("paper-4ms").results, tuple[CapacityFigures, ...])
     assert_type(busplan.capacity("paper-4ms").results[0].max_axes, int)
-    assert_type(busplan.capacity("paper-4ms").results[0].binding_term, Term)
+    assert_type(busplan.capacity("paper-4ms").results[0].binding_term, str)
     assert_type(busplan.capacity("paper-4ms").to_dict(), dict[str, Any])
-    assert_type(busplan.latency("paper-4ms").transactions[0].phases.latency_us, float)
+    assert_type(busplan.latency("paper-4ms").transactions[0].phases.latency_us, Any)
     assert_type(busplan.timeline("paper-4ms").events[0].start_us, float)
     assert_type(busplan.plan("paper-4ms", with_circle=False).recommended, Option | None)
     assert_type(busplan.check("paper-4ms", with_circle=False).findings, tuple[Located, ...])
@@ -31,7 +30,7 @@ def test_other_types_are_seen_too() -> None:
     def never() -> None:
         busplan.capacity(4)  # type: ignore[arg-type]
         busplan.capacity("paper-4ms", [4000.0])  # type: ignore[call-arg]
-        busplan.capacity("paper-4ms", timing_models=["papier"])  # type: ignore[list-item]
+        busplan.capacity("paper-4ms", timing_models=[1])  # type: ignore[list-item]
         busplan.capacity("paper-4ms").profile = busplan.load_profile("paper-1ms")  # type: ignore[misc]
 
     assert callable(never)

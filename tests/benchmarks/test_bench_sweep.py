@@ -17,8 +17,8 @@ import pytest
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
 from busplan.analysis.sweep.grid import Chunk, Grid, Steps, checked_grid
+from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.profile.toml import override
-from busplan.sections.profile import Profile
 
 MODELS = ("paper", "standard")
 GRIDS = {
@@ -32,7 +32,7 @@ GRIDS = {
 }
 SCALAR_POINTS = 300
 
-PROFILE = Profile.model_validate(
+PROFILE = Ieee1394Profile.model_validate(
     {
         "schema_version": 1,
         "name": "bench",
@@ -63,12 +63,12 @@ def by_hand(chunk: Chunk, clock: float, packets: tuple[int, int, int, int]) -> d
     available = ratio * period
     required = n * (read + gaps) + n * (write + gaps) + sync
     terms = [
+        sync + 0 * n,
         n * 4 * arbitration,
         n * (read_data + write_data),
         n * 4 * acknowledge,
         n * 2 * execution,
         n * 2 * gaps + 0 * n,
-        sync + 0 * n,
         0 * n,
     ]
     best, binding = terms[0], np.uint8(0)
@@ -129,7 +129,7 @@ def scalar_loop(grid: Grid) -> None:
     for changes in points[:: max(1, len(points) // SCALAR_POINTS)][:SCALAR_POINTS]:
         variant = override(PROFILE, changes)
         for model in MODELS:
-            figures(variant, model=model)  # type: ignore[arg-type]
+            figures(variant, model=model)
 
 
 @pytest.mark.parametrize("name", GRIDS)

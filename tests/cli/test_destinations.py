@@ -13,8 +13,8 @@ VARY = ("--vary", "bus.nodes=1:3")
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A profile p.toml, one more called x.csv with a link and a hard link to it, and a link to nowhere."""
-    for name in ("p.toml", "x.csv"):
+    """A profile p.toml, more called x.csv, with a link and a hard link to it, and y.csv, and a link to nowhere."""
+    for name in ("p.toml", "x.csv", "y.csv"):
         (tmp_path / name).write_bytes(PROFILE.read_bytes())
     (tmp_path / "link.csv").symlink_to("x.csv")
     (tmp_path / "twin.csv").hardlink_to(tmp_path / "x.csv")
@@ -41,7 +41,7 @@ OVER_AN_INPUT = {
     "--output x.csv ": ("report", "paper-4ms", "x.csv", "-o", "x.csv", "--format", "html"),
     "--output x.csv  ": ("timeline", "x.csv", "-o", "x.csv"),
     "--output b.json": ("check", "p.toml", "--baseline", "b.json", "-o", "b.json"),
-    "--baseline x.csv": ("check", "x.csv", "--baseline", "x.csv", "--update-baseline"),
+    "--baseline y.csv": ("check", "y.csv", "--baseline", "y.csv", "--update-baseline"),
 }
 INTO_A_PROFILE = {
     "--output new.toml": ("check", "x.csv", "-o", "new.toml"),
@@ -69,6 +69,7 @@ TWICE = {
         *((f"{words.strip()}: would overwrite ", given) for words, given in OVER_AN_INPUT.items()),
         *((f"{words.strip()}: .toml is a profile's name", given) for words, given in INTO_A_PROFILE.items()),
         *((f"{words.replace('./', '')}: the same file; give two names", given) for words, given in TWICE.items()),
+        ("x.csv: has 2 hard links", ("check", "x.csv", "--baseline", "x.csv", "--update-baseline")),
         ("--trace -: standard output has the document", ("circle-test", "x.csv", "--trace", "-")),
     ],
 )

@@ -9,6 +9,7 @@ import pytest
 from markdown_it import MarkdownIt
 
 from busplan.analysis.derivation.explain import figure_named
+from busplan.buses import kind_named
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]
@@ -78,10 +79,11 @@ def test_keys_inside_a_figure_mean_the_figure(run: Run, tmp_path: Path) -> None:
     circle = run("circle-test", "strict.toml", "--contributions", "--format", "json", cwd=tmp_path)
     found |= keys_inside(json.loads(circle.stdout))
     frame = {"schema", "command", "profile", "results", "transactions", "verdicts"}
+    bus = kind_named("ieee1394")
     for key in found - frame:
-        figure_named(key)
-    assert figure_named("circle-test.removed_mm")[1].key == "contributions"
-    assert figure_named("changes")[1].key == "cheapest_change"
+        figure_named(key, bus=bus)
+    assert figure_named("circle-test.removed_mm", bus=bus)[1].key == "contributions"
+    assert figure_named("changes", bus=bus)[1].key == "cheapest_change"
 
 
 def test_options_multiply_as_in_the_commands(run: Run) -> None:

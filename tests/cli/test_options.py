@@ -199,9 +199,10 @@ def test_a_gap_count_that_is_no_number_goes_on_as_text(gap_count: str, value: ob
 
 
 def test_both_models_are_paper_first() -> None:
-    assert timing_models("both") == ("paper", "standard")
-    assert timing_models("paper") == ("paper",)
-    assert timing_models("standard") == ("standard",)
+    profile = load("paper-4ms").profile
+    assert timing_models("both", profile) == ("paper", "standard")
+    assert timing_models("paper", profile) == ("paper",)
+    assert timing_models("standard", profile) == ("standard",)
 
 
 def test_completion_offers_the_shipped_names_that_begin_so() -> None:

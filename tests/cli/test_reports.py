@@ -166,7 +166,7 @@ def test_latency_as_a_table_names_the_equation_of_every_row(run: Run) -> None:
 def test_a_payload_over_the_speeds_limit_is_warned_of_and_computed(run: Run) -> None:
     done = run("latency", "paper-dma", "--payload", "4,3000")
     assert done.returncode == 0
-    assert done.stdout.splitlines()[-1] == "Warning: over the 2048 bytes of S400: 3000."
+    assert done.stdout.splitlines()[-1] == "Warning: a payload of 3000 bytes is over the 2048 bytes of S400."
 
 
 # --- capacity ---------------------------------------------------------------------------------------------
@@ -323,7 +323,7 @@ def test_every_command_has_its_own_help_with_an_example(run: Run, command: str) 
         (("capacity",), "Missing argument"),
         (("capacity", "paper-4ms", "paper-1ms"), "unexpected extra argument"),
         (("capacity", "paper-4ms", "--nodes", "two"), "Invalid value for '--nodes'"),
-        (("capacity", "paper-4ms", "--timing", "neither"), "Invalid value for '--timing'"),
+        (("capacity", "paper-4ms", "--timing", "neither"), "--timing neither: no timing model of bus.kind ieee1394"),
         (("latency", "paper-4ms", "--format", "xml"), "Invalid value for '--format'"),
         (("latency", "paper-4ms", "--period", "4ms"), "No such option"),
     ],

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from fcntl import LOCK_EX, flock
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
 
@@ -25,51 +25,58 @@ TABLE = str(SHIPPED / "table-1.csv")
 CHANGES = {
     "plan": ("plan", "p.toml", "--nodes", "4", "--no-circle", "--apply"),
     "calibrate": ("calibrate", "p.toml", TABLE, "--apply"),
-    "baseline": ("check", "other.toml", "--no-circle", "--baseline", "p.toml", "--update-baseline"),
+    "baseline": ("check", "other.toml", "--no-circle", "--baseline", "b.json", "--update-baseline"),
 }
-"""Each changes p.toml, which is a baseline in the last."""
+"""Each changes p.toml, but for the last, which changes b.json."""
+
+
+class Change(NamedTuple):
+    """A command, and the file that it changes."""
+
+    command: tuple[str, ...]
+    path: Path
 
 
 @pytest.fixture(params=CHANGES)
-def changed(request: pytest.FixtureRequest, tmp_path: Path, run: Run) -> tuple[str, ...]:
+def change(request: pytest.FixtureRequest, tmp_path: Path, run: Run) -> Change:
     """A command, beside the file that it changes."""
     text = (SHIPPED / "paper-1ms.toml").read_text(encoding="utf-8")
-    (tmp_path / "p.toml").write_text(text, encoding="utf-8")
     (tmp_path / "other.toml").write_text(text, encoding="utf-8")
     if request.param == "baseline":
-        (tmp_path / "p.toml").unlink()
-        run("check", "paper-4ms", "--no-circle", "--baseline", "p.toml", "--update-baseline", cwd=tmp_path)
-    return CHANGES[request.param]
+        run("check", "paper-4ms", "--no-circle", "--baseline", "b.json", "--update-baseline", cwd=tmp_path)
+        return Change(CHANGES[request.param], tmp_path / "b.json")
+    (tmp_path / "p.toml").write_text(text, encoding="utf-8")
+    return Change(CHANGES[request.param], tmp_path / "p.toml")
 
 
-def test_mode_and_links_stay(changed: tuple[str, ...], tmp_path: Path, run: Run) -> None:
+def test_mode_and_links_stay(change: Change, tmp_path: Path, run: Run) -> None:
     (tmp_path / "far").mkdir()
-    real = (tmp_path / "p.toml").rename(tmp_path / "far" / "real.toml")
-    (tmp_path / "p.toml").symlink_to("far/real.toml")
+    real = change.path.rename(tmp_path / "far" / f"real{change.path.suffix}")
+    change.path.symlink_to(f"far/{real.name}")
     real.chmod(0o640)
     before = real.read_bytes()
-    done = run(*changed, cwd=tmp_path)
+    done = run(*change.command, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert real.read_bytes() != before
     assert stat.S_IMODE(real.stat().st_mode) == 0o640
-    assert (tmp_path / "p.toml").is_symlink()
-    assert [path.name for path in real.parent.iterdir()] == ["real.toml"]
+    assert change.path.is_symlink()
+    assert list(real.parent.iterdir()) == [real]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files to others")
-def test_the_owner_stays(changed: tuple[str, ...], tmp_path: Path, run: Run) -> None:
-    path = tmp_path / "p.toml"
+def test_the_owner_stays(change: Change, tmp_path: Path, run: Run) -> None:
+    path = change.path
     os.chown(path, 1234, 5678)
     before = path.read_bytes()
-    assert run(*changed, cwd=tmp_path).returncode == 0
+    assert run(*change.command, cwd=tmp_path).returncode == 0
     assert path.read_bytes() != before
     assert (path.stat().st_uid, path.stat().st_gid) == (1234, 5678)
 
 
 def test_a_file_whose_owner_cannot_be_kept_is_left(
-    changed: tuple[str, ...], tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
+    change: Change, tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "p.toml"
+    path = change.path
     before = path.read_bytes()
     status = list(path.stat())
     status[stat.ST_UID] += 1
@@ -79,29 +86,29 @@ def test_a_file_whose_owner_cannot_be_kept_is_left(
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "fchown", forbidden)
-    said = refused(*changed, cwd=tmp_path)
-    assert f"p.toml: belongs to user {status[stat.ST_UID]} and group" in said
+    said = refused(*change.command, cwd=tmp_path)
+    assert f"{path.name}: belongs to user {status[stat.ST_UID]} and group" in said
     assert path.read_bytes() == before
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["other.toml", "p.toml"]
+    assert sorted(one.name for one in tmp_path.iterdir()) == sorted(["other.toml", path.name])
 
 
 @pytest.mark.parametrize("what", ["hard link", "read-only", "no file"])
 def test_what_would_be_another_file_is_refused_by_name(
-    changed: tuple[str, ...], what: str, tmp_path: Path, refused: Refused
+    change: Change, what: str, tmp_path: Path, refused: Refused
 ) -> None:
-    path = tmp_path / "p.toml"
+    path = change.path
     before = path.read_bytes()
     if what == "hard link":
         (tmp_path / "q.toml").hardlink_to(path)
-        words = "p.toml: has 2 hard links, which a new file would part; make a copy of it, and change that"
+        words = f"{path.name}: has 2 hard links, which a new file would part; make a copy of it, and change that"
     elif what == "read-only":
         path.chmod(0o444)
-        words = "p.toml: is read-only (mode 0444) and stays as it is; make it writable first"
+        words = f"{path.name}: is read-only (mode 0444) and stays as it is; make it writable first"
     else:
         path.unlink()
         os.mkfifo(path)
-        words = "p.toml: is no regular file, so it cannot be changed"
-    assert refused(*changed, cwd=tmp_path) == words
+        words = f"{path.name}: is no regular file, so it cannot be changed"
+    assert refused(*change.command, cwd=tmp_path) == words
     assert path.is_fifo() or path.read_bytes() == before
 
 
@@ -147,22 +154,25 @@ def test_what_another_run_writes_into_a_profile_is_not_lost(command: str, tmp_pa
 
 
 def test_a_run_that_never_ends_is_not_waited_for_forever(
-    changed: tuple[str, ...], tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
+    change: Change, tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(rewrite, "PATIENCE_S", 0.1)
-    before = (tmp_path / "p.toml").read_bytes()
+    before = change.path.read_bytes()
     Locked(tmp_path, lambda: None)
-    assert "another run has been changing a file of this folder for 0.1 s" in refused(*changed, cwd=tmp_path)
-    assert (tmp_path / "p.toml").read_bytes() == before
+    assert "another run has been changing a file of this folder for 0.1 s" in refused(*change.command, cwd=tmp_path)
+    assert change.path.read_bytes() == before
 
 
 def test_a_file_system_without_locks_is_said(
-    changed: tuple[str, ...], tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+    change: Change, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_locks(*_: object) -> None:
         raise OSError(9, "Bad file descriptor")
 
     monkeypatch.setattr("fcntl.flock", no_locks)
-    done = run(*changed, cwd=tmp_path)
+    done = run(*change.command, cwd=tmp_path)
     assert done.returncode == 0
-    assert "p.toml: its folder cannot be locked (Bad file descriptor); let no other run write it" in done.stderr
+    assert (
+        f"{change.path.name}: its folder cannot be locked (Bad file descriptor); let no other run write it"
+        in done.stderr
+    )

@@ -10,7 +10,7 @@ from busplan.errors import BusplanError
 
 
 def values(spec: str) -> list[object]:
-    (axis,) = parse_axes([f"key={spec}"]).values()
+    (axis,) = parse_axes([f"bus.gap_count={spec}"], kind="ieee1394").values()
     return list(axis.values) if isinstance(axis, Listed) else axis.part(0, axis.size).tolist()
 
 
@@ -53,6 +53,8 @@ def test_values(spec: str, expected: list[object]) -> None:
         (["k="], "expected KEY=VALUES"),
         (["k=1", "k=2"], "k is varied already"),
         (["k=x"], "'x' is no number"),
+        (["bus.gap_count=63,best"], "'best' is no number"),
+        (["bus.nodes=optimal"], "'optimal' is no number"),
         (["k=nan"], "'nan' is no number"),
         (["k=inf"], "'inf' is no number"),
         (["k=1e999"], "'1e999' is no number"),
@@ -74,4 +76,4 @@ def test_values(spec: str, expected: list[object]) -> None:
 )
 def test_nonsense_is_refused(texts: list[str], message: str) -> None:
     with pytest.raises(BusplanError, match=re.escape(message)):
-        parse_axes(texts)
+        parse_axes(texts, kind="ieee1394")

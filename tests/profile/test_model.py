@@ -9,6 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
+from busplan.analysis.network import network_of
+from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle, gap_count_of, hops_of, link_of
 from busplan.buses.ieee1394.section import (
     Ieee1394Bus,
     Ieee1394CycleSection,
@@ -18,7 +21,6 @@ from busplan.buses.ieee1394.section import (
 )
 from busplan.sections.cycle import NodeSection
 from busplan.sections.execution import LinearExecution, TableExecution
-from busplan.sections.profile import Profile
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
@@ -46,8 +48,8 @@ def data(**changes: object) -> dict[str, Any]:
     return made
 
 
-def profile(**changes: object) -> Profile:
-    return Profile.model_validate(data(**changes))
+def profile(**changes: object) -> Ieee1394Profile:
+    return Ieee1394Profile.model_validate(data(**changes))
 
 
 def value_of(model: BaseModel, key: str) -> object:
@@ -190,7 +192,7 @@ def test_a_profile_is_frozen(key: str) -> None:
 
 def test_a_profile_keeps_nothing_of_the_data_it_was_made_of() -> None:
     source = data(node__execution=TABLE)
-    loaded = Profile.model_validate(source)
+    loaded = Ieee1394Profile.model_validate(source)
     source["node"]["execution"]["time_us"][0] = 0.0
     assert isinstance(loaded.node.execution, TableExecution)
     assert loaded.node.execution.time_us == (40.0, 34.0, 58.0)
@@ -274,7 +276,7 @@ def test_both_forms_of_execution_may_have_a_grade(execution: dict[str, object], 
 
 def test_every_default_is_a_value_that_the_schema_takes() -> None:
     # Pydantic does not check defaults: a wrong one would load.
-    assert Profile.model_validate(profile().model_dump()) == profile()
+    assert Ieee1394Profile.model_validate(profile().model_dump()) == profile()
 
 
 SECTIONS = (
@@ -335,10 +337,10 @@ def test_what_is_no_speed_at_all_is_refused_without_that_reason(speed: str) -> N
 
 
 def test_a_chain_has_as_many_hops_as_nodes_and_a_tree_as_many_as_it_says() -> None:
-    chain = profile(bus__nodes=5).bus
-    assert [chain.hops(nodes) for nodes in (1, 5, 62)] == [1, 5, 62]
-    tree = profile(bus__nodes=5, bus__max_hops=3).bus
-    assert [tree.hops(nodes) for nodes in (1, 5, 62)] == [3, 3, 3]
+    chain = network_of(profile(bus__nodes=5))
+    assert [hops_of(chain.with_nodes(nodes)) for nodes in (1, 5, 62)] == [1, 5, 62]
+    tree = network_of(profile(bus__nodes=5, bus__max_hops=3))
+    assert [hops_of(tree.with_nodes(nodes)) for nodes in (1, 5, 62)] == [3, 3, 3]
 
 
 # From the gap-count table of IEEE 1394a for cables of 4.5 m, by hand.
@@ -346,12 +348,14 @@ def test_a_chain_has_as_many_hops_as_nodes_and_a_tree_as_many_as_it_says() -> No
     ("hops", "gap_count"), [(1, 5), (2, 7), (3, 8), (16, 43), (22, 59), (23, 62), (24, 63), (500, 63)]
 )
 def test_the_optimal_gap_count_follows_the_hops(hops: int, gap_count: int) -> None:
-    assert profile(bus__gap_count="optimal").bus.gap_count_for(hops) == gap_count
-    assert profile(bus__gap_count="optimal", bus__max_hops=hops).bus.gap_count_for(1) == gap_count
+    chain = network_of(profile(bus__gap_count="optimal"))
+    assert gap_count_of(chain.with_nodes(hops)) == gap_count
+    tree = network_of(profile(bus__gap_count="optimal", bus__max_hops=hops))
+    assert gap_count_of(tree.with_nodes(1)) == gap_count
 
 
 def test_a_gap_count_that_is_given_does_not_follow_the_hops() -> None:
-    assert profile(bus__gap_count=7).bus.gap_count_for(16) == 7
+    assert gap_count_of(network_of(profile(bus__gap_count=7)).with_nodes(16)) == 7
 
 
 def test_the_optimal_gap_count_is_refused_for_cables_the_table_does_not_know() -> None:
@@ -367,9 +371,10 @@ def test_the_optimal_gap_count_is_refused_for_cables_the_table_does_not_know() -
     ("speed", "rate_mbit_s", "limit"), [("S100", 98.304, 512), ("S200", 196.608, 1024), ("S400", 393.216, 2048)]
 )
 def test_a_link_has_the_rate_and_the_limits_of_its_speed(speed: str, rate_mbit_s: float, limit: int) -> None:
-    bus = profile(bus__speed=speed, bus__gap_count=9, bus__cable_length_m=2).bus
-    assert tuple(bus.link(3)) == pytest.approx((rate_mbit_s, 9, 3, 2.0), rel=1e-15)
-    assert bus.max_payload_bytes == limit
+    loaded = profile(bus__speed=speed, bus__gap_count=9, bus__cable_length_m=2)
+    link = link_of(network_of(loaded).with_nodes(3))
+    assert tuple(link) == pytest.approx((rate_mbit_s, 9, 3, 2.0), rel=1e-15)
+    assert float(MAX_PAYLOAD_BYTES[loaded.bus.speed]) == limit
 
 
 @pytest.mark.parametrize(
@@ -393,8 +398,9 @@ def test_what_breaks_the_standards_limits_loads(changes: dict[str, object]) -> N
 
 
 def test_the_synchronous_packet_grows_with_each_further_node() -> None:
-    sync = Sync(ping_us=0.3, ping_per_node_us=0.1)
-    assert [sync.sync_us(nodes) for nodes in (1, 2, 11)] == pytest.approx([0.3, 0.4, 1.3])
+    network = network_of(profile(cycle__sync={"ping_us": 0.3, "ping_per_node_us": 0.1}))
+    cycles = [Ieee1394Cycle(network.with_nodes(nodes), "standard") for nodes in (1, 2, 11)]
+    assert [cycle.sync_us for cycle in cycles] == pytest.approx([0.3, 0.4, 1.3])
 
 
 # --- execution times --------------------------------------------------------------------------------------
@@ -511,7 +517,7 @@ def test_the_kind_of_bus_is_the_unions_tag() -> None:
 
 
 def test_what_a_profile_does_not_say_is_what_the_servo_core_assumes() -> None:
-    profile = Profile.model_validate(data())
+    profile = Ieee1394Profile.model_validate(data())
     assert Axis(**profile.servo.axis_keys("x")) == Axis()
     assert Delivery(**profile.delivery.model_dump()) == Delivery()
     assert Mechanics(**profile.mechanics.model_dump()) == Mechanics()

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from busplan.analysis.network import network_of
+from busplan.buses.ieee1394.cycle import gap_count_of
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load, locate, locate_measurements, shipped_folder, shipped_names
 from busplan.profile.starter import starter_text
@@ -99,7 +101,7 @@ def test_execution_times_are_table_1_row_by_row(name: str) -> None:
 def test_the_optimal_gap_profile_leaves_the_gap_count_to_the_table() -> None:
     plan = load("paper-optimal-gap").profile
     assert plan.bus.gap_count == "optimal"
-    assert plan.bus.gap_count_for(plan.bus.nodes) == 7
+    assert gap_count_of(network_of(plan)) == 7
 
 
 def test_the_what_if_states_its_assumption() -> None:

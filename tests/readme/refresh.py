@@ -47,7 +47,7 @@ def refreshed(readme: str) -> str:
         return "```console\n" + "".join(f"$ {command}\n{output_of(command)}" for command in commands) + "```"
 
     readme = re.sub(r"^```console\n(.*?)^```$", block, readme, flags=re.MULTILINE | re.DOTALL)
-    rows = "\n".join(dict.fromkeys(tests.reference(tests.Profile)))
+    rows = "\n".join(dict.fromkeys(tests.reference(tests.Ieee1394Profile)))
     head = "| key | values | default | meaning |\n|---|---|---|---|\n"
     readme = re.sub(re.escape(head) + r"(?:\|.*\n)*", lambda _: f"{head}{rows}\n", readme)
     for lines in tests.registry_tables():

@@ -19,22 +19,27 @@ from markdown_it import MarkdownIt
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.analysis.overview import Overview, overview
+from busplan.buses import kind_named
+from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.page.chapters import ReportedProfile, page
 from busplan.report.page.charts.axes import axes_chart, drawn_range
 from busplan.report.page.charts.bars import signed_bar
 from busplan.report.page.charts.circle import circle_chart, magnified
-from busplan.report.page.charts.terms import TERMS, terms_chart
+from busplan.report.page.charts.terms import LEFT, terms_chart
 from busplan.report.page.commands import shell_word
 from busplan.report.page.content import Page, ShownFigure
 from busplan.report.page.html import page_html
 from busplan.report.page.markdown import page_markdown
-from busplan.report.timeline.kinds import KINDS
+from busplan.report.timeline.kinds import INKS
 from busplan.sections.profile import Profile
 
+PLACES = {"paper": "first", "standard": "second"}
+"""Where each timing model stands, which its colour goes by."""
 SVG = "{http://www.w3.org/2000/svg}"
 BASE = load("paper-4ms").profile
+TERMS = kind_named("ieee1394").term_figures
 NAMES = (
     "</title><script>alert(1)</script>",
     '"><img src=x onerror=alert(1)>',
@@ -207,8 +212,8 @@ def test_markdown_says_the_same_as_html() -> None:
         (changed(circle__feed_mm_per_min=60000.0), "The circle test cannot be run: "),
         (changed(bus__nodes=5000), "Not drawn: bus.nodes = 5000: a timeline shows up to 1000 nodes"),
         (
-            Profile.model_validate(BASE.model_dump(exclude_unset=True, include=Profile.model_fields.keys()
-                                   - {"servo", "circle", "tolerance", "delivery", "mechanics"})),
+            Ieee1394Profile.model_validate(BASE.model_dump(exclude_unset=True, include=Profile.model_fields.keys()
+                                           - {"servo", "circle", "tolerance", "delivery", "mechanics"})),
             "The profile has no section for a circle test, so none was run.",
         ),
     ],
@@ -257,7 +262,9 @@ def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) ->
     root = ET.fromstring(axes_chart(profile, steps))
     from_us, to_us = drawn_range(profile, steps)
     for one in steps:
-        (path,) = (found for found in root.iter(f"{SVG}path") if found.get("class") == f"curve {one.timing_model}")
+        (path,) = (
+            found for found in root.iter(f"{SVG}path") if found.get("class") == f"curve {PLACES[one.timing_model]}"
+        )
         corners = list(stairs(path.get("d", "")))
         wanted = [
             1000 * math.log(at / from_us) / math.log(to_us / from_us) for at in one.from_us if from_us < at <= to_us
@@ -272,7 +279,7 @@ def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) ->
         )
     marks = [(svg.get("x"), rect.get("class")) for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")]
     own = f"{100 * math.log(profile.cycle.period_us / from_us) / math.log(to_us / from_us):.5g}%"
-    assert {(own, "mark paper"), (own, "mark standard")} <= set(marks)
+    assert {(own, "mark first"), (own, "mark second")} <= set(marks)
 
 
 def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
@@ -295,7 +302,7 @@ def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
              if (svg.get("x") or "").endswith("%")}  # fmt: skip
     for one in steps:
         wanted = heights[0] - one.max_axes(BASE.cycle.period_us) * per_axis
-        assert float(marks[f"mark {one.timing_model}"].get("y") or "") == pytest.approx(wanted, abs=1)
+        assert float(marks[f"mark {PLACES[one.timing_model]}"].get("y") or "") == pytest.approx(wanted, abs=1)
 
 
 def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page() -> None:
@@ -401,14 +408,14 @@ def contrast(one: str, other: str) -> float:
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=["light", "dark"])
 def test_words_and_curves_can_be_read_in_both_schemes(scheme: dict[str, str]) -> None:
-    for name in ("ink", "muted", "link", "good", "bad", "plain", "model-paper", "model-standard"):
+    for name in ("ink", "muted", "link", "good", "bad", "plain", "model-first", "model-second"):
         assert contrast(scheme[name], scheme["paper"]) >= 4.5, name
 
 
 def test_letters_can_be_read_on_their_bars() -> None:
-    inks = dict.fromkeys(KINDS, ("#10151c", "#10151c"))
-    inks |= dict.fromkeys(("sync", "request_data", "acknowledge", "nonperiodic"), ("#ffffff", "#10151c"))
-    inks |= {"idle": (SCHEMES[0]["ink"], SCHEMES[1]["ink"]), "arbitration_reset_gap": ("#10151c", SCHEMES[1]["ink"])}
-    for term in TERMS:
-        for ink, colour in zip(inks[term.kind], KINDS[term.kind][3:], strict=True):
-            assert contrast(ink, colour) >= 4.5, term
+    letters = dict.fromkeys(INKS, ("#10151c", "#10151c"))
+    letters |= dict.fromkeys(("sync", "request", "acknowledge", "reserve"), ("#ffffff", "#10151c"))
+    letters |= {"idle": (SCHEMES[0]["ink"], SCHEMES[1]["ink"]), "long-gap": ("#10151c", SCHEMES[1]["ink"])}
+    for term in (*TERMS, LEFT):
+        for letter, colour in zip(letters[term.ink], INKS[term.ink], strict=True):
+            assert contrast(letter, colour) >= 4.5, term

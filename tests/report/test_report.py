@@ -42,7 +42,7 @@ def test_documents_hold_the_results_own_numbers(name: str) -> None:
     result = capacity(profile)
     document = json.loads(to_json(capacity_document(result, verdicts(result))))
     assert document["results"] == [
-        json.loads(json.dumps({**one._asdict(), "exceeded": list(one.exceeded)})) for one in result.results
+        json.loads(json.dumps({**one.by_key(), "exceeded": list(one.exceeded)})) for one in result.results
     ]
     single = latency(profile)
     transactions = json.loads(to_json(latency_document(single)))["transactions"]
@@ -115,7 +115,7 @@ def test_the_verdict_says_which_limit_is_broken(profile: Profile, changes: dict[
 def test_latency_warns_of_payloads_over_the_limit(profile: Profile) -> None:
     slow = override(profile, {"bus.speed": "S100"})
     lines = latency_lines(latency(slow, payloads_bytes=[4, 1024]), slow)
-    assert lines[-1].text == "Warning: over the 512 bytes of S100: 1024."
+    assert lines[-1].text == "Warning: a payload of 1024 bytes is over the 512 bytes of S100."
 
 
 def test_latency_warns_of_hops_and_gap_count(profile: Profile) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from busplan.analysis.capacity.figures import capacity
-from busplan.analysis.sweep.blocks import FIGURES, Block, Column, sweep
+from busplan.analysis.sweep.blocks import Block, Column, figure_names, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
+from busplan.buses import kind_named
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
@@ -19,6 +20,7 @@ from busplan.report.sweep.top import Tally, TopRows
 from busplan.sections.profile import Profile
 
 BOTH: tuple[TimingModelName, ...] = ("paper", "standard")
+FIGURES = figure_names(load("paper-4ms").profile)
 AXES: dict[str, Values] = {
     "bus.nodes": Steps(1, 16, 1, 3),
     "bus.gap_count": Listed((63, "optimal")),
@@ -125,7 +127,7 @@ def test_without_a_sort_the_top_rows_are_the_first() -> None:
 
 
 def test_the_summary_counts_points_under_each_model() -> None:
-    tally = Tally(BOTH)
+    tally = Tally(kind_named("ieee1394"), BOTH)
     for block in blocks(4):
         tally.add(block)
     fits = [[figures.fits for figures in capacity(profile, timing_models=BOTH).results] for _, profile in points()]
@@ -140,8 +142,8 @@ def test_the_summary_counts_points_under_each_model() -> None:
 def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, {"bus.gap_count": Steps(0, 1, 1, 64)}, with_circle=False)
-    tally = Tally(BOTH)
+    tally = Tally(kind_named("ieee1394"), BOTH)
     for block in sweep(profile, grid, timing_models=BOTH):
         tally.add(block)
     # Two hops need 7: 0 to 6 are unsafe.
-    assert tally.lines("p", expected=64)[1].text.startswith("At 7 points the gap count is unsafe")
+    assert tally.lines("p", expected=64)[1].text.startswith("At 7 points the gap count is unsafe (gap_count_safe).")

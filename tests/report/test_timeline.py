@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
+from busplan.buses import kind_named
+from busplan.buses.bus import IDLE
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.scale import ticks
 from busplan.report.timeline.documents import timeline_document, timeline_rows
-from busplan.report.timeline.kinds import KINDS, STRIP, event_label
 from busplan.report.timeline.lanes import node_lanes, stretches
 from busplan.report.timeline.mermaid import timeline_mermaid
 from busplan.report.timeline.png import timeline_png
@@ -36,13 +37,17 @@ def row(lines: list[str], label: str) -> str:
 
 
 def test_every_kind_has_its_own_mark() -> None:
-    assert len({style.mark for style in KINDS.values()}) == len(KINDS)
-    assert len({style.mark for style in STRIP.values()}) == len(STRIP)
-    assert all(style.mark.isascii() for style in KINDS.values())
+    bus = kind_named("ieee1394")
+    kinds = (*bus.event_kinds, IDLE)
+    assert len({kind.mark for kind in kinds}) == len(kinds) == 10
+    # The strip of the whole slice has whole transactions, and what belongs to no node.
+    strip = (bus.event_kind("sync"), *bus.stretch_kinds, bus.event_kind("nonperiodic"), IDLE)
+    assert len({kind.mark for kind in strip}) == len(strip) == 5
+    assert all(kind.mark.isascii() for kind in (*kinds, *strip))
 
 
 def test_the_request_is_the_hosts_and_its_acknowledge_the_nodes() -> None:
-    assert [event_label(one) for one in plan().events[1:10]] == [
+    assert [one.label for one in plan().events[1:10]] == [
         "host arbitration",
         "host data",
         "node acknowledge",
