@@ -57,6 +57,18 @@ def test_records_are_frozen() -> None:
         found.profile.bus.nodes = 99  # type: ignore[misc]
 
 
+def test_figures_of_one_kind_of_bus_are_frozen_plain_and_hashable() -> None:
+    phases = busplan.latency("paper-4ms").transactions[-1].phases
+    before = dict(phases)
+    with pytest.raises(AttributeError, match="does not change"):
+        phases.latency_us = 0
+    with pytest.raises(TypeError):
+        phases["latency_us"] = 0  # type: ignore[index]
+    assert dict(phases) == before
+    assert {type(value) for value in phases.values()} <= {int, float}
+    assert len({busplan.capacity("paper-4ms").results[0], busplan.capacity("paper-4ms").results[0]}) == 1
+
+
 def test_the_same_question_has_the_same_answer() -> None:
     assert busplan.capacity("paper-4ms") == busplan.capacity("paper-4ms")
     assert busplan.capacity("paper-4ms") != busplan.capacity("paper-1ms")

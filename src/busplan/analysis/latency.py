@@ -1,9 +1,9 @@
 """Latency on the bus: a profile in, every part of what takes time under each timing model out."""
 
-from collections.abc import Mapping, Sequence
-from types import SimpleNamespace
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses.bus import BusLatency
 from busplan.errors import BusplanError
@@ -19,19 +19,14 @@ class Transaction(NamedTuple):
     transaction: str
     payload_bytes: int | None
     nodes: int
-    figures: Mapping[str, Any]
-    """Its figures by key, as the register of the bus has them."""
+    phases: FigureValues
+    """Its figures, as the register of the bus has them."""
 
     def __getattr__(self, key: str) -> Any:
         # Only what is no field comes here.
-        if key in self.figures:
-            return self.figures[key]
+        if not key.startswith("_") and key in self.phases:
+            return self.phases[key]
         raise AttributeError(f"{self.transaction} has no figure {key!r}")
-
-    @property
-    def phases(self) -> SimpleNamespace:
-        """Its figures as attributes."""
-        return SimpleNamespace(**self.figures)
 
 
 class LatencyResult(NamedTuple):
@@ -78,7 +73,7 @@ def latency(
     return LatencyResult(
         profile.name,
         tuple(
-            Transaction(model, one.name, one.payload_bytes, profile.bus.nodes, one.phases)
+            Transaction(model, one.name, one.payload_bytes, profile.bus.nodes, FigureValues(one.phases))
             for variant in variants
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
             for model, one in zip(models, alike, strict=True)

@@ -48,8 +48,8 @@ def latency_rows(result: LatencyResult) -> list[Row]:
 
 def _transaction_row(transaction: Transaction) -> Row:
     row = transaction._asdict()
-    figures = row.pop("figures")
-    return {**row, **{key: int(value) if key.endswith("_bytes") else value for key, value in figures.items()}}
+    phases = row.pop("phases")
+    return {**row, **{key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}}
 
 
 def latency_document(result: LatencyResult) -> Document:

@@ -1,11 +1,12 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from typing import Any, NamedTuple
 
 from busplan.analysis.capacity.cycle import TIME, available_us, broken_limits, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
 from busplan.buses.bus import BusCycle, Term
@@ -48,7 +49,7 @@ class CapacityFigures(NamedTuple):
     fits: bool
     safe: bool
     """Whether the bus is set so that it works reliably, beside fitting."""
-    own: Mapping[str, Any]
+    own: FigureValues
     """Figures that only this kind of bus has."""
 
     def __getattr__(self, key: str) -> Any:
@@ -125,7 +126,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
-    numbers, own = numeric_figures(cycle), dict(cycle.figures())
+    numbers, own = numeric_figures(cycle), FigureValues(cycle.figures())
     max_nodes, limited_by = largest_nodes(profile, model=model)
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     exceeded = (*broken_limits(profile), *((TIME,) if late else ()))

@@ -1,0 +1,57 @@
+"""Figures that only some kinds of bus have, as an answer holds them."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Never
+
+from busplan.sourced import Sourced
+
+
+class FigureValues(Mapping[str, Any]):
+    """Figures by key, and as attributes; like all of an answer they do not change, and travel between processes.
+
+    Parameters
+    ----------
+    values
+        Each is plain: what a constant brings along stays behind.
+
+    Examples
+    --------
+    >>> found = FigureValues({"hops": 2})
+    >>> found.hops, found["hops"], dict(found)
+    (2, 2, {'hops': 2})
+    """
+
+    __slots__ = ("_values",)
+
+    _values: Mapping[str, Any]
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        plain = {key: float(value) if isinstance(value, Sourced) else value for key, value in values.items()}
+        object.__setattr__(self, "_values", plain)
+
+    def __getitem__(self, key: str) -> Any:
+        return self._values[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getattr__(self, key: str) -> Any:
+        # Only what is no attribute comes here, and what is asked for before there are values.
+        if key.startswith("_") or key not in self._values:
+            raise AttributeError(f"there is no figure {key!r}")
+        return self._values[key]
+
+    def __setattr__(self, key: str, value: object) -> Never:
+        raise AttributeError(f"an answer does not change: {key}")
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._values.items()))
+
+    def __reduce__(self) -> tuple[type["FigureValues"], tuple[dict[str, Any]]]:
+        return FigureValues, (dict(self._values),)
+
+    def __repr__(self) -> str:
+        return f"FigureValues({self._values!r})"
