@@ -63,7 +63,7 @@ def test_figures_of_one_kind_of_bus_are_frozen_plain_and_hashable() -> None:
     with pytest.raises(AttributeError, match="does not change"):
         phases.latency_us = 0
     with pytest.raises(TypeError):
-        phases["latency_us"] = 0  # type: ignore[index]
+        phases["latency_us"] = 0
     assert dict(phases) == before
     assert {type(value) for value in phases.values()} <= {int, float}
     assert len({busplan.capacity("paper-4ms").results[0], busplan.capacity("paper-4ms").results[0]}) == 1
