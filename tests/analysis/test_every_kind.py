@@ -14,6 +14,7 @@ from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polyn
 from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_names
+from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
@@ -103,6 +104,18 @@ def test_a_number_that_remembers_and_a_polynomial_have_the_same_value(
             continue  # then the most nodes are searched, and compared with a count above
         assert isinstance(whole, Polynomial)
         assert whole.at(nodes) == pytest.approx(plain, rel=1e-12)
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_what_a_cycle_needs_rests_on_neither_the_period_nor_the_slice_ratio(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    other = override(profile, {"cycle.period_us": 12_345.0, "cycle.slice_ratio": 0.123})
+    for model in model_names(profile):
+        assert cycle_of(profile, model=model).terms == cycle_of(other, model=model).terms
 
 
 def test_every_kind_is_tried(profiles_by_kind: Profiles) -> None:

@@ -37,7 +37,9 @@ from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, rounded_up, total
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.sections.base import Section
 from busplan.sections.cycle import BusSection
+from busplan.sections.machine import DeliverySection
 from busplan.sections.profile import Profile
 
 Run = Callable[..., Any]
@@ -58,10 +60,24 @@ class RingSection(BusSection):
     timing_model: Literal["plain"] = Field(default="plain", description="Timing model", examples=["plain"])
 
 
+class GuardSection(Section):
+    """Section [guard], which no other kind has."""
+
+    guard_us: float = Field(default=0.0, ge=0, description="Silence before each token [us]", examples=[1])
+
+
+class RingDelivery(DeliverySection):
+    """Section [delivery], with a key that the cycle depends on."""
+
+    late_us: float = Field(default=0.0, ge=0, description="Silence after each token [us]", examples=[1])
+
+
 class RingProfile(Profile):
     """A profile of the invented kind."""
 
     bus: RingSection = Field(description="The bus")
+    delivery: RingDelivery = Field(default_factory=RingDelivery, description="How set-points arrive")
+    guard: GuardSection = Field(default_factory=GuardSection, description="Silence on the ring")
 
 
 DATA = Figure("cycle_data_us", "data", "ring", "all data of a cycle", "data", ink="request", letter="D")
@@ -79,12 +95,17 @@ class RingCycle(BusCycle):
     def rounds(self) -> Number:
         return rounded_up(self.network.nodes / SHARED)
 
+    @cached_property
+    def round_us(self) -> Number:
+        profile = self.network.profile
+        return profile.bus.token_us + profile.guard.guard_us + profile.delivery.late_us
+
     def computed_terms(self) -> tuple[Term, ...]:
         bus = self.network.profile.bus
         sizes = (group.nodes * (group.read_bytes + group.write_bytes) for group in self.network.groups)
         return (
             Term("cycle_data_us", 8 * total(sizes) / bus.rate_mbit_s),
-            Term("cycle_token_us", self.rounds * bus.token_us),
+            Term("cycle_token_us", self.rounds * self.round_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),
         )
 
@@ -92,7 +113,7 @@ class RingCycle(BusCycle):
         bus, (group,) = self.network.profile.bus, self.network.groups
         for node in range(1, group.nodes + 1):
             if node % SHARED == 1:
-                yield BusEvent("token", "cycle_token_us", bus.token_us, "token")
+                yield BusEvent("token", "cycle_token_us", self.round_us, "token")
             for kind, size in (("in", group.read_bytes), ("out", group.write_bytes)):
                 yield BusEvent(kind, "cycle_data_us", 8 * size / bus.rate_mbit_s, f"data {kind}", node, "turn")
         yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "window")
@@ -184,12 +205,18 @@ NEEDED_US = 5 * 8 * 16 + 2 * 5.0
 
 
 @pytest.fixture
-def ring(tmp_path: Path) -> Iterator[Path]:
+def ring_file(tmp_path: Path) -> Path:
     """A profile of the invented kind, in a folder of its own."""
     path = tmp_path / "ring.toml"
-    path.write_text(TEXT.replace("period_us = 1500", "period_us = 1500"), encoding="utf-8")
+    path.write_text(TEXT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def ring(ring_file: Path) -> Iterator[Path]:
+    """That profile, while the kind is registered."""
     with registered(Ring()):
-        yield path
+        yield ring_file
 
 
 FORMS = {
@@ -224,7 +251,7 @@ def test_every_figure_is_explained(run: Run, ring: Path, figure: str | None, for
     assert done.returncode == 0, done
     if figure == "required_us" and form == "text":
         assert "n_r = ceil(N / 3)" in done.stdout
-        assert "token = n_r token_us" in done.stdout
+        assert "token = n_r (token_us + guard_us + late_us)" in done.stdout
         assert "T_need = data + token + T_npd" in done.stdout
 
 
@@ -295,6 +322,81 @@ def test_the_most_stations_are_those_that_a_count_finds(ring: Path, period_us: f
     most, limit = largest_nodes(profile, model="plain")
     assert most == len(fitting)
     assert limit == ("nodes" if most == MOST_STATIONS else "time")
+
+
+def ring_with(limits: tuple[Limit, ...]) -> Bus:
+    """The invented kind with other limits."""
+    found = Ring()
+    found.limits = limits  # type: ignore[assignment,misc]
+    return found
+
+
+def limit_of(value: Callable[[Network], Number], most: Callable[[Network], Number], key: str = "own") -> Limit:
+    """A limit of any form."""
+    return Limit(key, "{value} over {most}", value, most)
+
+
+@pytest.mark.parametrize(
+    ("limit", "most"),
+    [
+        pytest.param(limit_of(lambda one: one.nodes**2, lambda _one: 170), 13, id="a square"),
+        pytest.param(limit_of(lambda one: one.nodes**3, lambda _one: 170), 5, id="a cube"),
+        pytest.param(limit_of(lambda one: rounded_up(one.nodes / 2), lambda _one: 7), 14, id="no polynomial"),
+        pytest.param(limit_of(lambda one: 10 * one.nodes, lambda one: 40 + 5 * one.nodes), 8, id="a bound that grows"),
+        pytest.param(limit_of(lambda one: one.period_us, lambda _one: 1e5), 0, id="without the stations"),
+        pytest.param(limit_of(lambda one: one.period_us, lambda _one: 1e7), 37, id="kept by any number"),
+    ],
+)
+@pytest.mark.parametrize("nodes", [1, 5, 30])
+def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
+    ring_file: Path, limit: Limit, most: int, nodes: int
+) -> None:
+    text = TEXT.replace("nodes = 5", f"nodes = {nodes}").replace("= 1500", "= 1e6")
+    text = text.replace("slice_ratio = 0.5", "slice_ratio = 0.004833")  # 4833 us: 37 stations, which need 4801 us
+    ring_file.write_text(text, encoding="utf-8")
+    with registered(ring_with((limit,))):
+        profile = busplan.load_profile(ring_file)
+        found, _ = largest_nodes(profile, model="plain")
+        assert found == min(most, 37)
+        assert busplan.plan(profile, with_circle=False) is not None
+
+
+def test_a_sweep_has_room_for_more_limits_than_bits_of_a_byte(run: Run, ring_file: Path) -> None:
+    def at_most(number: int) -> Limit:
+        return limit_of(lambda one: one.nodes, lambda _one: number, f"at most {number}")
+
+    limits = tuple(map(at_most, range(1, 12)))
+    with registered(ring_with(limits)):
+        vary = ("sweep", ring_file.name, "--vary", "bus.nodes=1,4,12", "--format", "jsonl")
+        rows = [json.loads(line) for line in run(*vary, cwd=ring_file.parent).stdout.splitlines()]
+    assert [[one for one in row["exceeded"] if one != "time"] for row in rows if "exceeded" in row] == [
+        [f"at most {n}" for n in range(1, nodes)] for nodes in (1, 4, 12)
+    ]
+
+
+def test_keys_of_a_section_of_its_own_and_of_a_shared_one_are_the_cycles(run: Run, ring: Path) -> None:
+    for key in ("guard.guard_us", "delivery.late_us"):
+        done = run("sweep", ring.name, "--vary", f"{key}=0,7", "--format", "csv", cwd=ring.parent)
+        assert (done.returncode, done.stderr[:4]) == (0, "ring")
+        rows = list(csv.DictReader(StringIO(done.stdout)))
+        assert [float(row["required_us"]) for row in rows] == [NEEDED_US, NEEDED_US + 2 * 7]
+        explained = run("explain", ring.name, "cycle_token_us", cwd=ring.parent)
+        assert key in explained.stdout
+    ring.write_text(TEXT.replace('kind = "ring"', 'kind = "rong"') + "\n[guard]\nguard_us = 1\n[gard]\n", "utf-8")
+    done = run("capacity", ring.name, cwd=ring.parent)
+    assert [line.split(": ")[1] for line in done.stderr.splitlines()] == ['bus.kind = "rong"', "gard"]
+
+
+def test_a_name_is_registered_once(ring: Path) -> None:
+    with pytest.raises(ValueError, match="called ring"), registered(Ring()):
+        pass
+    assert busplan.capacity(ring).results[0].kind == "ring"
+
+
+def test_a_timing_model_of_one_kind_alone_is_refused_between_two(run: Run, ring: Path) -> None:
+    done = run("diff", ring.name, "paper-1ms", "--timing", "plain", cwd=ring.parent)
+    assert done.returncode == 2
+    assert "have no timing model in common" in done.stderr
 
 
 def test_a_plan_turns_its_setting_and_advice_names_it(run: Run, ring: Path) -> None:

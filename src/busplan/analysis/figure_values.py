@@ -48,7 +48,7 @@ class FigureValues(Mapping[str, Any]):
         raise AttributeError(f"an answer does not change: {key}")
 
     def __hash__(self) -> int:
-        return hash(tuple(self._values.items()))
+        return hash(frozenset(self._values.items()))
 
     def __reduce__(self) -> tuple[type["FigureValues"], tuple[dict[str, Any]]]:
         return FigureValues, (dict(self._values),)

@@ -36,7 +36,15 @@ def kind_named(name: str) -> "Bus":
 
 @contextmanager
 def registered(bus: "Bus") -> Iterator[None]:
-    """Register one more kind for a while, as a test does."""
+    """Register one more kind for a while, as a test does.
+
+    Raises
+    ------
+    ValueError
+        There is a kind of that name.
+    """
+    if bus.kind in _MODULES:
+        raise ValueError(f"there is a kind of bus called {bus.kind}")
     _MODULES[bus.kind] = type(bus).__module__
     _LOADED[bus.kind] = bus
     try:

@@ -1,8 +1,9 @@
 """What a cycle is computed from: groups of nodes, the period, and the kind's own keys."""
 
+from functools import reduce
 from typing import Any, Final, Literal, NamedTuple
 
-from busplan.elementwise import Number, total
+from busplan.elementwise import Number, larger, total
 
 TransactionKind = Literal["read", "write"]
 TRANSACTION_KINDS: Final[tuple[TransactionKind, ...]] = ("read", "write")
@@ -44,6 +45,12 @@ class Network(NamedTuple):
     def axes(self) -> Number:
         """Axes of all nodes [1]."""
         return total(group.nodes * group.axes for group in self.groups)
+
+    @property
+    def largest_payload_bytes(self) -> Number:
+        """The largest payload of any transaction [bytes]."""
+        sizes = [size for group in self.groups for size in (group.read_bytes, group.write_bytes)]
+        return reduce(larger, sizes)
 
     def with_nodes(self, nodes: Number) -> "Network":
         """The same network with another number of nodes in its one group."""

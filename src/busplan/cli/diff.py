@@ -89,7 +89,14 @@ def diff_command(
 
 def _models(timing: str, one: "Profile", other: "Profile") -> "tuple[str, ...] | None":
     """Timing models that both profiles have; None for all, also where the two kinds of bus have none in common."""
-    return None if timing == ALL_MODELS or one.bus.kind != other.bus.kind else timing_models(timing, one)
+    if timing == ALL_MODELS:
+        return None
+    if one.bus.kind != other.bus.kind:
+        kinds = f"{one.bus.kind} and {other.bus.kind}"
+        raise BusplanError(
+            f"--timing {timing}: the kinds of bus, {kinds}, have no timing model in common; leave it out"
+        )
+    return timing_models(timing, one)
 
 
 def _tolerance(percent: float | None, *, wanted: bool) -> float:

@@ -7,10 +7,10 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from busplan.buses import kind_named, kind_names
-from busplan.sections.profile import Profile
+from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
-_EXTENDED: Final = ("bus", "cycle", "payload", "node")
-"""Sections that a kind of bus adds keys to."""
+_NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
+"""Sections of every profile that no cycle depends on; what a kind of bus adds to them is its cycle's."""
 
 
 def kind_of(data: Mapping[str, Any]) -> str | None:
@@ -25,9 +25,15 @@ def profile_model(kind: str | None) -> type[Profile]:
     return Profile if kind is None else kind_named(kind).profile_model()
 
 
-def may_be_of_a_kind(path: tuple[int | str, ...]) -> bool:
-    """Whether a key that no model of ours has may belong to a kind of bus: nobody can tell before the kind is known."""
-    return path[0] in _EXTENDED or len(path) == 1
+def is_of_a_kind(path: tuple[int | str, ...]) -> bool:
+    """Whether any kind of bus has a key: then it may be right, once the kind is known."""
+    return any(_has(profile_model(kind), path) for kind in kind_names())
+
+
+def _has(model: type[BaseModel], path: tuple[int | str, ...]) -> bool:
+    field = model.model_fields.get(str(path[0]))
+    inner = [] if field is None else models_of(field.annotation)
+    return field is not None and (len(path) == 1 or not inner or any(_has(one, path[1:]) for one in inner))
 
 
 def models_of(annotation: Any) -> list[type[BaseModel]]:
@@ -51,8 +57,9 @@ def number_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 def cycle_keys(kind: str) -> tuple[str, ...]:
     """Keys in numbers that the cycle of a kind of bus may depend on."""
-    keys = number_keys(profile_model(kind))
-    return tuple(key for key in dict.fromkeys(keys) if key.partition(".")[0] in _EXTENDED)
+    others = {key for key in number_keys(Profile) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
+    keys = dict.fromkeys(number_keys(profile_model(kind)))
+    return tuple(key for key in keys if "." in key and key not in others)
 
 
 def words_of(kind: str, key: str) -> tuple[str, ...]:

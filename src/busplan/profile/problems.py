@@ -11,7 +11,7 @@ from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.printable import printable
 from busplan.profile.document import Document
-from busplan.profile.kinds import kind_of, may_be_of_a_kind, models_of, profile_model
+from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_model
 from busplan.profile.positions import KeyPath, Place
 
 _TAG: Final = "kind"
@@ -90,7 +90,7 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
         elif details["type"] == "missing":
             yield KeyFinding(path, _missing(path, data), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
-            if kind_of(data) is not None or not may_be_of_a_kind(path):
+            if kind_of(data) is not None or not is_of_a_kind(path):
                 yield KeyFinding(path, _unknown(path, data), "unknown-key", shows_value=False)
         elif details["type"] == "union_tag_not_found":
             key, tags = _tags(path, data)

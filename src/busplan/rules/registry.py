@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Final
 
 from busplan.buses import kind_named, kind_names
+from busplan.buses.bus import Bus
 from busplan.buses.rule import Rule
 from busplan.rules import bus, circle
 from busplan.rules.file import BY_KIND
@@ -44,12 +45,12 @@ NEVER_SUPPRESSED: Final = frozenset(
 
 def all_rules() -> Mapping[str, Rule]:
     """Every rule by its code, those of every kind of bus among them, in the order of the codes."""
-    return _by_code(kind_names())
+    return _by_code(tuple(map(kind_named, kind_names())))
 
 
 @cache
-def _by_code(kinds: tuple[str, ...]) -> Mapping[str, Rule]:
-    own = (rule for kind in kinds for rule in kind_named(kind).rules)
+def _by_code(kinds: tuple[Bus, ...]) -> Mapping[str, Rule]:
+    own = (rule for kind in kinds for rule in kind.rules)
     others = (*BY_KIND.values(), BASELINE, SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT)
     found = (*bus.RULES, *own, *circle.RULES, *others)
     return MappingProxyType({rule.code: rule for rule in sorted(found, key=lambda rule: rule.code)})

@@ -11,7 +11,16 @@ from pydantic import Field
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Section, TimeUs
 from busplan.sections.execution import Execution
 
-SliceRatio = Annotated[float, Field(ge=1e-6, le=1, allow_inf_nan=False)]
+SliceRatio = Annotated[
+    float,
+    Field(
+        ge=1e-6,
+        le=1,
+        allow_inf_nan=False,
+        description="Share alpha of the period that is for communication, 0..1",
+        examples=[0.5],
+    ),
+]
 
 
 class BusSection(Section):
@@ -33,9 +42,7 @@ class CycleSection(Section):
     period_us: Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
         description="Communication period T_s [us]", examples=[4000]
     )
-    slice_ratio: SliceRatio = Field(
-        default=1.0, description="Share alpha of the period that is for communication, 0..1", examples=[0.5]
-    )
+    slice_ratio: SliceRatio = 1.0
     nonperiodic_us: TimeUs = Field(
         default=0.0, description="Time kept for non-periodic data in each cycle T_npd [us]", examples=[0]
     )

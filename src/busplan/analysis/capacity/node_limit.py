@@ -9,6 +9,7 @@ from busplan.analysis.network import network_of
 from busplan.buses.bus import Limit
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, larger
+from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 
@@ -58,7 +59,7 @@ def most_nodes(network: Network, *, model: str) -> MostNodes:
     """
     limits = limits_with_time(network, model=model)
     closed = [_in_closed_form(limit, network) for limit in limits]
-    ceiling = int(min(_greatest(one) for one in closed if one is not None))
+    ceiling = int(min([MAX_COUNT, *(_greatest(one) for one in closed if one is not None)]))
     nodes: Number = None
     place: Number = 0
     for index, (limit, found) in enumerate(zip(limits, closed, strict=True)):
@@ -74,10 +75,13 @@ def most_nodes(network: Network, *, model: str) -> MostNodes:
 def _in_closed_form(limit: Limit, network: Network) -> Number | None:
     """The most nodes within one limit, infinite where they play no part; None where there is no closed form."""
     try:
-        value = limit.value(network.with_nodes(NODES))
+        at = network.with_nodes(NODES)
+        value, most = limit.value(at), limit.most(at)
+        if isinstance(most, Polynomial):
+            return None
         if isinstance(value, Polynomial):
-            return value.largest_within(limit.most(network))
-        return choose(value > limit.most(network), 0.0, inf)
+            return value.largest_within(most)
+        return choose(value > most, 0.0, inf)
     except NoPolynomialError:
         return None
 

@@ -1,8 +1,12 @@
 """What a profile's circle test simulates: path, axes, timing, delivery and mechanics, from its sections."""
 
+from typing import Any
+
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
+from busplan.sections.base import Section
 from busplan.sections.profile import Profile
+from busplan.servo.checks import parameters
 from busplan.servo.circle import check_circle
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path
@@ -33,8 +37,8 @@ def setup(profile: Profile) -> Setup:
         x=Axis(**servo.axis_keys("x")),
         y=Axis(**servo.axis_keys("y")),
         timing=loop_timing(profile),
-        delivery=Delivery(**delivery.model_dump()),
-        mechanics=Mechanics(**mechanics.model_dump()),
+        delivery=Delivery(**_parameters_in(delivery, Delivery)),
+        mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
     )
     check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
     return one
@@ -57,3 +61,8 @@ def loop_timing(profile: Profile) -> LoopTiming:
         # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
         delay_us=min(bus(profile).required_us, period_us) if servo.loop == "host" else 0.0,
     )
+
+
+def _parameters_in(section: Section, of: type) -> dict[str, Any]:
+    """The parameters of the servo core in a section, to which a kind of bus may have added keys."""
+    return section.model_dump(include={one.name for one in parameters(of)})

@@ -16,6 +16,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
+from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 RATIO_STEPS: Final = 10_000
@@ -203,7 +204,7 @@ def _ceiling(profile: Profile) -> int:
         return bool(bus.broken(network.with_nodes(nodes)))
 
     most = 1
-    while not is_over(most):
+    while most < MAX_COUNT and not is_over(most):
         most *= 2
     return bisect_right(range(1, most + 1), x=False, key=is_over)
 

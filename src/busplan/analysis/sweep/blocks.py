@@ -112,7 +112,9 @@ def sweep(
 def _varied(values: Array) -> Column:
     if values.dtype != object:
         return Column(values)
-    return Column(np.arange(values.size, dtype=np.uint8).reshape(values.shape), tuple(values.ravel()))
+    return Column(
+        np.arange(values.size, dtype=np.min_scalar_type(values.size)).reshape(values.shape), tuple(values.ravel())
+    )
 
 
 def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[str, Column]:
@@ -147,7 +149,8 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     limits = limits_with_time(network, model=model)
     late = np.logical_not(fits_in(numbers["required_us"], available_us=numbers["available_us"]))
     flags = [late if limit.key == TIME else limit.is_broken(network) for limit in limits]
-    exceeded: Any = sum(flag * np.uint8(1 << bit) for bit, flag in enumerate(flags))
+    bits = np.min_scalar_type((1 << len(flags)) - 1)
+    exceeded: Any = sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags))
     most = most_nodes(network, model=model)
     numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)

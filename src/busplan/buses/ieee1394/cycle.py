@@ -23,7 +23,7 @@ from busplan.buses.ieee1394.timing import (
 )
 from busplan.buses.network import TRANSACTION_KINDS, Group, Network, TransactionKind
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, SpecialNumber, alike, larger, named, total, worded
+from busplan.elementwise import Number, SpecialNumber, alike, named, total, worded
 
 _LATENCY_SYMBOLS: Final = {figure.key: figure.symbol for figure in figures.LATENCY}
 
@@ -201,8 +201,9 @@ class Ieee1394Cycle(BusCycle):
 
 
 def _one_of_each(exchanges: tuple[Exchange, ...]) -> tuple[Phases, Phases]:
-    """Phases of a read and of a write."""
-    return exchanges[0].phases, exchanges[-1].phases
+    """Phases of the read and of the write of the one group."""
+    read, write = exchanges
+    return read.phases, write.phases
 
 
 def _parts(phases: Phases) -> Iterator[BusEvent]:
@@ -227,13 +228,6 @@ def _parts(phases: Phases) -> Iterator[BusEvent]:
     yield BusEvent("arbitration_reset_gap", gaps, phases.arbitration_reset_gap_us, "arbitration reset gap")
 
 
-def _largest_payload(network: Network) -> Number:
-    largest: Number = 0
-    for group in network.groups:
-        largest = larger(largest, larger(group.read_bytes, group.write_bytes))
-    return largest
-
-
 def _most_payload(network: Network) -> Any:
     return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
 
@@ -242,7 +236,7 @@ LIMITS: Final = (
     Limit(
         "payload",
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        _largest_payload,
+        lambda network: network.largest_payload_bytes,
         _most_payload,
         way_out="the payload fits no packet",
         failure="payload_bytes",

@@ -23,7 +23,6 @@ from busplan.buses.ieee1394.cycle import LIMITS, Ieee1394Cycle, gap_count_of, ho
 from busplan.buses.ieee1394.timing import TIMING_MODELS, transaction
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.elementwise import larger
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -175,8 +174,8 @@ class Ieee1394(Bus):
         limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
         for number in nodes:
             with_them = network.with_nodes(number)
-            hops, given = hops_of(with_them), gap_count_of(with_them)
-            if given < safe_gap_count(hops):
+            if not self.is_safe(with_them):
+                hops, given = hops_of(with_them), gap_count_of(with_them)
                 found.append(
                     f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
                     f"({number} node{'s' * (number != 1)}); the smallest safe one is {safe_gap_count(hops)}{limit}."
@@ -198,9 +197,7 @@ class Ieee1394(Bus):
 
 def _payload_repairs(network: Network) -> dict[str, Value]:
     """A faster bus that carries the payloads, or else the payloads that this one carries."""
-    largest = 0
-    for group in network.groups:
-        largest = larger(largest, larger(group.read_bytes, group.write_bytes))
+    largest = network.largest_payload_bytes
     faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if largest <= limit]
     if faster:
         return {"bus.speed": faster[0]}

@@ -102,11 +102,7 @@ class Sync(Section):
 class Ieee1394CycleSection(CycleSection):
     """Section [cycle]: the communication period and what of it is for communication."""
 
-    slice_ratio: SliceRatio = Field(
-        default=float(SLICE_RATIO),
-        description="Share alpha of the period that is for communication, 0..1",
-        examples=[0.5],
-    )
+    slice_ratio: SliceRatio = float(SLICE_RATIO)
     sync: Sync = Field(default_factory=Sync, description="The synchronous packet that opens a cycle")
 
 
