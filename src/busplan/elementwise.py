@@ -1,7 +1,7 @@
 """The few functions that are no operators, for every sort of number.
 
-What a bus computes it writes with operators and with these. Then one function serves plain numbers, arrays, numbers
-that remember how they were computed, and polynomials of the number of nodes. numpy loads only where arrays are.
+What a bus computes it writes with operators and with these. Then one function serves plain numbers, arrays,
+traced numbers, and polynomials of the number of nodes. numpy loads only where arrays are.
 """
 
 from abc import ABC, abstractmethod
@@ -46,7 +46,7 @@ class SpecialNumber(ABC):
         return self
 
     def constant(self, number: Number) -> Number:
-        """Give a constant that computes with this number as one that remembers, too."""
+        """Give a constant that computes with this number as a traced one, too."""
         return number
 
     def worded(self, _words: str) -> Number:

@@ -34,7 +34,7 @@ class Sourced(float):
 
     Examples
     --------
-    >>> delay = Sourced(14, unit="ticks", grade="published", source="eqs (4)-(6)", meaning="PHY delay a hop")
+    >>> delay = Sourced(14, unit="ticks", grade="published", source="eqs (4)-(6)", meaning="delay of a node")
     >>> delay / 7
     2.0
     >>> delay.source
@@ -137,7 +137,7 @@ def published(*numbers: int, symbol: str, section: str, part: str = "") -> Calla
 
     Examples
     --------
-    >>> equation = Equation((4, 5, 6), "hop", "III-E", "their bracket", float)
+    >>> equation = Equation((4, 5, 6), "delay", "III-E", "their bracket", float)
     >>> equation.reference, equation.source
     ('(4)-(6)', 'Paper, section III-E, equations (4)-(6); their bracket')
     """

@@ -87,7 +87,7 @@ def test_the_most_nodes_are_those_that_a_count_finds(
 @KINDS
 @SOME
 @given(data=st.data())
-def test_a_number_that_remembers_and_a_polynomial_have_the_same_value(
+def test_a_traced_number_and_a_polynomial_have_the_same_value(
     kind: str, data: st.DataObject, profiles_by_kind: Profiles
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])

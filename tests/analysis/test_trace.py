@@ -1,4 +1,4 @@
-"""Numbers that remember: what they write down is what was computed."""
+"""Traced numbers: what they write down is what was computed."""
 
 import inspect
 import math

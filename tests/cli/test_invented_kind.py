@@ -133,7 +133,7 @@ class Ring(Bus):
 
     kind = "ring"
     title = "Token ring"
-    timing_models = (TimingModel("plain", "as it is", is_conservative=True),)
+    timing_models = (TimingModel("plain", "as it is"),)
     term_figures = (DATA, TOKEN, NONPERIODIC)
     capacity_figures = capacity_figures(term_figures, own=(ROUNDS,))
     table_figures = (ROUNDS,)
@@ -293,6 +293,19 @@ def test_it_is_compared_with_its_kind_and_with_another(
         assert found["plain", "required_us"]["judgement"] == "better"
 
 
+def test_its_latency_has_no_payload_to_explain(run: Run, ring: Path) -> None:
+    assert run("explain", ring.name, "latency.transaction", cwd=ring.parent).returncode == 0
+    done = run("explain", ring.name, "latency.payload_bytes", cwd=ring.parent)
+    assert done.returncode == 2
+    assert "payload_bytes" in done.stderr
+
+
+@pytest.mark.parametrize("code", ["BP006", "BP101", "BP301"])
+def test_rules_of_any_bus_speak_of_no_other_kind(run: Run, ring: Path, code: str) -> None:
+    said = run("rule", code, cwd=ring.parent).stdout
+    assert not [word for word in ("gap", "hop", "cable", "synchronous", "both timing") if word in said]
+
+
 def test_its_figures_are_those_by_hand(ring: Path) -> None:
     (one,) = busplan.capacity(ring).results
     assert (one.required_us, one.rounds, one.cycle_token_us) == (NEEDED_US, 2, 10)
@@ -446,6 +459,8 @@ def test_one_schema_serves_all_kinds_and_names_the_key(run: Run, ring: Path) -> 
     assert not list(schema.iter_errors(ours))
     assert not list(schema.iter_errors(paper))
     wrong = {**ours, "bus": {**ours["bus"], "rate_mbit_s": -1}}
+    titles = {name: one["title"] for name, one in schema.schema["$defs"].items() if "title" in one}
+    assert (titles["RingSection"], titles["Ieee1394Bus"], titles["Ieee1394CycleSection"]) == ("Bus", "Bus", "Cycle")
     assert ["bus", "rate_mbit_s"] in [list(one.absolute_path) for one in schema.iter_errors(wrong)]
 
 

@@ -16,9 +16,9 @@ class FigureValues(Mapping[str, Any]):
 
     Examples
     --------
-    >>> found = FigureValues({"hops": 2})
-    >>> found.hops, found["hops"], dict(found)
-    (2, 2, {'hops': 2})
+    >>> found = FigureValues({"rounds": 2})
+    >>> found.rounds, found["rounds"], dict(found)
+    (2, 2, {'rounds': 2})
     """
 
     __slots__ = ("_values",)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
-from busplan.buses.figure import MARGIN, NODES, PAYLOAD_BYTES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
+from busplan.buses.figure import MARGIN, NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import Number, total
@@ -30,8 +30,6 @@ class TimingModel(NamedTuple):
 
     name: str
     meaning: str
-    is_conservative: bool
-    """Whether it counts all that the bus is known to need."""
 
 
 class Term(NamedTuple):
@@ -256,7 +254,7 @@ class Bus(ABC):
     @property
     def latency_figures(self) -> tuple[Figure, ...]:
         """Of `latency`, in the order of its document."""
-        return (TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, *self.term_figures, REQUIRED)
+        return (TIMING_MODEL, TRANSACTION, NODES, *self.term_figures, REQUIRED)
 
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""

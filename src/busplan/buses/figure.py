@@ -201,7 +201,7 @@ VERDICT_FIGURES: Final = (
 )
 """Figures of the verdict, which belong to no one timing model."""
 
-TRANSACTION: Final = Figure("transaction", "kind", "profile", "what travels, as read or write", sort="word")
+TRANSACTION: Final = Figure("transaction", "kind", "profile", "what is timed", sort="word")
 PAYLOAD_BYTES: Final = Figure("payload_bytes", "P", "profile", "payload of the transaction", sort="count")
 
 

@@ -16,7 +16,7 @@ BAR: Final = r"\|"
 
 
 def escaped(text: str) -> str:
-    r"""Write words so that none of them is markup.
+    r"""Escape Markdown.
 
     Examples
     --------

@@ -47,13 +47,10 @@ def goal_words(profile: Profile) -> str:
     return f"{profile.name} with {plural(nodes, 'node')} ({plural(nodes * profile.node.axes, 'axis')})"
 
 
-_MODELS: Final = {1: "", 2: " both timing models"}
-
-
 def _headline(plan: Plan, *, with_circle: bool) -> Line:
     option, circle = plan.recommended, " and passes the circle" if with_circle else ""
     subject = f"{goal_words(plan.goal)} at {period(plan.goal.cycle.period_us)}"
-    models = _MODELS.get(len(bus_of(plan.goal).timing_models), " all timing models")
+    models = " every timing model" if len(bus_of(plan.goal).timing_models) > 1 else ""
     if option is None:
         why = _why_none(plan)
         bus = bus_of(plan.goal)
@@ -64,7 +61,7 @@ def _headline(plan: Plan, *, with_circle: bool) -> Line:
             "bad",
         )
     spare = min(one.margin_us for one in (option.deciding, *option.others))
-    tighter = " in the tighter one" if option.others else ""
+    tighter = " in the tightest" if option.others else ""
     result = f"fits{models} with {us(spare)} us to spare{tighter}{circle}"
     if not option.changes:
         return Line(f"{subject}: nothing to change; it {result}.", "good")

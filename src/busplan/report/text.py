@@ -59,8 +59,8 @@ def csv_cell(value: object) -> object:
 
     Examples
     --------
-    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "gap count"]), csv_cell(True)
-    ("'=1+1", -1.5, 'time gap count', 'true')
+    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "nodes"]), csv_cell(True)
+    ("'=1+1", -1.5, 'time nodes', 'true')
     """
     cell = spelled(value)
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell

@@ -72,10 +72,9 @@ RULES: Final = (
         "slice-overrun",
         "error",
         "the cycle does not fit its time slice",
-        "Under the timing model that decides (bus.timing_model), the reads, writes, gaps, the synchronous packet "
-        "and the non-periodic time of one cycle (equation 2) take longer than slice_ratio * period_us (equation "
-        "1). The message names the cheapest cure: the gap count is one register in each node, the slice ratio is "
-        "computing time of the host, the period is what the machine is for.",
+        "Under the timing model that decides (bus.timing_model), all terms of one cycle together (equation 2) take "
+        "longer than slice_ratio * period_us (equation 1). The message names the cheapest cure: a setting of the "
+        "bus needs no new parts, the slice ratio is computing time of the host, the period is what the machine is for.",
         slice_overrun,
     ),
     Rule(

@@ -53,8 +53,8 @@ BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
         "inconsistent",
         "error",
         "two values do not go together",
-        "The lists of an execution table must be of one length and its payloads must ascend; an optimal gap count "
-        "needs cables that its table holds for.",
+        "The lists of an execution table must be of one length and its payloads must ascend; a value "
+        "that busplan finds for you needs a bus that it can be found for.",
     ),
     "execution-unknown": Rule(
         "BP007",

@@ -16,8 +16,8 @@ BASELINE: Final = Rule(
     "baseline-regression",
     "error",
     "the profile lost axes or margin against the baseline",
-    "`--baseline FILE` holds what each profile could carry when it was recorded: axes and margin under both "
-    "timing models. A change that costs some of it must be meant: record it with `--update-baseline`, so that the "
+    "`--baseline FILE` holds what each profile could carry when it was recorded: axes and margin under every "
+    "timing model. A change that costs some of it must be meant: record it with `--update-baseline`, so that the "
     "review sees it.",
 )
 SUPPRESSION_WITHOUT_REASON: Final = Rule(

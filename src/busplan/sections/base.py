@@ -32,6 +32,13 @@ def refused(*problems: Problem) -> PydanticCustomError:
     return PydanticCustomError("busplan", "{text}", {"text": problems[0].message, "problems": problems})
 
 
+def _title(section: type) -> str:
+    """Title a section as its class; one of a kind of bus as the section that it extends."""
+    titles = (base.__name__.removesuffix("Section") for base in section.__mro__ if base.__name__.endswith("Section"))
+    *_, title = (section.__name__, *filter(None, titles))
+    return title
+
+
 class Section(BaseModel):
     """What all sections of a profile share."""
 
@@ -40,8 +47,8 @@ class Section(BaseModel):
         frozen=True,
         extra="forbid",
         defer_build=True,
-        # In the schema, and so in editors, a section is called by its key.
-        model_title_generator=lambda section: section.__name__.removesuffix("Section"),
+        # Editors show it.
+        model_title_generator=_title,
     )
 
 
@@ -49,7 +56,7 @@ _Section = TypeVar("_Section", bound=Section)
 
 
 def with_unchecked(section: _Section, key: str, value: Any) -> _Section:
-    """Put anything in the place of a key: an array, or a number that remembers. Nothing is checked.
+    """Return a copy with one key replaced, unvalidated.
 
     Parameters
     ----------
@@ -58,7 +65,7 @@ def with_unchecked(section: _Section, key: str, value: Any) -> _Section:
     key
         Dotted key below it.
     value
-        What functions of operators only can compute with.
+        Anything that computes like a number: an array, or a traced number.
     """
     name, _, rest = key.partition(".")
     new = with_unchecked(getattr(section, name), rest, value) if rest else value

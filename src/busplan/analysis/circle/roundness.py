@@ -133,7 +133,7 @@ def circle_test(
     with_contributions
         Run again without each error source in turn; a contour tolerance that fails asks for it by itself.
     explain
-        Whether it does; a search for what passes has no use for reasons.
+        If False, error sources are not ranked.
     progress
         Called now and then with the steps simulated so far and those known to be needed.
 

@@ -1,4 +1,4 @@
-"""How the figures of `capacity` are computed: the functions of the analysis itself, given numbers that remember.
+"""How the figures of `capacity` are computed: the functions of the analysis itself, given traced numbers.
 
 Only what is no operator is put into words here: words, truths, and a search's answer.
 """

@@ -121,7 +121,7 @@ def _path(one: _Test, found: Figures) -> Figures:
     ).named("setpoints", "n")
     return {
         "setpoints": setpoints,
-        # The result's own expression, given numbers that remember.
+        # The result's own expression, given traced numbers.
         "duration_s": setpoints * period / 1e6,
         "steps": Traced(
             result.steps,

@@ -1,7 +1,7 @@
 """Where a figure comes from: every step to it, in symbols and in numbers, and everything it starts from.
 
-Nothing is computed a second time by other means: the functions that give the figure are given numbers that remember
-what was done with them (`busplan.analysis.derivation.trace`).
+Nothing is computed a second time by other means: the functions that give the figure are given traced numbers
+(`busplan.analysis.derivation.trace`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -188,7 +188,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
     Returns
     -------
     tuple
-        Inputs of the cycle under both timing models, and of the circle; without those that are the planner's to choose.
+        Inputs of the cycle under every timing model, and of the circle; without those that are the planner's to choose.
         An execution time that nobody has graded is first.
     """
     found: dict[str, Input] = {}

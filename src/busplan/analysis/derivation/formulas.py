@@ -133,7 +133,7 @@ def _atom(text: str) -> tuple[str, int]:
 
 
 def formula_of(equation: Equation) -> str:
-    """Write an equation in symbols, by computing it with numbers that remember.
+    """Write an equation in symbols, by computing it with traced numbers.
 
     Examples
     --------

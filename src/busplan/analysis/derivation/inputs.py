@@ -74,13 +74,13 @@ def given(profile: Profile, key: str) -> Input:
 
 
 def traced(profile: Profile, key: str) -> Traced:
-    """Give a key of a profile as a number that remembers where it comes from."""
+    """Give a key of a profile as a traced number."""
     one = given(profile, key)
     return Traced(one.value, given=one)
 
 
 def traced_profile(profile: Profile) -> Profile:
-    """The profile with numbers that remember in the place of all that its cycle may depend on; nothing is checked."""
+    """The profile with traced numbers in the place of all that its cycle may depend on; nothing is checked."""
     found = profile
     for key in cycle_keys(profile.bus.kind):
         value: Any = profile

@@ -1,4 +1,4 @@
-"""How the figures of `latency` are computed: the functions of the bus itself, given numbers that remember."""
+"""How the figures of `latency` are computed: the functions of the bus itself, given traced numbers."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Numbers that remember how they were computed, so that a figure can show its own derivation.
+"""Traced numbers hold how they were computed, so that a figure can show its own derivation.
 
 The equations are operators only: given `Traced` numbers they compute what they always compute, and leave an expression
 behind. What a line of a derivation shows is therefore what was executed, and not a second writing of it.
@@ -153,7 +153,7 @@ class Traced(SpecialNumber):
     def __pow__(self, other: Operand) -> Any:
         return _computed("pow", self, other)
 
-    # Compared with anything it gives a truth that remembers; found again by what it is, not by what it equals.
+    # Compared with anything it gives a traced truth; found again by what it is, not by what it equals.
     __hash__ = object.__hash__
 
     def __eq__(self, other: object) -> Any:

@@ -47,8 +47,8 @@ def listed(words: Sequence[str], last: str) -> str:
 
     Examples
     --------
-    >>> listed(("gap count", "slice ratio", "period"), "or")
-    'gap count, slice ratio or period'
+    >>> listed(("speed", "slice ratio", "period"), "or")
+    'speed, slice ratio or period'
     """
     *before, end = words
     return f"{', '.join(before)} {last} {end}" if before else end

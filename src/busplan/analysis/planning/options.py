@@ -21,6 +21,7 @@ from busplan.analysis.planning.best_values import (
 from busplan.analysis.planning.cures import changes_to_fit
 from busplan.buses.bus import Setting, Value
 from busplan.profile.toml import override
+from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
 
 Changes = dict[str, Value]
@@ -162,7 +163,7 @@ def _differing(profile: Profile, changes: Changes) -> Changes:
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
 
 
-_CHEAPEST: Final = ("cheapest that fits", "cheapest that meets both models")
+_CHEAPEST: Final = ("cheapest that fits", "cheapest that meets every model")
 """Title of the recommendation where it is none of the other options, for one timing model and for several."""
 
 
@@ -250,7 +251,7 @@ class _Planner:
         """An option, unless it still does not fit."""
         broken = broken_limits(override(self.goal, dict(changes)))
         if broken:
-            return Impossible(title, f"the standard's limit of {' and '.join(broken)} is broken")
+            return Impossible(title, f"the bus's limit of {' and '.join(broken)} is broken")
         return self.option(title, changes, bounded_by=bounded_by, proven=proven)
 
     def period(self, title: str, changes: Changes) -> Option | Impossible:
@@ -259,7 +260,8 @@ class _Planner:
             return self.fitting(title, changes, bounded_by="time")
         found = smallest_period(changed, models=[self.model], circle=self.circle, max_circles=self.max_circles)
         if found.period_us is None:
-            reason = "no period passes the circle" if found.bounded_by == "circle" else "it would be over 1000 s"
+            too_long = f"it would be over {MAX_TIME_US / 1e6:g} s"
+            reason = "no period passes the circle" if found.bounded_by == "circle" else too_long
             return Impossible(title, reason, found.proven)
         changes = {**changes, "cycle.period_us": found.period_us}
         return self.fitting(title, changes, bounded_by=found.bounded_by, proven=found.proven)

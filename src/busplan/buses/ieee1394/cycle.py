@@ -100,7 +100,7 @@ def exchange(
 
 
 def _with_names(phases: Phases, suffix: str) -> Phases:
-    """The same phases, each with its symbol where numbers remember."""
+    """The same phases, each with its symbol if they are traced numbers."""
     if not isinstance(phases.latency_us, SpecialNumber):
         return phases
     return Phases(

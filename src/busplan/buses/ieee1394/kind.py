@@ -42,8 +42,8 @@ class Ieee1394(Bus):
     kind = "ieee1394"
     title = "IEEE 1394"
     timing_models = (
-        TimingModel("paper", "the paper's equations as published", is_conservative=False),
-        TimingModel("standard", "the standard's clock and packets", is_conservative=True),
+        TimingModel("paper", "the paper's equations as published"),
+        TimingModel("standard", "the standard's clock and packets"),
     )
     term_figures = figures.TERMS
     capacity_figures = figures.CAPACITY

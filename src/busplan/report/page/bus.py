@@ -65,7 +65,7 @@ def bus_verdict(answer: Overview, sources: Sources) -> ShownVerdict:
 
 
 def models_part(answer: Overview, sources: Sources) -> Part:
-    """Both timing models side by side: the whole cycle, and one read and one write."""
+    """The timing models side by side: the whole cycle, and the latencies."""
     results, transactions = answer.capacity.results, answer.latency.transactions
     decides, bus = answer.profile.bus.timing_model, bus_of(answer.profile)
     cycle = _grid(

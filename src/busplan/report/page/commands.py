@@ -69,7 +69,7 @@ def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool)
     bus, periods = answer.capacity, answer.periods
     found = [
         source("capacity", "verdict, timing models, terms", documents.capacity_document(bus, (answer.verdict,)), *own),
-        source("latency", "one read and one write", documents.latency_document(answer.latency)),
+        source("latency", "latencies, part by part", documents.latency_document(answer.latency)),
     ]
     if answer.schedule is not None:
         found.append(source("timeline", "the cycle event by event", timeline_document(answer.schedule), *own))
