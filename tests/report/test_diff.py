@@ -17,8 +17,8 @@ from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.report.changes import shown_value
 from busplan.report.diff import diff_document, diff_lines, diff_markdown, regression_words
+from busplan.report.json_and_csv import to_json
 from busplan.report.lines import plain_text
-from busplan.report.text import to_json
 from busplan.sections.profile import Profile
 
 AB = ("a.toml", "b.toml")

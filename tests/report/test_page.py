@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
+from busplan.analysis.all_answers import AllAnswers, all_answers
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.circle.contour_profile import ContourProfile
-from busplan.analysis.overview import Overview, overview
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.profile.shipped import load
@@ -57,14 +57,14 @@ def changed(**changes: object) -> Profile:
 
 
 def made(*profiles: Profile, title: str | None = None) -> Page:
-    subjects = [ReportedProfile(f"{number}.toml", overview(one, with_circle=False), other_period=False)
+    subjects = [ReportedProfile(f"{number}.toml", all_answers(one, with_circle=False), other_period=False)
                 for number, one in enumerate(profiles)]  # fmt: skip
     return page(subjects, title=title)
 
 
 @cache
-def simulated() -> Overview:
-    return overview(changed(circle__radius_mm=25.0, circle__ramp_periods=20))
+def simulated() -> AllAnswers:
+    return all_answers(changed(circle__radius_mm=25.0, circle__ramp_periods=20))
 
 
 class Tags(HTMLParser):
@@ -219,7 +219,7 @@ def test_markdown_says_the_same_as_html() -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
-    content = page([ReportedProfile("x", overview(profile), other_period=False)], title=None)
+    content = page([ReportedProfile("x", all_answers(profile), other_period=False)], title=None)
     assert words in Tags(page_html(content)).text
     assert "nan" not in page_html(content).lower().replace("nano", "")
     assert words.partition(":")[0] in page_markdown(content).replace("\\", "")
@@ -231,7 +231,7 @@ def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
 )
 def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
     profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)
-    html = page_html(page([ReportedProfile("x", overview(profile), other_period=False)], title=None))
+    html = page_html(page([ReportedProfile("x", all_answers(profile), other_period=False)], title=None))
     assert len(html.encode()) < 300_000
     assert said in Tags(html).text
     lanes = re.findall(r"by node</text>.*?</svg>", html, re.DOTALL)
@@ -306,7 +306,7 @@ def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
 
 
 def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page() -> None:
-    results = overview(BASE, with_circle=False).capacity.results
+    results = all_answers(BASE, with_circle=False).capacity.results
     root = ET.fromstring(terms_chart(results))
     widths = [float((rect.get("width") or "").rstrip("%")) for rect in root.iter(f"{SVG}rect")]
     bars = len([1 for one in results for term in TERMS if getattr(one, term.key) > 0])
@@ -331,7 +331,7 @@ def test_bars_are_the_terms_and_fill_the_slice() -> None:
 
 
 def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:
-    results = overview(changed(cycle__period_us=300.0), with_circle=False).capacity.results
+    results = all_answers(changed(cycle__period_us=300.0), with_circle=False).capacity.results
     root = ET.fromstring(terms_chart(results))
     (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("class") == "edge")
     assert float((edge.get("x1") or "").rstrip("%")) == pytest.approx(150 / results[1].required_us * 100, rel=1e-3)

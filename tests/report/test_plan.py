@@ -8,8 +8,8 @@ import pytest
 from busplan.analysis.planning.options import plan
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.report.json_and_csv import to_csv, to_json
 from busplan.report.plan import plan_csv_rows, plan_document, plan_lines
-from busplan.report.text import to_csv, to_json
 from busplan.sections.profile import Profile
 
 CONTRACT = {

@@ -14,10 +14,10 @@ from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.report.capacity import capacity_lines
 from busplan.report.documents import capacity_document, capacity_rows, latency_document
+from busplan.report.json_and_csv import to_csv, to_json
 from busplan.report.latency import latency_lines
 from busplan.report.lines import table, us
-from busplan.report.text import to_csv, to_json
-from busplan.report.words import period, verdict_lines
+from busplan.report.verdict_sentences import period, verdict_lines
 from busplan.sections.profile import Profile
 
 

@@ -14,7 +14,7 @@ from busplan.buses import kind_named
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.report import documents, text
+from busplan.report import documents, json_and_csv
 from busplan.report.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
 from busplan.report.sweep.top import Tally, TopRows
 from busplan.sections.profile import Profile
@@ -47,7 +47,9 @@ def test_csv_is_what_capacity_writes_for_each_point(chunk_points: int) -> None:
     found = csv_header(columns) + "".join(block_text(block, columns, style="csv") for block in blocks(chunk_points))
     expected = []
     for changes, profile in points():
-        rows = csv.reader(io.StringIO(text.to_csv(documents.capacity_rows(capacity(profile, timing_models=BOTH)))))
+        rows = csv.reader(
+            io.StringIO(json_and_csv.to_csv(documents.capacity_rows(capacity(profile, timing_models=BOTH))))
+        )
         assert next(rows) == list(FIGURES)
         expected += [[str(value) for value in changes.values()] + row for row in rows]
     assert list(csv.reader(io.StringIO(found))) == [list(columns), *expected]
@@ -57,7 +59,7 @@ def test_jsonl_is_what_capacity_writes_for_each_point() -> None:
     columns = (*AXES, *FIGURES)
     lines = "".join(block_text(block, columns, style="jsonl") for block in blocks()).splitlines()
     expected = [
-        {**changes, **json.loads(text.to_json(row))}
+        {**changes, **json.loads(json_and_csv.to_json(row))}
         for changes, profile in points()
         for row in documents.capacity_rows(capacity(profile, timing_models=BOTH))
     ]

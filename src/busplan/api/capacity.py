@@ -10,8 +10,8 @@ from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
 from busplan.report import documents
 from busplan.report.capacity import capacity_lines
+from busplan.report.json_and_csv import to_json
 from busplan.report.lines import Line
-from busplan.report.text import to_json
 from busplan.sections.profile import Profile
 
 

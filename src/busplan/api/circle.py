@@ -11,8 +11,8 @@ from busplan.api.inputs import ProfileLike, items, load_profile
 from busplan.progress import Progress
 from busplan.report import documents
 from busplan.report.circle import PLOT_SECTORS, circle_lines
+from busplan.report.json_and_csv import to_json
 from busplan.report.lines import Line
-from busplan.report.text import to_json
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
 

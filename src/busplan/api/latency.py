@@ -8,9 +8,9 @@ from busplan.analysis.latency import Transaction
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
 from busplan.report import documents
+from busplan.report.json_and_csv import to_json
 from busplan.report.latency import latency_lines
 from busplan.report.lines import Line, plural
-from busplan.report.text import to_json
 from busplan.sections.profile import Profile
 
 

@@ -10,9 +10,9 @@ from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
+from busplan.report.json_and_csv import to_json
 from busplan.report.lines import Line
 from busplan.report.plan import plan_document, plan_lines
-from busplan.report.text import to_json
 from busplan.sections.profile import Profile
 
 

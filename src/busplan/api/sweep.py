@@ -10,16 +10,16 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Block, Column
-from busplan.analysis.sweep.circles import MAX_CIRCLES, all_columns, require_circles, run_task, with_circles
+from busplan.analysis.sweep.circles import MOST_CIRCLES_UNASKED, all_columns, require_circles, run_task, with_circles
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
 from busplan.errors import BusplanError
 from busplan.profile.kinds import words_of
+from busplan.report.json_and_csv import spelled
 from busplan.report.lines import Line
 from busplan.report.sweep.rows import json_footer, json_header, json_rows
 from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
-from busplan.report.text import spelled
 from busplan.sections.profile import Profile
 
 MOST_POINTS: Final = 2_000_000
@@ -196,10 +196,10 @@ def _values(profile: Profile, key: str, given: str | Iterable[Any]) -> Values:
 
 
 def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:
-    if grid.points > MAX_CIRCLES and not force:
+    if grid.points > MOST_CIRCLES_UNASKED and not force:
         raise BusplanError(
-            f"with_circle: {grid.points:,} points are more circle tests than the {MAX_CIRCLES:,} that are run without "
-            "force=True; vary less, or give it"
+            f"with_circle: {grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
+            "without force=True; vary less, or give it"
         )
     require_circles(profile, grid)
 

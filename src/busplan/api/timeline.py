@@ -8,8 +8,8 @@ from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule,
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
 from busplan.errors import BusplanError
+from busplan.report.json_and_csv import to_json
 from busplan.report.lines import Line
-from busplan.report.text import to_json
 from busplan.report.timeline.documents import timeline_document
 from busplan.report.timeline.terminal import timeline_lines
 from busplan.sections.profile import Profile

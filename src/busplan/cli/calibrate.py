@@ -108,10 +108,10 @@ def calibrate_command(
     if format_ == "table":
         emit(report.calibration_lines(result, source=name))
         return
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     emit_document(
-        text.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))
+        json_and_csv.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))
         if format_ == "json"
-        else text.to_csv(documents.with_profile(bench.name, report.calibration_rows(result)))
+        else json_and_csv.to_csv(documents.with_profile(bench.name, report.calibration_rows(result)))
     )

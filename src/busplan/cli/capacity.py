@@ -44,10 +44,10 @@ def capacity_command(
 
         emit(capacity_lines(result, verdicts(result)))
         return
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     emit_document(
-        text.to_json(documents.capacity_document(result, verdicts(result)))
+        json_and_csv.to_json(documents.capacity_document(result, verdicts(result)))
         if format_ == "json"
-        else text.to_csv(documents.with_profile(plan.name, documents.capacity_rows(result)))
+        else json_and_csv.to_csv(documents.with_profile(plan.name, documents.capacity_rows(result)))
     )

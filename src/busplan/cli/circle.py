@@ -133,7 +133,7 @@ def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
     from busplan.report.documents import TRACE_COLUMNS, trace_rows
-    from busplan.report.text import csv_blocks
+    from busplan.report.json_and_csv import csv_blocks
 
     file.writelines(block.encode() for block in csv_blocks(trace_rows(test, every=every), columns=TRACE_COLUMNS))
 
@@ -146,12 +146,12 @@ def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
         profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in test.runs]
         emit(circle_lines(test, profiles, with_contributions=contributions))
         return
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     emit_document(
-        text.to_json(documents.circle_document(test, with_contributions=contributions))
+        json_and_csv.to_json(documents.circle_document(test, with_contributions=contributions))
         if format_ == "json"
-        else text.to_csv(
+        else json_and_csv.to_csv(
             documents.with_profile(test.profile.name, documents.circle_rows(test, with_contributions=contributions))
         )
     )

@@ -122,11 +122,11 @@ def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
 
 
 def _emit(found: "Difference", arguments: tuple[str, str], *, format_: str) -> None:
-    from busplan.report import diff, text
+    from busplan.report import diff, json_and_csv
 
     if format_ == "table":
         emit(diff.diff_lines(found, arguments=arguments))
     elif format_ == "markdown":
         emit_document(diff.diff_markdown(found, arguments=arguments))
     else:
-        emit_document(text.to_json(diff.diff_document(found, arguments=arguments)))
+        emit_document(json_and_csv.to_json(diff.diff_document(found, arguments=arguments)))

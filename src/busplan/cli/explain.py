@@ -124,25 +124,25 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
 def _list(plan: "Profile", format_: ExplainFormat) -> None:
     from busplan.analysis.derivation.explain import assumptions
     from busplan.report import explain as report
-    from busplan.report import text
+    from busplan.report import json_and_csv
 
     found = assumptions(plan)
     if format_ == "text":
         emit(report.figure_lines(plan, found))
     elif format_ == "json":
-        emit_document(text.to_json(report.figure_document(plan, found)))
+        emit_document(json_and_csv.to_json(report.figure_document(plan, found)))
     else:
         emit_document(report.figure_markdown(plan, found))
 
 
 def _write(found: "Explanation", format_: ExplainFormat) -> None:
     from busplan.report import explain as report
-    from busplan.report import text
+    from busplan.report import json_and_csv
 
     found = report.in_words(found)
     if format_ == "text":
         emit(report.explain_lines(found))
     elif format_ == "json":
-        emit_document(text.to_json(report.explain_document(found)))
+        emit_document(json_and_csv.to_json(report.explain_document(found)))
     else:
         emit_document(report.explain_markdown(found))

@@ -55,10 +55,10 @@ def latency_command(
 
         emit(latency_lines(result, plan))
         return
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     emit_document(
-        text.to_json(documents.latency_document(result))
+        json_and_csv.to_json(documents.latency_document(result))
         if format_ == "json"
-        else text.to_csv(documents.with_profile(plan.name, documents.latency_rows(result)))
+        else json_and_csv.to_csv(documents.with_profile(plan.name, documents.latency_rows(result)))
     )

@@ -27,10 +27,10 @@ def paper_command(format_: FormatOption = "table") -> None:
 
         emit(paper_lines(sections))
         return
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     emit_document(
-        text.to_json(documents.paper_document(sections))
+        json_and_csv.to_json(documents.paper_document(sections))
         if format_ == "json"
-        else text.to_csv(documents.paper_rows(sections))
+        else json_and_csv.to_csv(documents.paper_rows(sections))
     )

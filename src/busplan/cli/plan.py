@@ -79,7 +79,7 @@ def plan_command(
             help="Periods in a row to test for the smallest that passes the circle; then the strides double, and the "
             "answer is marked as not proven.",
         ),
-    ] = 50,  # settings.MAX_CIRCLES, which --help must not load
+    ] = 50,  # best_values.MAX_CIRCLES, which --help must not load
     apply: Annotated[
         bool,
         typer.Option(
@@ -213,10 +213,10 @@ def _emit(result: "Plan", *, format_: str, with_circle: bool, piped: bool) -> No
     if format_ == "table":
         emit(report.plan_lines(result, with_circle=with_circle))
         return
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     emit_document(
-        text.to_json(report.plan_document(result))
+        json_and_csv.to_json(report.plan_document(result))
         if format_ == "json"
-        else text.to_csv(documents.with_profile(result.profile.name, report.plan_csv_rows(result)))
+        else json_and_csv.to_csv(documents.with_profile(result.profile.name, report.plan_csv_rows(result)))
     )

@@ -20,7 +20,7 @@ def profiles_command(
     Example: busplan profiles
     """
     from busplan.profile.shipped import load, shipped_names
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
 
     rows = documents.profile_rows([load(name).profile for name in shipped_names()])
     if format_ == "table":
@@ -28,6 +28,6 @@ def profiles_command(
 
         emit(profiles_lines(rows))
     elif format_ == "json":
-        emit_document(text.to_json(documents.document("profiles", profiles=rows)))
+        emit_document(json_and_csv.to_json(documents.document("profiles", profiles=rows)))
     else:
-        emit_document(text.to_csv(rows))
+        emit_document(json_and_csv.to_csv(rows))

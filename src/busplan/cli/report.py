@@ -105,14 +105,14 @@ def _plan(argument: str, *, period: str | None) -> "Profile":
 def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, period: str | None, circle: bool
 ) -> "Page":
-    from busplan.analysis.overview import overview
+    from busplan.analysis.all_answers import all_answers
     from busplan.report.page.chapters import ReportedProfile, page
 
     subjects = []
     with progress_bar("circle tests") as progress:
         for number, (argument, plan) in enumerate(zip(arguments, plans, strict=True)):
             own = part_of(progress, number=number, of=len(plans))
-            answer = overview(plan, with_circle=circle, progress=own)
+            answer = all_answers(plan, with_circle=circle, progress=own)
             subjects.append(ReportedProfile(argument, answer, other_period=period is not None))
     return page(subjects, title=title)
 

@@ -30,7 +30,7 @@ def rule_command(
 
     Example: busplan rule BP110
     """
-    from busplan.report import documents, text
+    from busplan.report import documents, json_and_csv
     from busplan.report.rules import rule_page, rule_rows, rule_table
     from busplan.rules.registry import all_rules
 
@@ -39,6 +39,6 @@ def rule_command(
         raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")
     chosen = list(rules.values()) if code is None else [rules[code.upper()]]
     if format_ == "json":
-        emit_document(text.to_json(documents.document("rule", rules=rule_rows(chosen))))
+        emit_document(json_and_csv.to_json(documents.document("rule", rules=rule_rows(chosen))))
     else:
         emit_text(rule_table(chosen) if code is None else rule_page(chosen[0]))

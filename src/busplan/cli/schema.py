@@ -12,6 +12,6 @@ def schema_command() -> None:
     Example: busplan schema > busplan.schema.json
     """
     from busplan.profile.schema import profile_schema
-    from busplan.report.text import to_json
+    from busplan.report.json_and_csv import to_json
 
     emit_document(to_json(profile_schema()))

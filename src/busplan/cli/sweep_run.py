@@ -98,12 +98,12 @@ def _drawing(job: "SweepJob") -> "FigureData | None":
 
 
 def _require_circles(job: "SweepJob") -> None:
-    from busplan.analysis.sweep.circles import MAX_CIRCLES, require_circles
+    from busplan.analysis.sweep.circles import MOST_CIRCLES_UNASKED, require_circles
 
-    if job.grid.points > MAX_CIRCLES and not job.force:
+    if job.grid.points > MOST_CIRCLES_UNASKED and not job.force:
         raise BusplanError(
-            f"--circle: {job.grid.points:,} points are more circle tests than the {MAX_CIRCLES:,} that are run without "
-            "--force; vary less, or give it"
+            f"--circle: {job.grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
+            "without --force; vary less, or give it"
         )
     require_circles(job.profile, job.grid)
 

@@ -194,10 +194,14 @@ def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
         from busplan.report.timeline.mermaid import timeline_mermaid
 
         return timeline_mermaid(shown)
-    from busplan.report import text
+    from busplan.report import json_and_csv
     from busplan.report.timeline.documents import timeline_document, timeline_rows
 
-    return text.to_json(timeline_document(shown)) if chosen == "json" else text.to_csv(timeline_rows(shown))
+    return (
+        json_and_csv.to_json(timeline_document(shown))
+        if chosen == "json"
+        else json_and_csv.to_csv(timeline_rows(shown))
+    )
 
 
 def _columns() -> int:

@@ -8,7 +8,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.buses import figure
 from busplan.buses.bus import Bus
 from busplan.report.lines import BLANK, GridRow, Line, figure_row, grid, plural
-from busplan.report.words import verdict_lines
+from busplan.report.verdict_sentences import verdict_lines
 from busplan.sections.profile import Profile
 
 

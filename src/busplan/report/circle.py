@@ -6,7 +6,7 @@ from typing import Final
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, failed_measure, to_attack
 from busplan.report.lines import BLANK, Line, table, us
-from busplan.report.words import period
+from busplan.report.verdict_sentences import period
 
 PLOT_SECTORS: Final = 72
 """Columns of the plot in the terminal: one for every 5 degrees."""

@@ -9,7 +9,7 @@ from busplan.report import markdown
 from busplan.report.changes import CHANGE_HEADINGS, change_document, change_rows
 from busplan.report.documents import Document, document
 from busplan.report.lines import BLANK, Line, figure_row, plural, table
-from busplan.report.words import period
+from busplan.report.verdict_sentences import period
 from busplan.sections.profile import Profile
 
 Arguments = tuple[str, str]

@@ -10,7 +10,7 @@ from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.latency import LatencyResult, Transaction
 from busplan.analysis.network import bus_of
-from busplan.report.words import verdict_lines, warnings
+from busplan.report.verdict_sentences import verdict_lines, warnings
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from busplan.buses.figure import Figure
 from busplan.report import markdown
 from busplan.report.documents import Document, Row, capacity_document, document
 from busplan.report.lines import BLANK, Line, table
-from busplan.report.words import period
+from busplan.report.verdict_sentences import period
 from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 

@@ -8,7 +8,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Bus
 from busplan.buses.figure import REQUIRED
 from busplan.report.lines import BLANK, GridRow, Line, figure_row, grid
-from busplan.report.words import execution_line, warnings
+from busplan.report.verdict_sentences import execution_line, warnings
 from busplan.sections.profile import Profile
 
 

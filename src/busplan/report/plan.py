@@ -8,7 +8,7 @@ from busplan.analysis.planning.options import Option, Plan
 from busplan.buses.bus import Value
 from busplan.report.documents import Document, Row, document
 from busplan.report.lines import BLANK, Line, plural, table, us
-from busplan.report.words import period, warnings
+from busplan.report.verdict_sentences import period, warnings
 from busplan.sections.profile import Profile
 
 

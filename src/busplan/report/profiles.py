@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from busplan.report.lines import BLANK, Line, plural
-from busplan.report.words import period
+from busplan.report.verdict_sentences import period
 
 
 def profiles_lines(rows: Sequence[Mapping[str, Any]]) -> list[Line]:

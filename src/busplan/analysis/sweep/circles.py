@@ -15,7 +15,7 @@ from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
-CIRCLE_FIGURES: Final = (
+CIRCLE_COLUMNS: Final = (
     "mean_contour_error_mm",
     "max_contour_error_mm",
     "circular_deviation_mm",
@@ -24,7 +24,7 @@ CIRCLE_FIGURES: Final = (
     "passed",
 )
 """Columns that circle tests add, by their names in `circle-test`."""
-MAX_CIRCLES: Final = 1000
+MOST_CIRCLES_UNASKED: Final = 1000
 """Circle tests that are run without being asked twice: minutes with numba, an hour without."""
 
 Figures = tuple[float | bool | None, ...]
@@ -32,7 +32,7 @@ Figures = tuple[float | bool | None, ...]
 
 def all_columns(profile: Profile, grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
     """All columns of a sweep: the varied keys, the figures of `capacity`, and those of circle tests."""
-    return (*grid.axes, *figure_names(profile), *(CIRCLE_FIGURES if with_circle else ()))
+    return (*grid.axes, *figure_names(profile), *(CIRCLE_COLUMNS if with_circle else ()))
 
 
 class CircleTask(NamedTuple):
@@ -53,7 +53,7 @@ def run_task(task: CircleTask) -> list[Figures]:
             found[model] = on_node
             continue
         (result,) = circle_test(profile, explain=False).results
-        found[model] = tuple(getattr(result, name) for name in CIRCLE_FIGURES)
+        found[model] = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
         if result.bus_fits and result.loop == "node":
             # Such a loop knows nothing of the bus but whether it fits: the next model's circle is the same.
             on_node = found[model]
@@ -110,7 +110,7 @@ def with_circles(
                 **figures,
                 **{
                     name: Column(_array([point[number][place] for point in results]).reshape(block.chunk.shape))
-                    for place, name in enumerate(CIRCLE_FIGURES)
+                    for place, name in enumerate(CIRCLE_COLUMNS)
                 },
             }
             for number, figures in enumerate(block.models)

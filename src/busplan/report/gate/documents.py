@@ -4,7 +4,7 @@ from pathlib import PurePath
 
 from busplan.printable import json_text
 from busplan.report.documents import document
-from busplan.report.text import to_json
+from busplan.report.json_and_csv import to_json
 from busplan.rules.report import CheckReport
 
 

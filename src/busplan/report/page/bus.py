@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.latency import Transaction
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.overview import Overview
 from busplan.buses.figure import unit_of
 from busplan.report.capacity import capacity_table_rows
 from busplan.report.latency import latency_table_rows
@@ -17,7 +17,7 @@ from busplan.report.timeline.kinds import kind_of
 from busplan.report.timeline.lanes import charged, drawn_window
 from busplan.report.timeline.mermaid import timeline_mermaid
 from busplan.report.timeline.svg import is_coarse, timeline_svg
-from busplan.report.words import verdict_lines
+from busplan.report.verdict_sentences import verdict_lines
 
 Sources = Mapping[str, SourceCommand]
 
@@ -35,7 +35,7 @@ def plain(value: float) -> str:
     return f"{value:.12g}"
 
 
-def bus_verdict(answer: Overview, sources: Sources) -> ShownVerdict:
+def bus_verdict(answer: AllAnswers, sources: Sources) -> ShownVerdict:
     """Does the cycle fit, and do the timing models agree?"""
     verdict, source = answer.verdict, sources["capacity"]
     word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
@@ -64,7 +64,7 @@ def bus_verdict(answer: Overview, sources: Sources) -> ShownVerdict:
     )
 
 
-def models_part(answer: Overview, sources: Sources) -> Part:
+def models_part(answer: AllAnswers, sources: Sources) -> Part:
     """The timing models side by side: the whole cycle, and the latencies."""
     results, transactions = answer.capacity.results, answer.latency.transactions
     decides, bus = answer.profile.bus.timing_model, bus_of(answer.profile)
@@ -120,7 +120,7 @@ def _group(one: Transaction) -> str:
     return one.transaction if one.payload_bytes is None else f"{one.transaction} {one.payload_bytes} B"
 
 
-def timeline_part(answer: Overview, sources: Sources) -> Part:
+def timeline_part(answer: AllAnswers, sources: Sources) -> Part:
     """The cycle to scale."""
     title = "The cycle to scale"
     if answer.schedule is None:
@@ -162,7 +162,7 @@ def timeline_part(answer: Overview, sources: Sources) -> Part:
     return Part("timeline", title, lines, (), charts, (table,), _ids(sources, "timeline"))
 
 
-def terms_part(answer: Overview, sources: Sources) -> Part:
+def terms_part(answer: AllAnswers, sources: Sources) -> Part:
     """Where the microseconds go."""
     results, source = answer.capacity.results, sources["capacity"]
     chart = Chart(
@@ -185,7 +185,7 @@ def terms_part(answer: Overview, sources: Sources) -> Part:
     return Part("terms", "Where the microseconds go", charts=(chart,), tables=(table,), commands=(source.anchor,))
 
 
-def axes_part(answer: Overview, sources: Sources) -> Part:
+def axes_part(answer: AllAnswers, sources: Sources) -> Part:
     """Axes against period."""
     source, models = sources["axes"], len(answer.steps)
     nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
@@ -219,7 +219,7 @@ def axes_part(answer: Overview, sources: Sources) -> Part:
     return Part("axes", "Axes against period", charts=(chart,), tables=(table,), commands=(source.anchor,))
 
 
-def _curves(answer: Overview) -> str:
+def _curves(answer: AllAnswers) -> str:
     """How the curves of the timing models are told apart."""
     if len(answer.steps) == 1:
         return ""

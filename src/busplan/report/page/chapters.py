@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan import __version__
+from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.network import bus_of
-from busplan.analysis.overview import Overview
 from busplan.report.circle import um
 from busplan.report.lines import count, percent, plural, us
 from busplan.report.page.bus import axes_part, bus_verdict, fit_word, models_part, plain, terms_part, timeline_part
@@ -30,7 +30,7 @@ class ReportedProfile(NamedTuple):
 
     argument: str
     """The PROFILE argument."""
-    answer: Overview
+    answer: AllAnswers
     other_period: bool
     """Whether its period is not that of its file."""
 

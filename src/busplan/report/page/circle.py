@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Final
 
+from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.roundness import CircleFigures
-from busplan.analysis.overview import Overview
 from busplan.report.circle import circle_verdict_lines, signed_um, two_decimals, um
 from busplan.report.lines import GridRow, count, yes
 from busplan.report.page.bus import plain
@@ -35,7 +35,7 @@ _ROWS: Final = (
 )
 
 
-def circle_verdict(answer: Overview, sources: Mapping[str, SourceCommand]) -> ShownVerdict:
+def circle_verdict(answer: AllAnswers, sources: Mapping[str, SourceCommand]) -> ShownVerdict:
     """Is the circle still round?"""
     result = answer.circle_figures
     if result is None:
@@ -62,7 +62,7 @@ def _rests_on(result: CircleFigures) -> tuple[str, ...]:
     return () if result.stable is None else (f"The servo values behind these figures are {result.servo_grade}.",)
 
 
-def _why_not(answer: Overview) -> tuple[str, ...]:
+def _why_not(answer: AllAnswers) -> tuple[str, ...]:
     if answer.no_circle:
         return tuple(f"The circle test cannot be run: {why}." for why in answer.no_circle)
     if answer.profile.asks_for_circle:
@@ -70,7 +70,7 @@ def _why_not(answer: Overview) -> tuple[str, ...]:
     return ("The profile has no section for a circle test, so none was run.",)
 
 
-def circle_part(answer: Overview, sources: Mapping[str, SourceCommand]) -> Part:
+def circle_part(answer: AllAnswers, sources: Mapping[str, SourceCommand]) -> Part:
     """The magnified circle and its figures."""
     result, title = answer.circle_figures, "The circle"
     if result is None:
@@ -92,7 +92,7 @@ def circle_part(answer: Overview, sources: Mapping[str, SourceCommand]) -> Part:
     )
 
 
-def _not_drawn(answer: Overview, result: CircleFigures) -> str:
+def _not_drawn(answer: AllAnswers, result: CircleFigures) -> str:
     if answer.contour is not None:
         return "Not drawn: there is no contour error to show."
     reason = ", and ".join(failure.text for failure in result.failures)
@@ -113,7 +113,7 @@ def _caption(scale: Magnified, result: CircleFigures, *, tolerance_mm: float | N
     return f"{words}; {limit} dashed."
 
 
-def sources_part(answer: Overview, sources: Mapping[str, SourceCommand]) -> Part | None:
+def sources_part(answer: AllAnswers, sources: Mapping[str, SourceCommand]) -> Part | None:
     """What makes the circle less round, ranked; nothing without a simulation."""
     result = answer.circle_figures
     if result is None or result.contributions is None:

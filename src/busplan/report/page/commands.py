@@ -3,8 +3,8 @@
 import os
 import shlex
 
+from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.capacity.verdict import verdicts
-from busplan.analysis.overview import Overview
 from busplan.printable import commands
 from busplan.report import documents
 from busplan.report.explain import figure_document
@@ -45,7 +45,7 @@ def period_option(period_us: float) -> tuple[str, str]:
     return "--period", f"{repr(period_us).removesuffix('.0')}us"
 
 
-def sources(answer: Overview, *, argument: str, anchor: str, other_period: bool) -> tuple[SourceCommand, ...]:
+def sources(answer: AllAnswers, *, argument: str, anchor: str, other_period: bool) -> tuple[SourceCommand, ...]:
     """List the commands behind one profile's figures, each with the document that it writes.
 
     Parameters

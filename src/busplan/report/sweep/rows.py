@@ -13,7 +13,7 @@ from busplan.analysis.sweep.blocks import Block, Column
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.printable import json_text
 from busplan.report.documents import Document, document
-from busplan.report.text import csv_cell
+from busplan.report.json_and_csv import csv_cell
 
 Style = Literal["csv", "jsonl"]
 TEXT_POINTS: Final = 4096

@@ -4,7 +4,7 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Schedule, totals
 from busplan.report.documents import Document, Row, document, safety_row
 from busplan.report.timeline.kinds import kind_of
-from busplan.report.words import warnings
+from busplan.report.verdict_sentences import warnings
 
 
 def event_rows(plan: Schedule) -> list[Row]:

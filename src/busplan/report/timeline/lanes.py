@@ -7,7 +7,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.timeline.schedule import Event, Schedule
 from busplan.report.lines import plural, us
 from busplan.report.timeline.kinds import event_title
-from busplan.report.words import period, story
+from busplan.report.verdict_sentences import period, story
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events are drawn in a row each; more of them in a row for each node. One node's whole cycle is 20."""

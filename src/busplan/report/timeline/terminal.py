@@ -23,7 +23,7 @@ from busplan.report.timeline.lanes import (
     stretches,
     strip_title,
 )
-from busplan.report.words import warnings
+from busplan.report.verdict_sentences import warnings
 
 NARROWEST: Final = 60
 """Columns below which a drawing would show nothing."""

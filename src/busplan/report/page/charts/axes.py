@@ -10,7 +10,7 @@ from busplan.analysis.capacity.node_steps import NodeSteps
 from busplan.report.lines import plural
 from busplan.report.scale import round_steps
 from busplan.report.svg import drawing, markup, text_at
-from busplan.report.words import period
+from busplan.report.verdict_sentences import period
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
 

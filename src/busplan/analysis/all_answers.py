@@ -22,7 +22,7 @@ CONTOUR_SECTORS: Final = 720
 _PERIOD_FACTORS: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
-class Overview(NamedTuple):
+class AllAnswers(NamedTuple):
     """All answers of one profile; what cannot be computed is None, with the reason."""
 
     profile: Profile
@@ -51,7 +51,7 @@ class Overview(NamedTuple):
         return None if self.circle is None else self.circle.results[0]
 
 
-def overview(profile: Profile, *, with_circle: bool = True, progress: Progress | None = None) -> Overview:
+def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progress | None = None) -> AllAnswers:
     """Compute what is to be said of a profile.
 
     Parameters
@@ -70,7 +70,7 @@ def overview(profile: Profile, *, with_circle: bool = True, progress: Progress |
     circle, contour, no_circle = (
         _circle(profile, progress) if with_circle and profile.asks_for_circle else (None, None, ())
     )
-    return Overview(
+    return AllAnswers(
         profile=profile,
         capacity=bus,
         verdict=verdicts(bus)[0],
