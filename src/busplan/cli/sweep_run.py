@@ -102,8 +102,8 @@ def _require_circles(job: "SweepJob") -> None:
 
     if job.grid.points > MOST_CIRCLES_UNASKED and not job.force:
         raise BusplanError(
-            f"--circle: {job.grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
-            "without --force; vary less, or give it"
+            f"--circle: {job.grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are "
+            "run without --force; vary less, or give it"
         )
     require_circles(job.profile, job.grid)
 

@@ -150,7 +150,7 @@ def change_for_room(profile: Profile, *, model: str, nodes: int, utilisation: fl
     Parameters
     ----------
     profile
-        A network that keeps the standard's own limits.
+        A network that keeps the limits of its bus.
     model
         Timing model.
     nodes
