@@ -31,6 +31,8 @@ def environment(**changes: str) -> dict[str, str]:
         "LC_",
         "TERM",
         "TTY_",
+        "BUSPLAN",
+        "_BUSPLAN",
     )
     kept = {key: value for key, value in os.environ.items() if not key.startswith(dropped)}
     return {**kept, "LANG": "C.UTF-8", "TERM": "xterm-256color", **changes}
