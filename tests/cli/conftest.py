@@ -114,6 +114,16 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 @pytest.fixture(scope="session")
+def busplan(run: Run) -> Run:
+    """Call the command line in this process, with whatever is written as an argument."""
+
+    def call(*arguments: object, cwd: Path, stdin: str | None = None) -> "subprocess.CompletedProcess[str]":
+        return run(*map(str, arguments), cwd=cwd, stdin=stdin)
+
+    return call
+
+
+@pytest.fixture(scope="session")
 def refused(run: Run) -> Callable[..., str]:
     """Run what must be refused: exit 2, no document, no traceback; gives what is said."""
 

@@ -50,16 +50,6 @@ def process(*arguments: object, cwd: Path, stdin: str | None = None, **env: str)
 
 
 @pytest.fixture
-def busplan(run: Busplan) -> Busplan:
-    """Call the same command line without a process for each of hundreds of calls."""
-
-    def call(*arguments: object, cwd: Path, stdin: str | None = None) -> Run:
-        return run(*map(str, arguments), cwd=cwd, stdin=stdin)
-
-    return call
-
-
-@pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "p").mkdir()
     for name, text in (("clean", CLEAN), ("fails", FAILS), ("warns", WARNS)):
