@@ -1,4 +1,4 @@
-"""Each answer's document is the one that the command writes, as a process, with `--format json`."""
+"""Each answer's document is the one that the command writes with `--format json`."""
 
 import json
 import subprocess
@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 import busplan
 from busplan.api.answer import Answer
+from busplan.cli import app
 from busplan.profile.shipped import shipped_names
 
 EVERY: dict[str, Callable[[str], Answer]] = {
@@ -59,9 +61,7 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
 
 
 def printed(line: str) -> Any:
-    done = subprocess.run(
-        [sys.executable, "-m", "busplan", *line.split(), "--format", "json"], capture_output=True, check=False
-    )
+    done = CliRunner().invoke(app, [*line.split(), "--format", "json"], prog_name="busplan")
     assert done.stdout, done.stderr
     return json.loads(done.stdout)
 

@@ -95,11 +95,13 @@ def c_axes(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], list[Floats
 
 @needs_gcc
 @needs_numba
-def test_compiled_kernel_against_c(benchmark: Any, c_axes: Callable[[], list[Floats]]) -> None:
+def test_compiled_kernel_against_c(
+    benchmark: Any, c_axes: Callable[[], list[Floats]], size: Callable[[int, int], int]
+) -> None:
     for found, expected in zip(both_axes("numba"), c_axes(), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
     # Taken in turns, so that a busy neighbour slows both.
-    pairs = [(best_of(lambda: both_axes("numba"), rounds=1), best_of(c_axes, rounds=1)) for _ in range(15)]
+    pairs = [(best_of(lambda: both_axes("numba"), rounds=1), best_of(c_axes, rounds=1)) for _ in range(size(15, 1))]
     compiled, in_c = (min(times) for times in zip(*pairs, strict=True))
     benchmark.extra_info["c_seconds"] = in_c
     benchmark.extra_info["ratio_to_c"] = compiled / in_c

@@ -31,6 +31,8 @@ def environment(**changes: str) -> dict[str, str]:
         "LC_",
         "TERM",
         "TTY_",
+        "BUSPLAN",
+        "_BUSPLAN",
     )
     kept = {key: value for key, value in os.environ.items() if not key.startswith(dropped)}
     return {**kept, "LANG": "C.UTF-8", "TERM": "xterm-256color", **changes}
@@ -107,6 +109,16 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         if arguments not in known:
             known[arguments] = run_inside(*arguments, cwd=home)
         return known[arguments]
+
+    return call
+
+
+@pytest.fixture(scope="session")
+def busplan(run: Run) -> Run:
+    """Call the command line in this process, with whatever is written as an argument."""
+
+    def call(*arguments: object, cwd: Path, stdin: str | None = None) -> "subprocess.CompletedProcess[str]":
+        return run(*map(str, arguments), cwd=cwd, stdin=stdin)
 
     return call
 

@@ -1,4 +1,4 @@
-"""`busplan check`, `rule` and `schema` as processes: exit codes, streams, files, and what other programs read."""
+"""`busplan check`, `rule` and `schema` through the command line: exit codes, streams, files, and what other programs read."""
 
 import json
 import os
@@ -8,11 +8,15 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
 from ruamel.yaml import YAML
+
+from busplan.cli.workers import Map, workers
 
 ROOT = Path(__file__).resolve().parents[2]
 CLEAN = (ROOT / "tests/rules/examples/BP001/valid.toml").read_text(encoding="utf-8")
@@ -23,6 +27,7 @@ FORMATS = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
 PROGRAM = [sys.executable, "-m", "busplan"]
 
 Run = subprocess.CompletedProcess[str]
+Busplan = Callable[..., Run]
 
 
 def environment(**more: str) -> dict[str, str]:
@@ -30,7 +35,7 @@ def environment(**more: str) -> dict[str, str]:
     return {**kept, **more}
 
 
-def busplan(*arguments: object, cwd: Path, stdin: str | None = None, **env: str) -> Run:
+def process(*arguments: object, cwd: Path, stdin: str | None = None, **env: str) -> Run:
     return subprocess.run(
         [*PROGRAM, *map(str, arguments)],
         capture_output=True,
@@ -84,7 +89,7 @@ def folder(tmp_path: Path) -> Path:
         (["p", "-o", "p"], 2),
     ],
 )
-def test_exit_codes(folder: Path, arguments: list[str], code: int) -> None:
+def test_exit_codes(busplan: Busplan, folder: Path, arguments: list[str], code: int) -> None:
     run = busplan("check", *arguments, cwd=folder)
     assert run.returncode == code, run.stderr
     assert "Traceback" not in run.stderr
@@ -92,19 +97,26 @@ def test_exit_codes(folder: Path, arguments: list[str], code: int) -> None:
     assert code == 0 or run.stdout or run.stderr
 
 
-def test_findings_go_to_stdout_and_the_summary_to_stderr(folder: Path) -> None:
+@pytest.mark.parametrize("arguments", [["p/clean.toml"], ["p"], ["p", "gone.toml"], ["p", "--format", "xml"]])
+def test_a_process_says_what_the_command_line_says(busplan: Busplan, folder: Path, arguments: list[str]) -> None:
+    # The other tests call the command line without a process where none is needed.
+    inside, outside = busplan("check", *arguments, cwd=folder), process("check", *arguments, cwd=folder)
+    assert (outside.returncode, outside.stdout, outside.stderr) == (inside.returncode, inside.stdout, inside.stderr)
+
+
+def test_findings_go_to_stdout_and_the_summary_to_stderr(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "p", cwd=folder)
     assert [line.partition(" ")[0] for line in run.stdout.splitlines()] == ["p/fails.toml:11:1:", "p/warns.toml:7:1:"]
     assert run.stdout.splitlines()[0].startswith("p/fails.toml:11:1: BP101 cycle.period_us: the cycle needs ")
     assert run.stderr == "checked 3 profiles: 1 error, 1 warning\n"
 
 
-def test_clean_is_silent_on_stdout(folder: Path) -> None:
+def test_clean_is_silent_on_stdout(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "p/clean.toml", cwd=folder)
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "checked 1 profile: 0 errors, 0 warnings\n")
 
 
-def test_one_broken_file_does_not_stop_the_others(folder: Path) -> None:
+def test_one_broken_file_does_not_stop_the_others(busplan: Busplan, folder: Path) -> None:
     (folder / "p" / "broken.toml").write_text(BROKEN, encoding="utf-8")
     (folder / "p" / "bytes.toml").write_bytes(b"schema_version = 1\n\xff\n")
     os.mkfifo(folder / "pipe.toml")
@@ -130,14 +142,14 @@ def test_one_broken_file_does_not_stop_the_others(folder: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="no file here that root cannot read")
-def test_a_file_that_fails_while_it_is_read_is_a_failure(folder: Path) -> None:
+def test_a_file_that_fails_while_it_is_read_is_a_failure(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "/proc/self/mem", "p/fails.toml", cwd=folder)
     assert (run.returncode, run.stdout[:14]) == (2, "p/fails.toml:1")
     assert run.stderr.startswith("/proc/self/mem: cannot be read: ")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read anything")
-def test_an_unreadable_file_is_a_failure(folder: Path) -> None:
+def test_an_unreadable_file_is_a_failure(busplan: Busplan, folder: Path) -> None:
     (folder / "p" / "clean.toml").chmod(0)
     run = busplan("check", "p", cwd=folder)
     assert run.returncode == 2
@@ -145,7 +157,7 @@ def test_an_unreadable_file_is_a_failure(folder: Path) -> None:
     assert "p/fails.toml:11:1" in run.stdout
 
 
-def test_quiet_keeps_failures_and_nothing_else(folder: Path) -> None:
+def test_quiet_keeps_failures_and_nothing_else(busplan: Busplan, folder: Path) -> None:
     assert busplan("check", "p", "-q", cwd=folder).stderr == ""
     assert busplan("check", "p", "-q", "--baseline", "b.json", "--update-baseline", cwd=folder).stderr == ""
     run = busplan("check", "p", "gone.toml", "--quiet", cwd=folder)
@@ -153,7 +165,7 @@ def test_quiet_keeps_failures_and_nothing_else(folder: Path) -> None:
     assert "gone.toml: no such file" in run.stderr
 
 
-def test_verbose_names_what_is_fine_and_what_is_skipped(folder: Path) -> None:
+def test_verbose_names_what_is_fine_and_what_is_skipped(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "p", "-v", cwd=folder)
     assert run.stderr.splitlines() == [
         "p/other.toml: skipped, claims no schema_version",
@@ -162,7 +174,7 @@ def test_verbose_names_what_is_fine_and_what_is_skipped(folder: Path) -> None:
     ]
 
 
-def test_standard_input(folder: Path) -> None:
+def test_standard_input(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "-", cwd=folder, stdin=FAILS)
     assert (run.returncode, run.stdout[:15]) == (1, "<stdin>:11:1: B")
     run = busplan("check", "-", "--stdin-filename", "p/a b.toml", cwd=folder, stdin=FAILS)
@@ -173,7 +185,7 @@ def test_standard_input(folder: Path) -> None:
 
 def test_standard_input_is_read_whatever_the_number_of_jobs(folder: Path) -> None:
     given = ["check", "p/clean.toml", "-", "p/warns.toml"]
-    one, two = (busplan(*given, "--jobs", jobs, cwd=folder, stdin=FAILS) for jobs in (1, 2))
+    one, two = (process(*given, "--jobs", jobs, cwd=folder, stdin=FAILS) for jobs in (1, 2))
     assert one.returncode == two.returncode == 1
     assert one.stdout == two.stdout
     assert [line.partition(":")[0] for line in one.stdout.splitlines()] == ["<stdin>", "p/warns.toml"]
@@ -193,7 +205,7 @@ def test_a_shells_process_substitution_is_read(folder: Path) -> None:
     assert re.match(r"/dev/fd/\d+:11:1: BP101 ", run.stdout)
 
 
-def test_an_output_file_is_the_report_and_stdout_is_empty(folder: Path) -> None:
+def test_an_output_file_is_the_report_and_stdout_is_empty(busplan: Busplan, folder: Path) -> None:
     for format_ in FORMATS:
         shown = busplan("check", "p", "--format", format_, cwd=folder)
         written = busplan("check", "p", "--format", format_, "-o", "report.out", cwd=folder)
@@ -216,19 +228,19 @@ def test_a_closed_stdout_is_no_verdict(folder: Path) -> None:
 
 
 def test_the_environment_sets_the_default_format(folder: Path) -> None:
-    assert json.loads(busplan("check", "p", cwd=folder, BUSPLAN_FORMAT="json").stdout)["command"] == "check"
-    text = busplan("check", "p", "--format", "text", cwd=folder, BUSPLAN_FORMAT="json").stdout
+    assert json.loads(process("check", "p", cwd=folder, BUSPLAN_FORMAT="json").stdout)["command"] == "check"
+    text = process("check", "p", "--format", "text", cwd=folder, BUSPLAN_FORMAT="json").stdout
     assert (
-        text == busplan("check", "p", cwd=folder).stdout == busplan("check", "p", cwd=folder, BUSPLAN_FORMAT="").stdout
+        text == process("check", "p", cwd=folder).stdout == process("check", "p", cwd=folder, BUSPLAN_FORMAT="").stdout
     )
-    run = busplan("check", "p", cwd=folder, BUSPLAN_FORMAT="yaml")
+    run = process("check", "p", cwd=folder, BUSPLAN_FORMAT="yaml")
     assert (run.returncode, run.stdout) == (2, "")
     assert "yaml" in run.stderr
     # It is this command's: others have formats of their own.
-    assert busplan("rule", cwd=folder, BUSPLAN_FORMAT="yaml").returncode == 0
+    assert process("rule", cwd=folder, BUSPLAN_FORMAT="yaml").returncode == 0
 
 
-def test_github_has_the_plain_report_on_stderr(folder: Path) -> None:
+def test_github_has_the_plain_report_on_stderr(busplan: Busplan, folder: Path) -> None:
     plain = busplan("check", "p", cwd=folder)
     run = busplan("check", "p", "--format", "github", cwd=folder)
     assert run.stdout.splitlines()[0].startswith("::error file=p/fails.toml,line=11,col=1,title=BP101 slice-overrun::")
@@ -236,29 +248,49 @@ def test_github_has_the_plain_report_on_stderr(folder: Path) -> None:
     assert busplan("check", "p", "--format", "github", "-q", cwd=folder).stderr == plain.stdout
 
 
-def test_any_number_of_jobs_gives_the_same_bytes(folder: Path) -> None:
+def test_any_number_of_jobs_gives_the_same_bytes(
+    busplan: Busplan, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (folder / "p" / "bytes.toml").write_bytes(b"schema_version = 1\n\xff\n")
     circle = CLEAN + "[servo]\nposition_gain_per_s = 30000\n"
     for number in range(8):
         (folder / "p" / f"{number}.toml").write_text((FAILS, WARNS, circle, BROKEN)[number % 4], encoding="utf-8")
     given = ["check", "p/warns.toml", "gone.toml", "p", "paper-1ms"]
-    for format_ in FORMATS:
-        one, two = (busplan(*given, "--no-circle", "--format", format_, "--jobs", jobs, cwd=folder) for jobs in (1, 2))
-        assert one.returncode == 2
-        assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
-        assert one.stdout
-    one, two, many = (busplan(*given, "--jobs", jobs, cwd=folder) for jobs in (1, 2, 50))
+    asked: list[int] = []
+    monkeypatch.chdir(folder)  # where workers start, they work
+    # The same two workers for every form: their start is most of the time of a process.
+    with workers(2) as shared:
+
+        def again(number: int) -> AbstractContextManager[Map]:
+            asked.append(number)
+            return nullcontext(shared)
+
+        monkeypatch.setattr("busplan.cli.workers.workers", again)
+        for format_ in FORMATS:
+            one, two = (
+                busplan(*given, "--no-circle", "--format", format_, "--jobs", jobs, cwd=folder) for jobs in (1, 2)
+            )
+            assert one.returncode == 2
+            assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
+            assert one.stdout
+    assert asked == [2] * len(FORMATS)
+    monkeypatch.undo()
+    one, two = (call(*given, "--jobs", jobs, cwd=folder) for call, jobs in ((busplan, 1), (process, 2)))
     assert "BP202" in one.stdout
-    assert (one.stdout, one.stderr) == (two.stdout, two.stderr) == (many.stdout, many.stderr)
+    assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
+    few = ["check", "p/warns.toml", "gone.toml", "p/2.toml"]
+    one, many = (call(*few, "--jobs", jobs, cwd=folder) for call, jobs in ((busplan, 1), (process, 50)))
+    assert "BP202" in one.stdout
+    assert (one.stdout, one.stderr) == (many.stdout, many.stderr)
 
 
-def test_the_circle_can_be_left_out(folder: Path) -> None:
+def test_the_circle_can_be_left_out(busplan: Busplan, folder: Path) -> None:
     (folder / "circle.toml").write_text(CLEAN + "[servo]\nposition_gain_per_s = 30000\n", encoding="utf-8")
     assert busplan("check", "circle.toml", cwd=folder).returncode == 1
     assert busplan("check", "circle.toml", "--no-circle", cwd=folder).returncode == 0
 
 
-def test_names_that_command_the_terminal_do_not(tmp_path: Path) -> None:
+def test_names_that_command_the_terminal_do_not(busplan: Busplan, tmp_path: Path) -> None:
     (tmp_path / "a\x1b[31m\n::error::b.toml").write_text(FAILS, encoding="utf-8")
     (tmp_path / os.fsdecode(b"\xff.toml")).write_text(FAILS, encoding="utf-8")
     for format_ in FORMATS:
@@ -278,7 +310,7 @@ def test_names_that_command_the_terminal_do_not(tmp_path: Path) -> None:
 # Baseline
 
 
-def test_a_baseline_is_recorded_and_held(folder: Path) -> None:
+def test_a_baseline_is_recorded_and_held(busplan: Busplan, folder: Path) -> None:
     recorded = busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
     assert recorded.returncode == 1  # what else is wrong is said as always
     assert recorded.stderr.splitlines()[0] == "recorded 3 profiles in b.json"
@@ -292,7 +324,7 @@ def test_a_baseline_is_recorded_and_held(folder: Path) -> None:
     assert busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder).returncode == 0
 
 
-def test_an_update_keeps_what_was_not_checked(folder: Path) -> None:
+def test_an_update_keeps_what_was_not_checked(busplan: Busplan, folder: Path) -> None:
     busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
     before = json.loads((folder / "b.json").read_text(encoding="utf-8"))["profiles"]
     (folder / "p" / "clean.toml").write_text(CLEAN.replace("axes = 4", "axes = 3"), encoding="utf-8")
@@ -307,7 +339,7 @@ def test_an_update_keeps_what_was_not_checked(folder: Path) -> None:
     assert after["p/fails.toml"] == before["p/fails.toml"]
 
 
-def test_what_is_no_baseline_is_never_overwritten(folder: Path) -> None:
+def test_what_is_no_baseline_is_never_overwritten(busplan: Busplan, folder: Path) -> None:
     for content in ("{", '{"schema": 2, "command": "baseline", "profiles": {}}', "[project]\n"):
         (folder / "b.json").write_text(content, encoding="utf-8")
         for more in ([], ["--update-baseline"]):
@@ -339,7 +371,7 @@ PATCHES = {
 
 @pytest.mark.parametrize("when", PATCHES)
 @pytest.mark.parametrize("what", ["report", "baseline"])
-def test_a_kill_leaves_the_old_file_whole(folder: Path, what: str, when: str) -> None:
+def test_a_kill_leaves_the_old_file_whole(busplan: Busplan, folder: Path, what: str, when: str) -> None:
     options = ["-o", "report"] if what == "report" else ["--baseline", "baseline", "--update-baseline"]
     busplan("check", "p/clean.toml", *options, "--format", "json", cwd=folder)
     old = (folder / what).read_bytes()
@@ -366,7 +398,7 @@ def test_a_kill_at_any_time_leaves_one_file_or_the_other(folder: Path) -> None:
     wholes: dict[str, set[bytes]] = {"baseline": set(), "report": set()}
     for paths in (["p/clean.toml"], ["p"]):
         start = time.perf_counter()
-        busplan("check", *paths, *given, cwd=folder)
+        process("check", *paths, *given, cwd=folder)
         seconds = time.perf_counter() - start
         for name, whole in wholes.items():
             whole.add((folder / name).read_bytes())
@@ -378,10 +410,10 @@ def test_a_kill_at_any_time_leaves_one_file_or_the_other(folder: Path) -> None:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             env=environment(),
-        ) as process:
+        ) as killed:
             # Most of the time is start-up: the last third is when files are written.
             time.sleep(seconds * (0.65 + 0.4 * number / 12))
-            process.kill()
+            killed.kill()
         for name, whole in wholes.items():
             assert (folder / name).read_bytes() in whole
 
@@ -389,7 +421,7 @@ def test_a_kill_at_any_time_leaves_one_file_or_the_other(folder: Path) -> None:
 # rule and schema
 
 
-def test_rule_lists_and_explains(tmp_path: Path) -> None:
+def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     listed = busplan("rule", cwd=tmp_path)
     assert listed.returncode == 0
     codes = re.findall(r"^(BP\d+) ", listed.stdout, re.MULTILINE)
@@ -408,18 +440,18 @@ def test_rule_lists_and_explains(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("code", ["BP999", "", "110"])
-def test_an_unknown_rule_is_exit_2(tmp_path: Path, code: str) -> None:
+def test_an_unknown_rule_is_exit_2(busplan: Busplan, tmp_path: Path, code: str) -> None:
     run = busplan("rule", code, cwd=tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
     assert "no such rule; there are BP001, " in run.stderr
 
 
-def test_the_file_rules_do_not_promise_a_suppression(tmp_path: Path) -> None:
+def test_the_file_rules_do_not_promise_a_suppression(busplan: Busplan, tmp_path: Path) -> None:
     assert "cannot be suppressed" in busplan("rule", "BP001", cwd=tmp_path).stdout
     assert "# busplan: ignore" not in busplan("rule", "BP005", cwd=tmp_path).stdout
 
 
-def test_the_committed_schema_is_what_the_program_prints(tmp_path: Path) -> None:
+def test_the_committed_schema_is_what_the_program_prints(busplan: Busplan, tmp_path: Path) -> None:
     run = busplan("schema", cwd=tmp_path)
     assert run.returncode == 0
     assert run.stdout == (ROOT / "profiles" / "busplan.schema.json").read_text(encoding="utf-8"), (
@@ -433,7 +465,7 @@ def test_shipped_profiles_name_their_schema_and_are_clean() -> None:
     for path in profiles:
         with path.open(encoding="utf-8") as file:
             assert file.readline() == "#:schema ./busplan.schema.json\n"
-    run = busplan("check", "profiles", "--fail-on", "warning", "--jobs", "2", cwd=ROOT)
+    run = process("check", "profiles", "--fail-on", "warning", "--jobs", "2", cwd=ROOT)
     assert (run.returncode, run.stdout) == (0, ""), run.stdout
     assert run.stderr == f"checked {len(profiles)} profiles: 0 errors, 0 warnings\n"
 
@@ -443,7 +475,7 @@ def test_shipped_profiles_name_their_schema_and_are_clean() -> None:
 
 def completed(line: str, *, cwd: Path) -> list[str]:
     words = str(len(line.split(" ")) - 1)
-    run = busplan(cwd=cwd, _BUSPLAN_COMPLETE="complete_bash", COMP_WORDS=line, COMP_CWORD=words)
+    run = process(cwd=cwd, _BUSPLAN_COMPLETE="complete_bash", COMP_WORDS=line, COMP_CWORD=words)
     assert run.returncode == 0, run.stderr
     return run.stdout.split()
 
@@ -463,7 +495,7 @@ def test_completion_of_names_codes_and_values(tmp_path: Path) -> None:
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
 def test_completion_in_other_shells(tmp_path: Path, shell: str) -> None:
     for line, word in (("busplan check paper-1", "paper-1ms"), ("busplan rule BP11", "BP112")):
-        run = busplan(
+        run = process(
             cwd=tmp_path,
             _BUSPLAN_COMPLETE=f"complete_{shell}",
             _TYPER_COMPLETE_ARGS=line,

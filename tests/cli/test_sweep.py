@@ -1,4 +1,4 @@
-"""`busplan sweep` as a process: documents, files, interruption, refusals."""
+"""`busplan sweep` through the command line: documents, files, interruption, refusals."""
 
 import csv
 import json
@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +17,10 @@ import pytest
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "FORCE_COLOR"}
 
 
-def busplan(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+def process(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "busplan", *arguments],
         capture_output=True,
@@ -28,7 +32,7 @@ def busplan(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(tmp_path: Path) -> None:
+def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(busplan: Run, tmp_path: Path) -> None:
     run = busplan("sweep", "paper-4ms", "--vary", "bus.nodes=2:3", "--format", "csv", cwd=tmp_path)
     assert (run.returncode, run.stderr.count("\n")) == (0, 1)
     rows = list(csv.reader(run.stdout.splitlines()))
@@ -39,7 +43,7 @@ def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(tmp_path: 
     assert rows[3:] == [["3", *row[1:]] for row in own[1:]]
 
 
-def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_rows(tmp_path: Path) -> None:
+def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_rows(busplan: Run, tmp_path: Path) -> None:
     grid = ["--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3"]
     for name in ("rows.csv", "rows.json", "rows.jsonl", "rows.npz"):
         run = busplan("sweep", "paper-4ms", *grid, "-o", name, cwd=tmp_path)
@@ -65,7 +69,7 @@ def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_row
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.csv", "rows.json", "rows.jsonl", "rows.npz"]
 
 
-def test_the_table_shows_the_top_rows_and_how_many_fit(tmp_path: Path) -> None:
+def test_the_table_shows_the_top_rows_and_how_many_fit(busplan: Run, tmp_path: Path) -> None:
     run = busplan(
         "sweep", "paper-4ms", "--vary", "bus.nodes=1:16", "--sort", "margin_us:asc", "--top", "2", "--timing",
         "standard", cwd=tmp_path,
@@ -133,7 +137,7 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
 def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: Path) -> None:
     grid = ["--vary", "cycle.period_us=500,4000", "--vary", "circle.feed_mm_per_min=15000", "--circle"]
     shortened = ["--vary", "circle.radius_mm=20", *grid, "--format", "jsonl"]
-    alone, together = (busplan("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path) for jobs in ("1", "2"))
+    alone, together = (process("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path) for jobs in ("1", "2"))
     assert (alone.returncode, together.returncode) == (0, 0), alone.stderr + together.stderr
     assert alone.stdout == together.stdout
     _, *rows = [json.loads(line) for line in alone.stdout.splitlines()]
@@ -145,7 +149,7 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: P
     ]
     # What does not fit is not simulated, and does not pass.
     assert (rows[1]["max_contour_error_mm"], rows[1]["passed"]) == (None, False)
-    single = busplan("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
+    single = process("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
     (result,) = json.loads(single.stdout)["results"]
     for name in (
         "mean_contour_error_mm",
@@ -162,7 +166,7 @@ def test_figures_are_drawn(grid: list[str], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     varied = [part for spec in grid for part in ("--vary", spec)]
     first, second = (
-        busplan("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
+        process("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
     )
     assert (first.returncode, first.stderr, second.returncode) == (0, "wrote f.svg\n", 0)
     assert (tmp_path / "f.svg").read_bytes().startswith(b"<?xml")
@@ -193,7 +197,7 @@ REFUSALS = {
 
 
 @pytest.mark.parametrize("line", REFUSALS)
-def test_refusals(line: str, tmp_path: Path) -> None:
+def test_refusals(busplan: Run, line: str, tmp_path: Path) -> None:
     run = busplan("sweep", "paper-4ms", *line.split(), cwd=tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
 

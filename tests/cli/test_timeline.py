@@ -1,4 +1,4 @@
-"""`busplan timeline` as a process: contract, options together, files, errors."""
+"""`busplan timeline` through the command line: contract, options together, files, errors."""
 
 import csv
 import fcntl
@@ -10,26 +10,16 @@ import struct
 import subprocess
 import sys
 import termios
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
-
-def busplan(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    environment = {key: value for key, value in os.environ.items() if key not in ("FORCE_COLOR", "COLUMNS")}
-    return subprocess.run(
-        [sys.executable, "-m", "busplan", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        env=environment,
-        check=False,
-        timeout=60,
-    )
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
-def test_json_holds_the_contract_and_agrees_with_capacity(tmp_path: Path) -> None:
+def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path: Path) -> None:
     options = ("--nodes", 7, "--gap-count", "optimal", "--period", "2ms")
     run = busplan("timeline", "paper-1ms", *options, "--timing", "standard", "--format", "json", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
@@ -49,7 +39,7 @@ def test_json_holds_the_contract_and_agrees_with_capacity(tmp_path: Path) -> Non
     assert document["events"][-1]["end_us"] == figures["available_us"]
 
 
-def test_the_deciding_model_is_the_default_and_csv_has_the_same_events(tmp_path: Path) -> None:
+def test_the_deciding_model_is_the_default_and_csv_has_the_same_events(busplan: Run, tmp_path: Path) -> None:
     run = busplan("timeline", "paper-4ms", "--format", "csv", "--from", "0.1ms", "--to", "150us", cwd=tmp_path)
     rows = list(csv.DictReader(io.StringIO(run.stdout)))
     assert {row["timing_model"] for row in rows} == {"paper"}
@@ -57,7 +47,7 @@ def test_the_deciding_model_is_the_default_and_csv_has_the_same_events(tmp_path:
     assert all(one["end_us"] == other["start_us"] for one, other in pairwise(rows))
 
 
-def test_every_form_goes_to_a_file_by_its_name(tmp_path: Path) -> None:
+def test_every_form_goes_to_a_file_by_its_name(busplan: Run, tmp_path: Path) -> None:
     begins = {
         "a.svg": b"<svg ",
         "a.png": b"\x89PNG",
@@ -73,12 +63,12 @@ def test_every_form_goes_to_a_file_by_its_name(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(begins)
 
 
-def test_a_form_may_be_named_whatever_the_file_is_called(tmp_path: Path) -> None:
+def test_a_form_may_be_named_whatever_the_file_is_called(busplan: Run, tmp_path: Path) -> None:
     assert busplan("timeline", "paper-4ms", "-o", "cycle", "--format", "mermaid", cwd=tmp_path).returncode == 0
     assert (tmp_path / "cycle").read_text(encoding="utf-8").startswith("gantt\n")
 
 
-def test_an_overrun_is_a_report_and_exits_0(tmp_path: Path) -> None:
+def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> None:
     run = busplan("timeline", "paper-4ms", "--period", "300us", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
     assert "does not fit, 55.917 us short" in run.stdout
@@ -102,7 +92,9 @@ def test_an_overrun_is_a_report_and_exits_0(tmp_path: Path) -> None:
         (["--timing", "both"], "both"),
     ],
 )
-def test_what_cannot_be_done_is_said_and_leaves_nothing(tmp_path: Path, arguments: list[str], message: str) -> None:
+def test_what_cannot_be_done_is_said_and_leaves_nothing(
+    busplan: Run, tmp_path: Path, arguments: list[str], message: str
+) -> None:
     run = busplan("timeline", "paper-4ms", *arguments, cwd=tmp_path)
     assert run.returncode == 2
     assert message in run.stderr
