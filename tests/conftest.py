@@ -9,6 +9,9 @@ import pytest
 
 Git = Callable[..., bytes]
 
+# Hundreds of runs of the program compile its modules once, as those of a user do, and not in each run again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 
 @pytest.fixture
 def git(tmp_path: Path) -> Git:

@@ -1,4 +1,4 @@
-"""`busplan check`, `rule` and `schema` through the command line: exit codes, streams, files, and what other programs read."""
+"""`busplan check`, `rule` and `schema` as they are typed: exit codes, streams, files, and what other programs read."""
 
 import json
 import os
