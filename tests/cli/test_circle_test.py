@@ -1,4 +1,4 @@
-"""`busplan circle-test` as a process: exit codes, documents, files."""
+"""`busplan circle-test` as it is typed: exit codes, documents, files."""
 
 import csv
 import json
@@ -7,12 +7,15 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from busplan.cli.output import new_file
 from busplan.errors import BusplanError
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 QUICK = """
 schema_version = 1
@@ -49,19 +52,18 @@ def profile(tmp_path: Path) -> Path:
     return path
 
 
-def busplan(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "busplan", "circle-test", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        timeout=60,
-    )
+@pytest.fixture
+def circle_test(busplan: Run) -> Run:
+    """Ask for a circle test, in this process."""
+
+    def call(*arguments: object, cwd: Path) -> "subprocess.CompletedProcess[str]":
+        return busplan("circle-test", *arguments, cwd=cwd)
+
+    return call
 
 
-def test_json_holds_the_contract(profile: Path) -> None:
-    run = busplan(
+def test_json_holds_the_contract(circle_test: Run, profile: Path) -> None:
+    run = circle_test(
         profile, "--format", "json", "--contributions", "--period", "2ms", "--period", "4ms", cwd=profile.parent
     )
     assert (run.returncode, run.stderr) == (0, "")
@@ -93,53 +95,53 @@ def test_json_holds_the_contract(profile: Path) -> None:
         assert all(set(one) >= {"source", "max_contour_error_mm", "removed_mm"} for one in result["contributions"])
 
 
-def test_without_contributions_the_key_is_not_there(profile: Path) -> None:
-    run = busplan(profile, "--format", "json", cwd=profile.parent)
+def test_without_contributions_the_key_is_not_there(circle_test: Run, profile: Path) -> None:
+    run = circle_test(profile, "--format", "json", cwd=profile.parent)
     assert "contributions" not in json.loads(run.stdout)["results"][0]
 
 
-def test_csv_has_the_same_figures_as_json(profile: Path) -> None:
-    rows = list(csv.DictReader(busplan(profile, "--format", "csv", cwd=profile.parent).stdout.splitlines()))
-    (result,) = json.loads(busplan(profile, "--format", "json", cwd=profile.parent).stdout)["results"]
+def test_csv_has_the_same_figures_as_json(circle_test: Run, profile: Path) -> None:
+    rows = list(csv.DictReader(circle_test(profile, "--format", "csv", cwd=profile.parent).stdout.splitlines()))
+    (result,) = json.loads(circle_test(profile, "--format", "json", cwd=profile.parent).stdout)["results"]
     assert len(rows) == 1
     assert float(rows[0]["max_contour_error_mm"]) == result["max_contour_error_mm"]
     assert float(rows[0]["centre_offset_x_mm"]) == result["centre_offset_mm"][0]
     assert rows[0]["passed"] == "true"
 
 
-def test_a_missed_tolerance_is_exit_1_with_its_size_and_what_to_attack(profile: Path) -> None:
+def test_a_missed_tolerance_is_exit_1_with_its_size_and_what_to_attack(circle_test: Run, profile: Path) -> None:
     profile.write_text(QUICK + "[tolerance]\nmax_contour_error_mm = 0.001\n", encoding="utf-8")
-    run = busplan(profile, cwd=profile.parent)
+    run = circle_test(profile, cwd=profile.parent)
     assert run.returncode == 1
     assert "FAILED, the largest contour error of " in run.stdout
     assert " um over its 1 um" in run.stdout
     assert "Attack velocity_feedforward first" in run.stdout
 
 
-def test_a_cycle_that_does_not_fit_is_exit_1_without_figures(profile: Path) -> None:
-    run = busplan(profile, "--period", "100us", "--format", "json", cwd=profile.parent)
+def test_a_cycle_that_does_not_fit_is_exit_1_without_figures(circle_test: Run, profile: Path) -> None:
+    run = circle_test(profile, "--period", "100us", "--format", "json", cwd=profile.parent)
     assert run.returncode == 1
     (result,) = json.loads(run.stdout)["results"]
     assert [failure["name"] for failure in result["failures"]] == ["required_us"]
     assert result["max_contour_error_mm"] is None
-    table = busplan(profile, "--period", "100us", cwd=profile.parent)
+    table = circle_test(profile, "--period", "100us", cwd=profile.parent)
     assert table.returncode == 1
     assert "the cycle does not fit the bus" in table.stdout
 
 
-def test_an_unstable_loop_is_exit_1_and_never_nan(profile: Path) -> None:
+def test_an_unstable_loop_is_exit_1_and_never_nan(circle_test: Run, profile: Path) -> None:
     profile.write_text(QUICK.replace("position_gain_per_s = 50", "position_gain_per_s = 30000"), encoding="utf-8")
-    run = busplan(profile, "--format", "json", cwd=profile.parent)
+    run = circle_test(profile, "--format", "json", cwd=profile.parent)
     assert run.returncode == 1
     assert "NaN" not in run.stdout
     assert "Infinity" not in run.stdout
     (result,) = json.loads(run.stdout)["results"]
     assert (result["stable"], result["failures"][0]["name"]) == (False, "stability")
-    assert "the position loop is unstable" in busplan(profile, cwd=profile.parent).stdout
+    assert "the position loop is unstable" in circle_test(profile, cwd=profile.parent).stdout
 
 
-def test_trace_has_every_nth_step_of_each_period(profile: Path) -> None:
-    run = busplan(
+def test_trace_has_every_nth_step_of_each_period(circle_test: Run, profile: Path) -> None:
+    run = circle_test(
         profile, "--period", "2ms", "--period", "4ms", "--trace", "t.csv", "--every", "100", cwd=profile.parent
     )
     assert (run.returncode, run.stderr) == (0, "wrote t.csv\n")
@@ -162,15 +164,15 @@ def test_trace_has_every_nth_step_of_each_period(profile: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "magic"), [("c.png", b"\x89PNG"), ("c.svg", b"<?xml"), ("c.pdf", b"%PDF")])
-def test_plots_in_three_formats(profile: Path, name: str, magic: bytes) -> None:
-    run = busplan(profile, "--plot", name, cwd=profile.parent)
+def test_plots_in_three_formats(circle_test: Run, profile: Path, name: str, magic: bytes) -> None:
+    run = circle_test(profile, "--plot", name, cwd=profile.parent)
     assert (run.returncode, run.stderr) == (0, f"wrote {name}\n")
     assert (profile.parent / name).read_bytes().startswith(magic)
 
 
-def test_the_same_test_draws_the_same_svg(profile: Path) -> None:
+def test_the_same_test_draws_the_same_svg(circle_test: Run, profile: Path) -> None:
     for name in ("a.svg", "b.svg"):
-        busplan(profile, "--plot", name, cwd=profile.parent)
+        circle_test(profile, "--plot", name, cwd=profile.parent)
     assert (profile.parent / "a.svg").read_bytes() == (profile.parent / "b.svg").read_bytes()
 
 
@@ -193,8 +195,10 @@ def test_the_same_test_draws_the_same_svg(profile: Path) -> None:
         (["--period", "2050us"], "step_us = 100"),
     ],
 )
-def test_bad_input_is_exit_2_with_one_message_and_no_file(profile: Path, arguments: list[str], message: str) -> None:
-    run = busplan(profile, *arguments, cwd=profile.parent)
+def test_bad_input_is_exit_2_with_one_message_and_no_file(
+    circle_test: Run, profile: Path, arguments: list[str], message: str
+) -> None:
+    run = circle_test(profile, *arguments, cwd=profile.parent)
     assert run.returncode == 2
     assert run.stdout == ""
     assert message in run.stderr
@@ -202,10 +206,10 @@ def test_bad_input_is_exit_2_with_one_message_and_no_file(profile: Path, argumen
     assert [path.name for path in profile.parent.iterdir()] == ["quick.toml"]
 
 
-def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(profile: Path) -> None:
+def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(circle_test: Run, profile: Path) -> None:
     old = profile.parent / "c.png"
     old.write_bytes(b"old")
-    run = busplan(profile, "--plot", "c.png", "--period", "100us", "--format", "json", cwd=profile.parent)
+    run = circle_test(profile, "--plot", "c.png", "--period", "100us", "--format", "json", cwd=profile.parent)
     assert run.returncode == 1
     assert "nothing to draw" in run.stderr
     assert "wrote" not in run.stderr
@@ -214,9 +218,9 @@ def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(profile: Pat
     assert len(list(profile.parent.iterdir())) == 2
 
 
-def test_trace_and_plot_in_one_file_are_refused(profile: Path) -> None:
+def test_trace_and_plot_in_one_file_are_refused(circle_test: Run, profile: Path) -> None:
     (profile.parent / "link.svg").symlink_to("c.svg")
-    run = busplan(profile, "--trace", "c.svg", "--plot", "link.svg", cwd=profile.parent)
+    run = circle_test(profile, "--trace", "c.svg", "--plot", "link.svg", cwd=profile.parent)
     assert run.returncode == 2
     assert "the same file" in run.stderr
 
@@ -263,30 +267,30 @@ def test_a_broken_matplotlib_is_said_before_the_simulation(profile: Path) -> Non
     assert not (profile.parent / "c.png").exists()
 
 
-def test_rounding_is_shown_as_nothing(profile: Path) -> None:
+def test_rounding_is_shown_as_nothing(circle_test: Run, profile: Path) -> None:
     # Ideal but for a scale: all errors are on one side, and the other end of the plot is rounding.
     text = QUICK.replace("velocity_feedforward = 0", "velocity_feedforward = 1") + "[mechanics]\nbacklash_mm = 0.0\n"
     profile.write_text(text, encoding="utf-8")
-    run = busplan(profile, cwd=profile.parent)
+    run = circle_test(profile, cwd=profile.parent)
     assert not re.search(r"e-\d\d|[+-]0\.0\b", run.stdout)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_is_said_before_the_simulation(profile: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_said_before_the_simulation(circle_test: Run, profile: Path) -> None:
     profile.parent.chmod(0o500)
-    run = busplan(profile, "--plot", "c.png", cwd=profile.parent)
+    run = circle_test(profile, "--plot", "c.png", cwd=profile.parent)
     profile.parent.chmod(0o700)
     assert run.returncode == 2
     assert "cannot be written" in run.stderr
 
 
-def test_options_override_the_profile(profile: Path) -> None:
-    run = busplan(profile, "--feed", "1500", "--radius", "50", "--format", "json", cwd=profile.parent)
+def test_options_override_the_profile(circle_test: Run, profile: Path) -> None:
+    run = circle_test(profile, "--feed", "1500", "--radius", "50", "--format", "json", cwd=profile.parent)
     (result,) = json.loads(run.stdout)["results"]
     assert (result["feed_mm_per_min"], result["radius_mm"]) == (1500, 50)
 
 
-def test_plain_python_without_numba_gives_the_same_answer(profile: Path) -> None:
+def test_plain_python_without_numba_gives_the_same_answer(circle_test: Run, profile: Path) -> None:
     code = """
 import importlib.util, sys
 sys.modules["numba"] = None
@@ -302,6 +306,6 @@ main()
         check=False,
     )
     assert plain.stderr == ""
-    fast = busplan(profile, "--format", "json", cwd=profile.parent)
+    fast = circle_test(profile, "--format", "json", cwd=profile.parent)
     first, second = (json.loads(run.stdout)["results"][0] for run in (plain, fast))
     assert first["max_contour_error_mm"] == pytest.approx(second["max_contour_error_mm"], abs=1e-9)
