@@ -165,7 +165,7 @@ def test_the_circle_is_not_run_where_the_bus_does_not_fit(make: Make) -> None:
 
 def test_a_limit_of_the_standard_is_named_where_no_value_helps(make: Make) -> None:
     result = plan(make(), wanted={"bus.nodes": 20})
-    assert ("smallest period", "the bus's limit of hops is broken", True) in result.impossible
+    assert ("smallest period", "the standard's limit of hops is broken", True) in result.impossible
     assert result.recommended is not None
     assert "bus.max_hops" in result.recommended.changes
     assert plan(make(bus__max_hops=4), wanted={"bus.nodes": 63}).recommended is None

@@ -79,8 +79,8 @@ HEADLINES = {
     "capacity": "<CapacityAnswer: paper-1ms at 1 ms: fits, 294.083 us to spare, 41.2% of 500.000 us used (paper model; "
     "standard agrees).>",
     "circle_test": "<CircleTestAnswer: paper-1ms at 1 ms and 10000 mm/min: the circle holds every tolerance.>",
-    "plan": "<PlanAnswer: paper-1ms with 2 nodes (8 axes) at 1 ms: nothing to change; it fits every timing model with "
-    "179.601 us to spare in the tightest and passes the circle.>",
+    "plan": "<PlanAnswer: paper-1ms with 2 nodes (8 axes) at 1 ms: nothing to change; it fits both timing models with "
+    "179.601 us to spare in the tighter one and passes the circle.>",
     "timeline": "<TimelineAnswer: paper-1ms at 1 ms: fits, 294.083 us to spare, 41.2% of 500.000 us used (paper "
     "model).>",
     "check": "<CheckAnswer: checked 1 profile: 0 errors, 0 warnings>",

@@ -38,7 +38,7 @@ def text(profile: Profile, circle: Callable[[Profile], tuple[str, ...]] | None =
 def test_the_first_line_says_what_to_set(paper: Profile) -> None:
     first = text(paper, wanted={"bus.nodes": 4}).splitlines()[0]
     assert first.startswith("paper-1ms with 4 nodes (16 axes) at 1 ms: set bus.gap_count = 10; then it fits every")
-    assert first.endswith("with 85.058 us to spare in the tightest.")
+    assert first.endswith("with 85.058 us to spare in the tighter one.")
     assert ": nothing to change; it fits every" in text(load("paper-optimal-gap").profile).splitlines()[0]
     assert "and passes the circle." in text(paper, circle=lambda _: ()).splitlines()[0]
 
@@ -58,7 +58,7 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
 
     lines = text(paper, circle=circle, max_circles=3).splitlines()
     (recommended,) = (line for line in lines if line.startswith("*") and "recommended." not in line)
-    assert recommended.startswith("*?  cheapest that meets every model")
+    assert recommended.startswith("*?  cheapest that meets both models")
     assert any(line.startswith("?   smallest period") for line in lines)
     assert any("not proven" in line for line in lines)
     (proven,) = (line for line in text(paper).splitlines() if line.startswith("*  "))

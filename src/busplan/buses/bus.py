@@ -219,6 +219,8 @@ class Bus(ABC):
     """Rows of the table of `latency`; without them its terms."""
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
+    limits_of: ClassVar[str] = "bus"
+    """Who sets them, as a message says it."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""

@@ -47,10 +47,18 @@ def goal_words(profile: Profile) -> str:
     return f"{profile.name} with {plural(nodes, 'node')} ({plural(nodes * profile.node.axes, 'axis')})"
 
 
+_OF_MODELS: Final = (
+    ("", ""),
+    (" both timing models", " in the tighter one"),
+    (" every timing model", " in the tightest one"),
+)
+"""What fits, and in which there is least to spare: of one timing model, of two and of more."""
+
+
 def _headline(plan: Plan, *, with_circle: bool) -> Line:
     option, circle = plan.recommended, " and passes the circle" if with_circle else ""
     subject = f"{goal_words(plan.goal)} at {period(plan.goal.cycle.period_us)}"
-    models = " every timing model" if len(bus_of(plan.goal).timing_models) > 1 else ""
+    models, tighter = _OF_MODELS[min(len(bus_of(plan.goal).timing_models), len(_OF_MODELS)) - 1]
     if option is None:
         why = _why_none(plan)
         bus = bus_of(plan.goal)
@@ -61,7 +69,6 @@ def _headline(plan: Plan, *, with_circle: bool) -> Line:
             "bad",
         )
     spare = min(one.margin_us for one in (option.deciding, *option.others))
-    tighter = " in the tightest" if option.others else ""
     result = f"fits{models} with {us(spare)} us to spare{tighter}{circle}"
     if not option.changes:
         return Line(f"{subject}: nothing to change; it {result}.", "good")

@@ -144,7 +144,7 @@ def _no_advice(verdict: Verdict, profile: Profile) -> Line:
         return Line(f"No change of {listed(changeable(profile, structure=False), 'or')} alone carries more nodes.")
     limit = bus.limit(figures.limited_by)
     most = "" if limit is None else f"{limit.most(network_of(profile)):g} {limit.key}"
-    return Line(f"No setting carries more nodes: {most} are the limit of the bus.")
+    return Line(f"No setting carries more nodes: {most} are the {bus.limits_of}'s limit.")
 
 
 def _setting(key: str, value: object, meanings: Mapping[str, str]) -> str:

@@ -163,8 +163,8 @@ def _differing(profile: Profile, changes: Changes) -> Changes:
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
 
 
-_CHEAPEST: Final = ("cheapest that fits", "cheapest that meets every model")
-"""Title of the recommendation where it is none of the other options, for one timing model and for several."""
+_CHEAPEST: Final = ("cheapest that fits", "cheapest that meets both models", "cheapest that meets every model")
+"""Title of the recommendation where it is none of the other options, for one timing model, for two and for more."""
 
 
 class _Planner:
@@ -226,7 +226,8 @@ class _Planner:
                     continue
                 changes["cycle.period_us"] = found.period_us
                 bounded_by, proven = found.bounded_by, found.proven
-            option = self.option(_CHEAPEST[len(self.models) > 1], changes, bounded_by=bounded_by, proven=proven)
+            title = _CHEAPEST[min(len(self.models), len(_CHEAPEST)) - 1]
+            option = self.option(title, changes, bounded_by=bounded_by, proven=proven)
             if option.is_plan:
                 return option._replace(recommended=True)
         return None
@@ -251,7 +252,7 @@ class _Planner:
         """An option, unless it still does not fit."""
         broken = broken_limits(override(self.goal, dict(changes)))
         if broken:
-            return Impossible(title, f"the bus's limit of {' and '.join(broken)} is broken")
+            return Impossible(title, f"the {bus_of(self.goal).limits_of}'s limit of {' and '.join(broken)} is broken")
         return self.option(title, changes, bounded_by=bounded_by, proven=proven)
 
     def period(self, title: str, changes: Changes) -> Option | Impossible:

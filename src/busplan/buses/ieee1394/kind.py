@@ -57,6 +57,7 @@ class Ieee1394(Bus):
     no_safe_setting = "No gap count is known to be safe for cables of this length."
     safety_figure = figures.GAP_COUNT_SAFE
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
+    limits_of = "standard"
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     event_kinds = (
         EventKind("sync", "synchronous packet", figures.SYNC.reference, "S", "sync"),
