@@ -37,9 +37,9 @@ def text(profile: Profile, circle: Callable[[Profile], tuple[str, ...]] | None =
 
 def test_the_first_line_says_what_to_set(paper: Profile) -> None:
     first = text(paper, wanted={"bus.nodes": 4}).splitlines()[0]
-    assert first.startswith("paper-1ms with 4 nodes (16 axes) at 1 ms: set bus.gap_count = 10; then it fits every")
+    assert first.startswith("paper-1ms with 4 nodes (16 axes) at 1 ms: set bus.gap_count = 10; then it fits both")
     assert first.endswith("with 85.058 us to spare in the tighter one.")
-    assert ": nothing to change; it fits every" in text(load("paper-optimal-gap").profile).splitlines()[0]
+    assert ": nothing to change; it fits both" in text(load("paper-optimal-gap").profile).splitlines()[0]
     assert "and passes the circle." in text(paper, circle=lambda _: ()).splitlines()[0]
 
 
