@@ -14,6 +14,7 @@ from unittest import mock
 import pytest
 from typer.main import get_command
 
+from busplan.analysis.planning.best_values import MAX_CIRCLES
 from busplan.cli import app
 from busplan.cli.help import FAILURES
 from busplan.cli.lazy import COMMANDS
@@ -187,3 +188,8 @@ def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str,
     assert len(offers) == len(flags)
     if shell == "fish":
         assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)
+
+
+def test_the_most_circles_of_a_plan_are_those_of_its_search() -> None:
+    (param,) = (one for one in context("plan").command.params if one.name == "max_circles")
+    assert param.default == MAX_CIRCLES
