@@ -47,7 +47,7 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     >>> import busplan
     >>> busplan.load_profile("paper-4ms").cycle.period_us
     4000.0
-    >>> busplan.load_profile("paper-4ms", changes={"bus.nodes": 3, "bus.max_hops": 2}).bus.nodes
+    >>> busplan.load_profile("paper-4ms", changes={"bus.nodes": 3, "cycle.nonperiodic_us": 2}).bus.nodes
     3
     """
     if not isinstance(changes, Mapping | None):

@@ -63,9 +63,9 @@ def diff_command(
 
     First the keys whose values differ, defaults applied; then the figures of capacity, latency and circle-test for
     both, with B - A, its share of A, and whether B is better, worse, the same or neutral: what describes the plan
-    (period, nodes, gap count, time available, largest term) is neutral. Times are in us, contour errors in um in the
-    table and in mm in JSON. Exits 0 whatever the figures are; with --fail-on-regression 1 when the report calls any
-    figure worse, under either timing model whichever decides, or of the circle; --timing and --no-circle leave some
+    (period, nodes, how the bus is set, time available, largest term) is neutral. Times are in us, contour errors in um
+    in the table and in mm in JSON. Exits 0 whatever the figures are; with --fail-on-regression 1 when the report calls
+    any figure worse, under either timing model whichever decides, or of the circle; --timing and --no-circle leave some
     out, but never whether B fits as its own timing_model decides. A circle that cannot be run is not passed.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression

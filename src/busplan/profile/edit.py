@@ -25,7 +25,7 @@ def edited(document: Document, changes: Mapping[str, object], *, notes: Mapping[
     document
         A valid profile; its line ends may be LF or CRLF.
     changes
-        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "bus.max_hops": None}. A value
+        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "node.axes": None}. A value
         is a boolean, an int, a float, a text, or a sequence of them; one that is equal already stays as written.
         A key or table that is not there yet is added: keys behind the last one of their table, tables at the end.
     notes
@@ -47,10 +47,10 @@ def edited(document: Document, changes: Mapping[str, object], *, notes: Mapping[
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> text = edited(load("paper-4ms").document, {"bus.nodes": 16, "bus.max_hops": 3})
-    >>> print(*(line for line in text.splitlines() if line.startswith(("nodes", "max_hops"))), sep="\n")
+    >>> text = edited(load("paper-4ms").document, {"bus.nodes": 16, "limits.min_spare_nodes": 3})
+    >>> print(*(line for line in text.splitlines() if line.startswith(("nodes", "min_spare"))), sep="\n")
     nodes = 16                 # distributed nodes, host not counted
-    max_hops = 3
+    min_spare_nodes = 3
     """
     text, wanted = document.text, document.data()
     # What is set goes before what is removed, so that no table is ever without keys in between.

@@ -31,7 +31,7 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
     --------
     >>> from busplan.profile.shipped import load
     >>> keys = dotted_keys(load("paper-4ms").profile)
-    >>> keys["bus.nodes"], keys["bus.max_hops"].source
+    >>> keys["bus.nodes"], keys["servo.y.drive_lag_us"].source
     (KeyValue(value=2, source='file'), 'default')
     """
     said = dict(_flat(profile.model_dump(exclude_unset=True)))
