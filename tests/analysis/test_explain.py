@@ -21,13 +21,13 @@ from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.derivation.verdict import VERDICT_KEYS
 from busplan.analysis.latency import latency
 from busplan.analysis.register import figures_of
+from busplan.answers.documents import capacity_document, capacity_rows, latency_rows
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
-from busplan.report.documents import capacity_document, capacity_rows, latency_rows
 from busplan.sections.profile import Profile
 
 MODELS = st.sampled_from(["paper", "standard"])

@@ -31,7 +31,7 @@ def test_an_error_or_a_type_loads_no_analysis() -> None:
         "busplan",
         "busplan.errors",
     }
-    assert not loaded("import busplan; busplan.Profile") & {"numpy", "busplan.analysis", "busplan.report"}
+    assert not loaded("import busplan; busplan.Profile") & {"numpy", "busplan.analysis", "busplan.answers"}
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from busplan.report.json_and_csv import csv_cell
+from busplan.forms.json_and_csv import csv_cell
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess

@@ -14,10 +14,10 @@ from markdown_it import MarkdownIt
 from typer.main import get_command
 
 from busplan import __version__
+from busplan.answers.manual.pages import Entry, Manual
 from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
 from busplan.cli.tree import manual_of
-from busplan.report.manual.pages import Entry, Manual
 
 Run = Callable[..., CompletedProcess[str]]
 Refused = Callable[..., str]

@@ -260,7 +260,7 @@ def test_what_needs_no_profile_loads_nothing_heavy(run: Run, option: str) -> Non
     loaded = modules(run, option)
     assert "typer" in loaded
     assert not loaded & {"numpy", "pydantic", "rich", "tomllib", "tomli_w", "csv", "json", "matplotlib"}
-    assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.report"))}
+    assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.answers"))}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -268,7 +268,7 @@ def test_the_help_of_a_command_loads_nothing_of_its_work(run: Run, command: str)
     loaded = modules(run, command, "--help")
     # Typer reads the program's own options before a command's, and takes pydantic for it.
     assert not loaded & {"numpy", "rich", "tomllib", "tomli_w", "matplotlib"}
-    assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.report"))}
+    assert not {name for name in loaded if name.startswith(("busplan.profile", "busplan.analysis", "busplan.answers"))}
 
 
 @pytest.mark.parametrize(

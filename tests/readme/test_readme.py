@@ -17,12 +17,12 @@ from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
 from busplan.analysis.latency import latency
+from busplan.answers.documents import capacity_rows, latency_rows
+from busplan.answers.explain import constant_rows, equation_rows
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
+from busplan.forms.markdown import code, table
 from busplan.profile.shipped import load, shipped_names
-from busplan.report.documents import capacity_rows, latency_rows
-from busplan.report.explain import constant_rows, equation_rows
-from busplan.report.markdown import code, table
 from busplan.sections.machine import AxisOverride
 
 ROOT = Path(__file__).resolve().parents[2]

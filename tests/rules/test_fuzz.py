@@ -19,11 +19,11 @@ import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
+from busplan.answers.gate import render
 from busplan.errors import PlacedError
 from busplan.profile import positions
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import decode
-from busplan.report.gate import render
 from busplan.rules.finding import Finding
 from busplan.rules.gate import FileResult, check_document, unreadable
 from busplan.rules.registry import all_rules

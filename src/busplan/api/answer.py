@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from busplan.report.lines import Line, plain_text
+from busplan.forms.lines import Line, plain_text
 
 
 class Answer(ABC):

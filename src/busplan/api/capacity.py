@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from busplan.analysis.capacity import figures as analysis
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict, verdicts
+from busplan.answers import documents
+from busplan.answers.capacity import capacity_lines
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
-from busplan.report import documents
-from busplan.report.capacity import capacity_lines
-from busplan.report.json_and_csv import to_json
-from busplan.report.lines import Line
+from busplan.forms.json_and_csv import to_json
+from busplan.forms.lines import Line
 from busplan.sections.profile import Profile
 
 

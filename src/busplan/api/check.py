@@ -4,12 +4,12 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from busplan.answers.gate import render
+from busplan.answers.gate.plain import summary_line
 from busplan.api.answer import Answer
 from busplan.api.inputs import Path, argument, items
+from busplan.forms.lines import Line
 from busplan.profile.collect import collect
-from busplan.report.gate import render
-from busplan.report.gate.plain import summary_line
-from busplan.report.lines import Line
 from busplan.rules.gate import FileResult, check_source
 from busplan.rules.report import CheckReport, Located, Summary
 

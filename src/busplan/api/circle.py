@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from busplan.analysis.circle import roundness as analysis
 from busplan.analysis.circle.contour_profile import contour_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
+from busplan.answers import documents
+from busplan.answers.circle import PLOT_SECTORS, circle_lines
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, items, load_profile
+from busplan.forms.json_and_csv import to_json
+from busplan.forms.lines import Line
 from busplan.progress import Progress
-from busplan.report import documents
-from busplan.report.circle import PLOT_SECTORS, circle_lines
-from busplan.report.json_and_csv import to_json
-from busplan.report.lines import Line
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
 

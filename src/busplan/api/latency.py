@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from busplan.analysis import latency as analysis
 from busplan.analysis.latency import Transaction
+from busplan.answers import documents
+from busplan.answers.latency import latency_lines
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
-from busplan.report import documents
-from busplan.report.json_and_csv import to_json
-from busplan.report.latency import latency_lines
-from busplan.report.lines import Line, plural
+from busplan.forms.json_and_csv import to_json
+from busplan.forms.lines import Line, plural
 from busplan.sections.profile import Profile
 
 

@@ -6,13 +6,13 @@ from typing import Literal
 from busplan.analysis.planning import options as analysis
 from busplan.analysis.planning.best_values import MAX_CIRCLES
 from busplan.analysis.planning.options import Impossible, Option, Plan
+from busplan.answers.plan import plan_document, plan_lines
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
-from busplan.report.json_and_csv import to_json
-from busplan.report.lines import Line
-from busplan.report.plan import plan_document, plan_lines
+from busplan.forms.json_and_csv import to_json
+from busplan.forms.lines import Line
 from busplan.sections.profile import Profile
 
 

@@ -12,14 +12,14 @@ from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Block, Column
 from busplan.analysis.sweep.circles import MOST_CIRCLES_UNASKED, all_columns, require_circles, run_task, with_circles
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
+from busplan.answers.sweep.rows import json_footer, json_header, json_rows
+from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
 from busplan.errors import BusplanError
+from busplan.forms.json_and_csv import spelled
+from busplan.forms.lines import Line
 from busplan.profile.kinds import words_of
-from busplan.report.json_and_csv import spelled
-from busplan.report.lines import Line
-from busplan.report.sweep.rows import json_footer, json_header, json_rows
-from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
 from busplan.sections.profile import Profile
 
 MOST_POINTS: Final = 2_000_000

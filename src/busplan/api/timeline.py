@@ -5,13 +5,13 @@ from typing import Final
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule, totals, zoom
+from busplan.answers.timeline import timeline_document
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
+from busplan.drawings.timeline.characters import timeline_lines
 from busplan.errors import BusplanError
-from busplan.report.json_and_csv import to_json
-from busplan.report.lines import Line
-from busplan.report.timeline.documents import timeline_document
-from busplan.report.timeline.terminal import timeline_lines
+from busplan.forms.json_and_csv import to_json
+from busplan.forms.lines import Line
 from busplan.sections.profile import Profile
 
 _COLUMNS: Final = 80

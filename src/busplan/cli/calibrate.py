@@ -83,10 +83,10 @@ def calibrate_command(
     if apply:
         require_own_file(profile)
     from busplan.analysis.calibration.calibrate import calibrate
+    from busplan.answers import calibration as report
     from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
     from busplan.profile.shipped import load, locate_measurements
     from busplan.profile.toml import override, read_bytes
-    from busplan.report import calibration as report
 
     loaded = load(profile)
     bench = override(loaded.profile, changes, origin=BUS_OPTIONS)
@@ -108,7 +108,8 @@ def calibrate_command(
     if format_ == "table":
         emit(report.calibration_lines(result, source=name))
         return
-    from busplan.report import documents, json_and_csv
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
 
     emit_document(
         json_and_csv.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))

@@ -40,11 +40,12 @@ def capacity_command(
         timing_models=timing_models(timing, plan),
     )
     if format_ == "table":
-        from busplan.report.capacity import capacity_lines
+        from busplan.answers.capacity import capacity_lines
 
         emit(capacity_lines(result, verdicts(result)))
         return
-    from busplan.report import documents, json_and_csv
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
 
     emit_document(
         json_and_csv.to_json(documents.capacity_document(result, verdicts(result)))

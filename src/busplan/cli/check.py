@@ -102,7 +102,7 @@ def check_command(
     if update_baseline and baseline is not None:
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
-        from busplan.report.gate.plain import summary_line
+        from busplan.answers.gate.plain import summary_line
 
         say(summary_line(report))
     if report.failed:
@@ -174,7 +174,7 @@ def _write(
     format_: Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"],
     output: Path | None,
 ) -> None:
-    from busplan.report.gate import render
+    from busplan.answers.gate import render
 
     text = render(report, file_format=format_)
     if output is None and format_ in {"text", "full"}:

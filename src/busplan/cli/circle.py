@@ -119,7 +119,7 @@ def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
     if all(run is None for run in test.runs):
         file.abandon()
         return
-    from busplan.report.plot import circle_figure
+    from busplan.drawings.circle_plot import circle_figure
 
     file.write(circle_figure(test, file_format=file_format))
 
@@ -132,8 +132,8 @@ def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
 
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
-    from busplan.report.documents import TRACE_COLUMNS, trace_rows
-    from busplan.report.json_and_csv import csv_blocks
+    from busplan.answers.documents import TRACE_COLUMNS, trace_rows
+    from busplan.forms.json_and_csv import csv_blocks
 
     file.writelines(block.encode() for block in csv_blocks(trace_rows(test, every=every), columns=TRACE_COLUMNS))
 
@@ -141,12 +141,13 @@ def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
 def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
     if format_ == "table":
         from busplan.analysis.circle.contour_profile import contour_profile
-        from busplan.report.circle import PLOT_SECTORS, circle_lines
+        from busplan.answers.circle import PLOT_SECTORS, circle_lines
 
         profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in test.runs]
         emit(circle_lines(test, profiles, with_contributions=contributions))
         return
-    from busplan.report import documents, json_and_csv
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
 
     emit_document(
         json_and_csv.to_json(documents.circle_document(test, with_contributions=contributions))

@@ -81,7 +81,7 @@ def diff_command(
     _emit(found, (a, b), format_=format_)
     regressions = found.regressions(tolerance=allowed / 100)
     if fail_on_regression and regressions:
-        from busplan.report.diff import regression_words
+        from busplan.answers.diff import regression_words
 
         say(regression_words(found, regressions, tolerance=allowed))
         raise PlanFailsError
@@ -122,7 +122,8 @@ def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
 
 
 def _emit(found: "Difference", arguments: tuple[str, str], *, format_: str) -> None:
-    from busplan.report import diff, json_and_csv
+    from busplan.answers import diff
+    from busplan.forms import json_and_csv
 
     if format_ == "table":
         emit(diff.diff_lines(found, arguments=arguments))

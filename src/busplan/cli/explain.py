@@ -123,8 +123,8 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
 
 def _list(plan: "Profile", format_: ExplainFormat) -> None:
     from busplan.analysis.derivation.explain import assumptions
-    from busplan.report import explain as report
-    from busplan.report import json_and_csv
+    from busplan.answers import explain as report
+    from busplan.forms import json_and_csv
 
     found = assumptions(plan)
     if format_ == "text":
@@ -136,8 +136,8 @@ def _list(plan: "Profile", format_: ExplainFormat) -> None:
 
 
 def _write(found: "Explanation", format_: ExplainFormat) -> None:
-    from busplan.report import explain as report
-    from busplan.report import json_and_csv
+    from busplan.answers import explain as report
+    from busplan.forms import json_and_csv
 
     found = report.in_words(found)
     if format_ == "text":

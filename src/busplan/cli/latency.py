@@ -51,11 +51,12 @@ def latency_command(
         timing_models=timing_models(timing, plan),
     )
     if format_ == "table":
-        from busplan.report.latency import latency_lines
+        from busplan.answers.latency import latency_lines
 
         emit(latency_lines(result, plan))
         return
-    from busplan.report import documents, json_and_csv
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
 
     emit_document(
         json_and_csv.to_json(documents.latency_document(result))

@@ -35,11 +35,11 @@ def manual_command(
     chosen = form_of_file(format_, output, forms={".1": "man", ".md": "markdown"}, default="markdown")
     manual = manual_of(context.find_root().command)
     if chosen == "man":
-        from busplan.report.manual.man import man_page
+        from busplan.answers.manual.man import man_page
 
         text = man_page(manual)
     else:
-        from busplan.report.manual.markdown import markdown_page
+        from busplan.answers.manual.markdown import markdown_page
 
         text = markdown_page(manual)
     write_document(text, output)

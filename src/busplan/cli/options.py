@@ -245,7 +245,7 @@ def plot_format(path: Path) -> str:
     BusplanError
         Another ending, or nothing to draw with.
     """
-    from busplan.report.plot import PLOT_FORMATS, require_matplotlib
+    from busplan.drawings.circle_plot import PLOT_FORMATS, require_matplotlib
 
     file_format = path.suffix.removeprefix(".").lower()
     if file_format not in PLOT_FORMATS:

@@ -14,7 +14,7 @@ from busplan.cli.interrupt import StoppedError
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.report.lines import Line
+    from busplan.forms.lines import Line
 
 PLAN_FAILS: int = 1
 """Exit code of a plan that does not hold."""
@@ -102,7 +102,7 @@ def write_document(document: str | bytes, output: Path | None, *, quiet: bool = 
 
 def emit(lines: Iterable["Line"]) -> None:
     """Write a report to stdout: with colours on a terminal only, and none under NO_COLOR."""
-    from busplan.report.lines import plain_text
+    from busplan.forms.lines import plain_text
 
     # A pipe gets plain lines, and does not wait for the renderer to load.
     styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()

@@ -23,11 +23,12 @@ def paper_command(format_: FormatOption = "table") -> None:
         circles = [circle_test(load(name).profile, progress=progress).results[0] for name in CIRCLE_PROFILES]
     sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
     if format_ == "table":
-        from busplan.report.paper import paper_lines
+        from busplan.answers.paper import paper_lines
 
         emit(paper_lines(sections))
         return
-    from busplan.report import documents, json_and_csv
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
 
     emit_document(
         json_and_csv.to_json(documents.paper_document(sections))

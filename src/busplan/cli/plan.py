@@ -187,7 +187,7 @@ def _wanted(
 
 def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     """Edit the recommended values into the file."""
-    from busplan.report.plan import settings
+    from busplan.answers.plan import settings
 
     if result.recommended is None:
         return
@@ -205,7 +205,7 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
 
 def _emit(result: "Plan", *, format_: str, with_circle: bool, piped: bool) -> None:
     """Write the report; where standard output takes the profile, as a summary."""
-    from busplan.report import plan as report
+    from busplan.answers import plan as report
 
     if piped:
         say(*(line.text for line in report.plan_lines(result, with_circle=with_circle)))
@@ -213,7 +213,8 @@ def _emit(result: "Plan", *, format_: str, with_circle: bool, piped: bool) -> No
     if format_ == "table":
         emit(report.plan_lines(result, with_circle=with_circle))
         return
-    from busplan.report import documents, json_and_csv
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
 
     emit_document(
         json_and_csv.to_json(report.plan_document(result))

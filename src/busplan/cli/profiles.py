@@ -19,12 +19,13 @@ def profiles_command(
 
     Example: busplan profiles
     """
+    from busplan.answers import documents
+    from busplan.forms import json_and_csv
     from busplan.profile.shipped import load, shipped_names
-    from busplan.report import documents, json_and_csv
 
     rows = documents.profile_rows([load(name).profile for name in shipped_names()])
     if format_ == "table":
-        from busplan.report.profiles import profiles_lines
+        from busplan.answers.profiles import profiles_lines
 
         emit(profiles_lines(rows))
     elif format_ == "json":

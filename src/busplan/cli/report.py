@@ -16,7 +16,7 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.report.page.content import Page
+    from busplan.answers.page.content import Page
     from busplan.sections.profile import Profile
 
 ReportFormat = Literal["html", "markdown"]
@@ -106,7 +106,7 @@ def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, period: str | None, circle: bool
 ) -> "Page":
     from busplan.analysis.all_answers import all_answers
-    from busplan.report.page.chapters import ReportedProfile, page
+    from busplan.answers.page.chapters import ReportedProfile, page
 
     subjects = []
     with progress_bar("circle tests") as progress:
@@ -119,9 +119,9 @@ def _page(
 
 def _written(content: "Page", chosen: ReportFormat) -> str:
     if chosen == "markdown":
-        from busplan.report.page.markdown import page_markdown
+        from busplan.answers.page.markdown import page_markdown
 
         return page_markdown(content)
-    from busplan.report.page.html import page_html
+    from busplan.forms.html import page_html
 
     return page_html(content)

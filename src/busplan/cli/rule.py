@@ -30,8 +30,9 @@ def rule_command(
 
     Example: busplan rule BP110
     """
-    from busplan.report import documents, json_and_csv
-    from busplan.report.rules import rule_page, rule_rows, rule_table
+    from busplan.answers import documents
+    from busplan.answers.rules import rule_page, rule_rows, rule_table
+    from busplan.forms import json_and_csv
     from busplan.rules.registry import all_rules
 
     rules = all_rules()

@@ -11,7 +11,7 @@ def schema_command() -> None:
 
     Example: busplan schema > busplan.schema.json
     """
+    from busplan.forms.json_and_csv import to_json
     from busplan.profile.schema import profile_schema
-    from busplan.report.json_and_csv import to_json
 
     emit_document(to_json(profile_schema()))

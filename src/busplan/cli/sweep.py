@@ -202,7 +202,7 @@ def _columns(
             if name not in known:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
     elif short:
-        from busplan.report.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS
+        from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS
 
         chosen = DEFAULT_COLUMNS + (CIRCLE_COLUMNS if circle else ())
     else:

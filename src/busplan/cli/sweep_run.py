@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.cli.sweep_job import SweepJob
-    from busplan.report.sweep.figure import FigureData
+    from busplan.drawings.sweep_plot import FigureData
 
 _CIRCLES_AT_ONCE: Final = 4
 """Points that each process tests between two looks at signals."""
@@ -37,7 +37,7 @@ def run_sweep(job: "SweepJob") -> None:
         Ctrl-C, SIGTERM, SIGHUP or a lost worker; what was written is valid, and says that it is partial.
     """
     from busplan.analysis.network import bus_of
-    from busplan.report.sweep.top import Tally
+    from busplan.answers.sweep.top import Tally
 
     drawing = _drawing(job)
     if job.jobs is not None:
@@ -91,7 +91,7 @@ def _work(
 def _drawing(job: "SweepJob") -> "FigureData | None":
     if job.plot is None:
         return None
-    from busplan.report.sweep.figure import FigureData, require_drawable
+    from busplan.drawings.sweep_plot import FigureData, require_drawable
 
     require_drawable(job.grid)
     return FigureData(job.grid, figure=job.figure, timing_models=job.timing_models)
@@ -112,7 +112,7 @@ def _require_circles(job: "SweepJob") -> None:
 def _blocks(job: "SweepJob") -> "Iterator[Iterable[Block]]":
     """Blocks of a size that suits what is done with them."""
     from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
-    from busplan.report.sweep.rows import TEXT_POINTS
+    from busplan.answers.sweep.rows import TEXT_POINTS
 
     if job.jobs is None:
         chunk_points = TEXT_POINTS if job.format_ in {"csv", "jsonl", "json"} else CHUNK_POINTS

@@ -10,9 +10,9 @@ from busplan.cli.output import document_bytes, emit, emit_document
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
+    from busplan.answers.sweep.top import Tally
     from busplan.cli.npz import Archive, NpzColumns
     from busplan.cli.sweep_job import SweepJob
-    from busplan.report.sweep.top import Tally
 
 
 class Sink(Protocol):
@@ -63,7 +63,7 @@ class _TableSink:
     """Keeps the rows at the top, for a table at the end."""
 
     def __init__(self, job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> None:
-        from busplan.report.sweep.top import TopRows
+        from busplan.answers.sweep.top import TopRows
 
         self._job, self._file, self._tally = job, file, tally
         self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
@@ -75,7 +75,7 @@ class _TableSink:
         if self._file is None:
             emit(lines)
         else:
-            from busplan.report.lines import plain_text
+            from busplan.forms.lines import plain_text
 
             _write(self._file, plain_text(lines))
 
@@ -84,7 +84,7 @@ class _TextSink:
     """Writes every row as it comes, and each ends itself."""
 
     def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
-        from busplan.report.sweep.rows import csv_header, jsonl_header
+        from busplan.answers.sweep.rows import csv_header, jsonl_header
 
         self._job, self._write = job, write
         if job.format_ == "csv":
@@ -94,7 +94,7 @@ class _TextSink:
 
     def add(self, block: "Block") -> None:
         """Write one more block."""
-        from busplan.report.sweep.rows import block_text
+        from busplan.answers.sweep.rows import block_text
 
         self._write(block_text(block, self._job.columns, style="csv" if self._job.format_ == "csv" else "jsonl"))
 
@@ -106,20 +106,20 @@ class _JsonSink:
     """Writes one document, row by row."""
 
     def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
-        from busplan.report.sweep.rows import json_header
+        from busplan.answers.sweep.rows import json_header
 
         self._columns, self._write = job.columns, write
         write(json_header(job.profile.name, job.grid, job.timing_models))
 
     def add(self, block: "Block") -> None:
         """Write one more block."""
-        from busplan.report.sweep.rows import json_rows
+        from busplan.answers.sweep.rows import json_rows
 
         self._write(json_rows(block, self._columns))
 
     def finish(self, *, complete: bool) -> None:
         """Close the document; one that is not whole says so, and is still JSON."""
-        from busplan.report.sweep.rows import json_footer
+        from busplan.answers.sweep.rows import json_footer
 
         self._write(json_footer(complete=complete))
 
@@ -133,7 +133,7 @@ class _NpzSink:
 
     def finish(self, *, complete: bool) -> None:
         """Write the archive, with what a reader must know of it."""
-        from busplan.report.documents import document
+        from busplan.answers.documents import document
 
         facts = document("sweep", profile=self._job.profile.name, points=self._job.grid.points, complete=complete)
         self._columns.write(self._file, facts)

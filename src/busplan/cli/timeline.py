@@ -146,7 +146,7 @@ def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineForm
     if chosen == "png":
         if output is None:
             refuse_terminal("png")
-        from busplan.report.plot import require_matplotlib
+        from busplan.drawings.circle_plot import require_matplotlib
 
         require_matplotlib("--format png")
     return chosen
@@ -168,11 +168,11 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
 
 def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> None:
     if chosen == "table" and output is None:
-        from busplan.report.timeline.terminal import timeline_lines
+        from busplan.drawings.timeline.characters import timeline_lines
 
         emit(timeline_lines(shown, width=_columns()))
     elif chosen == "png":
-        from busplan.report.timeline.png import timeline_png
+        from busplan.drawings.timeline.png import timeline_png
 
         write_document(timeline_png(shown), output)
     else:
@@ -182,20 +182,20 @@ def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> No
 def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
     """The document in one of the forms that are text."""
     if chosen == "table":
-        from busplan.report.lines import plain_text
-        from busplan.report.timeline.terminal import timeline_lines
+        from busplan.drawings.timeline.characters import timeline_lines
+        from busplan.forms.lines import plain_text
 
         return plain_text(timeline_lines(shown, width=_PIPE_COLUMNS))
     if chosen == "svg":
-        from busplan.report.timeline.svg import timeline_svg
+        from busplan.drawings.timeline.svg import timeline_svg
 
         return timeline_svg(shown)
     if chosen == "mermaid":
-        from busplan.report.timeline.mermaid import timeline_mermaid
+        from busplan.drawings.timeline.mermaid import timeline_mermaid
 
         return timeline_mermaid(shown)
-    from busplan.report import json_and_csv
-    from busplan.report.timeline.documents import timeline_document, timeline_rows
+    from busplan.answers.timeline import timeline_document, timeline_rows
+    from busplan.forms import json_and_csv
 
     return (
         json_and_csv.to_json(timeline_document(shown))

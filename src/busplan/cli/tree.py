@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from busplan import __version__
-from busplan.report.manual.closing import closing_sections
-from busplan.report.manual.pages import CommandPage, Entry, Manual
+from busplan.answers.manual.closing import closing_sections
+from busplan.answers.manual.pages import CommandPage, Entry, Manual
 
 _EXAMPLE = "Example: "
 

@@ -1,0 +1,185 @@
+"""A timeline for the terminal: to scale, in characters that every terminal has."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from busplan.analysis.network import bus_of
+from busplan.analysis.timeline.schedule import Event, Schedule, totals
+from busplan.answers.verdict_sentences import warnings
+from busplan.buses.bus import IDLE
+from busplan.drawings.scale import ticks
+from busplan.drawings.timeline.kinds import kind_of
+from busplan.drawings.timeline.lanes import (
+    Lane,
+    beyond,
+    charged,
+    drawn_window,
+    event_lanes,
+    has_event_lanes,
+    headline,
+    node_lanes,
+    only_owner,
+    overruns,
+    stretches,
+    strip_title,
+)
+from busplan.forms.lines import BLANK, Line, table, us
+
+NARROWEST: Final = 60
+"""Columns below which a drawing would show nothing."""
+_TICK_COLUMNS: Final = 9
+_OVER: Final = "!"
+_WINDOW: Final = "^"
+
+
+def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
+    """Verdict, the whole slice in one strip, the lanes of the window, and what each kind takes of it.
+
+    Parameters
+    ----------
+    plan
+        The schedule, narrowed to its window.
+    width
+        Columns of the terminal.
+    """
+    width = max(width, NARROWEST)
+    window, figures = drawn_window(plan), plan.figures
+    lines = [
+        Line(headline(plan), "good" if figures.fits and figures.safe else "bad"),
+        Line(f"{charged(window)}."),
+        *(Line(warning, "warning") for warning in warnings(plan.profile, nodes=figures.nodes, most=0)),
+        BLANK,
+        *_strip(plan, width=width),
+        BLANK,
+    ]
+    lines.extend(_event_rows(window, width=width) if has_event_lanes(window) else _node_rows(window, width=width))
+    return [*lines, BLANK, *_totals(plan)]
+
+
+def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
+    """The whole slice in one row, transaction by transaction, and what lies beyond it."""
+    parts = stretches(plan.cycle_events)
+    styles = {one.kind: kind_of(plan.profile, one.kind) for one in parts}
+    rows = {"cycle": [(styles[one.kind].mark, one.event) for one in parts]}
+    legend = [f"{style.mark} {style.label}" for style in styles.values()]
+    if overruns(plan):
+        rows["over"] = [(_OVER, beyond(plan))]
+        legend.append(f"{_OVER} beyond the slice")
+    if not plan.is_whole:
+        rows["window"] = [(_WINDOW, plan.cycle_events[0]._replace(start_us=plan.from_us, end_us=plan.to_us))]
+        legend.append(f"{_WINDOW} shown below")
+    gutter = max(map(len, rows))
+    bar = _Bar(0.0, plan.end_us, width - gutter - 3)
+    yield Line(f"{strip_title(plan)}, {bar.per_column}", "heading")
+    for label, row in rows.items():
+        yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "bad" if label == "over" else "table")
+    yield bar.scale(gutter + 2)
+    yield from _wrapped("Legend: ", legend, width=width)
+
+
+def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
+    """A row for each node, every column showing what takes most of it."""
+    lanes = node_lanes(window)
+    gutter = max(len(lane.label) for lane in lanes)
+    bar = _Bar(window.from_us, window.to_us, width - gutter - 3)
+    yield Line(f"{us(window.from_us)} to {us(window.to_us)} us by node, {bar.per_column}", "heading")
+    for lane in lanes:
+        yield Line(f"{lane.label:<{gutter}} |{bar.cells(_marked(window, lane))}|", "table")
+    if overruns(window) and window.to_us > window.figures.available_us:
+        yield Line(f"{'over':<{gutter}} |{bar.cells([(_OVER, beyond(window))])}|", "bad")
+    yield bar.scale(gutter + 2)
+    shown = {event.kind for event in window.events}
+    kinds = (*bus_of(window.profile).event_kinds, IDLE)
+    legend = [f"{kind.mark} {kind.label}" for kind in kinds if kind.key in shown]
+    yield from _wrapped("Legend: ", legend, width=width)
+
+
+def _marked(window: Schedule, lane: Lane) -> list[tuple[str, Event]]:
+    return [(kind_of(window.profile, event.kind).mark, event) for event in lane.events]
+
+
+def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
+    """A row for each event, with how long it takes."""
+    lanes, owner = event_lanes(window), only_owner(window)
+    figures = [us(event.duration_us) for event in window.events]
+    gutter, digits = max(len(lane.label) for lane in lanes), max(map(len, figures))
+    bar = _Bar(window.from_us, window.to_us, max(10, width - gutter - digits - 5))
+    whose = "Events" if owner is None else f"The {owner}"
+    yield Line(f"{whose}, {us(window.from_us)} to {us(window.to_us)} us, {bar.per_column}", "heading")
+    for lane, figure in zip(lanes, figures, strict=True):
+        yield Line(f"{lane.label:<{gutter}}  {figure:>{digits}} |{bar.cells(_marked(window, lane))}|", "table")
+    yield bar.scale(gutter + digits + 4)
+
+
+class _Bar:
+    """A row of columns to scale.
+
+    Parameters
+    ----------
+    from_us, to_us
+        What it spans [us].
+    columns
+        How many columns.
+    """
+
+    def __init__(self, from_us: float, to_us: float, columns: int) -> None:
+        self._from_us, self._to_us, self._columns = from_us, to_us, columns
+        self._column_us = (to_us - from_us) / columns
+
+    @property
+    def per_column(self) -> str:
+        """The scale in words."""
+        return f"{self._column_us:.3g} us a column"
+
+    def _column(self, time_us: float) -> int:
+        return min(self._columns - 1, max(0, int((time_us - self._from_us) / self._column_us)))
+
+    def cells(self, parts: Iterable[tuple[str, Event]]) -> str:
+        """Fill each column with the mark of what takes most of it; nothing that is there is left out of its column."""
+        shares: list[dict[str, float]] = [{} for _ in range(self._columns)]
+        for mark, event in parts:
+            # What only touches a column by the rounding of floats is not in it.
+            least_us = min(self._column_us, event.duration_us) * 1e-6
+            for column in range(self._column(event.start_us), self._column(event.end_us) + 1):
+                start_us = self._from_us + column * self._column_us
+                inside_us = min(event.end_us, start_us + self._column_us) - max(event.start_us, start_us)
+                if inside_us > least_us:
+                    shares[column][mark] = shares[column].get(mark, 0.0) + inside_us
+        return "".join(max(share, key=lambda mark: share[mark]) if share else " " for share in shares)
+
+    def scale(self, indent: int) -> Line:
+        """Round times under their columns."""
+        text = " " * self._columns
+        for tick in ticks(self._from_us, self._to_us, most=max(2, self._columns // _TICK_COLUMNS)):
+            at = self._column(tick.at_us)
+            if text[max(0, at - 1) :].strip():
+                continue
+            text = f"{text[:at]}{tick.label}{text[at + len(tick.label) :]}"
+        return Line(f"{'us':<{indent}}{text.rstrip()}", "table")
+
+
+def _totals(plan: Schedule) -> Iterator[Line]:
+    whole = "the cycle" if overruns(plan) else "the slice"
+    part = whole if plan.is_whole else "the window"
+    yield Line(f"What takes {part}, {us(plan.to_us - plan.from_us)} us", "heading")
+    yield from table(
+        ["kind", "eq", "events", "us", "share, %"],
+        (
+            [f"{kind.mark} {kind.label}", kind.reference, str(one.events), us(one.total_us), f"{one.share * 100:.2f}"]
+            for one in totals(plan)
+            for kind in (kind_of(plan.profile, one.kind),)
+        ),
+        left=2,
+    )
+
+
+def _wrapped(head: str, words: Sequence[str], *, width: int) -> Iterator[Line]:
+    """Words behind one another, in lines that fit the width."""
+    line = head
+    for number, word in enumerate(words):
+        piece = word if number == len(words) - 1 else f"{word}, "
+        if len(line) + len(piece.rstrip()) > width and line.strip():
+            yield Line(line.rstrip(), "table")
+            line = " " * len(head)
+        line += piece
+    yield Line(line.rstrip(), "table")

@@ -1,0 +1,135 @@
+"""A timeline as PNG. Needs the extra `plot` (matplotlib); load it only where that is there."""
+
+from io import BytesIO
+from textwrap import wrap
+from typing import Any, Final
+from warnings import catch_warnings, simplefilter
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from busplan.analysis.timeline.schedule import Event, Schedule, totals
+from busplan.drawings.timeline.kinds import INKS, kind_of
+from busplan.drawings.timeline.lanes import (
+    Lane,
+    beyond,
+    charged,
+    drawn_window,
+    event_lanes,
+    has_event_lanes,
+    headline,
+    node_lanes,
+    overruns,
+    stretches,
+    strip_title,
+)
+from busplan.forms.lines import us
+
+_OVER: Final = "#b3261e"
+_TITLE_CHARACTERS: Final = 110
+_LANE_INCHES: Final = 0.28
+_MOST_LANE_INCHES: Final = 60.0
+"""Height of the lanes at most: thousands of them become thin, the sheet does not grow without end."""
+
+
+def timeline_png(plan: Schedule) -> bytes:
+    """Draw the slice in one strip, the window in lanes, and the legend with what each kind takes.
+
+    Parameters
+    ----------
+    plan
+        The schedule, narrowed to its window.
+
+    Returns
+    -------
+    bytes
+        The file's content; the same for the same schedule.
+    """
+    window = drawn_window(plan)
+    lanes = _lanes(window)
+    lane_inches = min(_LANE_INCHES * len(lanes) + 0.6, _MOST_LANE_INCHES)
+    buffer = BytesIO()
+    # Names in a profile are text: a dollar sign starts no formula.
+    with rc_context({"text.parse_math": False}):
+        figure = Figure(figsize=(11.0, lane_inches + 2.9), layout="constrained")
+        strip, area = figure.subplots(2, 1, height_ratios=(0.7, lane_inches))
+        title = "\n".join(wrap(headline(plan), _TITLE_CHARACTERS))
+        figure.suptitle(title, fontsize=11, color="black" if plan.figures.fits else _OVER)
+        _strip(strip, plan, window)
+        _draw(area, lanes, window)
+        figure.legend(handles=_legend(plan), loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+        with catch_warnings():
+            # A name in a script that the font does not have shows boxes; that is no reason to warn for each letter.
+            simplefilter("ignore", UserWarning)
+            figure.savefig(buffer, format="png", dpi=120)
+    return buffer.getvalue()
+
+
+def _lanes(window: Schedule) -> tuple[Lane, ...]:
+    if not has_event_lanes(window):
+        return node_lanes(window)
+    return tuple(
+        lane._replace(label=f"{lane.label}, {us(lane.events[0].duration_us)} us") for lane in event_lanes(window)
+    )
+
+
+def _colour(plan: Schedule, kind: str) -> str:
+    return INKS[kind_of(plan.profile, kind).ink].light
+
+
+def _bar(axes: Any, event: Event, *, lane: float, colour: str, height: float = 0.8) -> None:
+    # Not moved to whole pixels: bars of a few pixels keep their share.
+    span = (event.start_us, event.duration_us)
+    axes.broken_barh([span], (lane - height / 2, height), facecolors=colour, linewidth=0, snap=False)
+
+
+def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
+    """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
+    parts = stretches(plan.cycle_events)
+    for one in parts:
+        _bar(axes, one.event, lane=0.0, colour=_colour(plan, one.kind))
+    if window.from_us > 0 or window.to_us < plan.end_us:
+        axes.axvspan(window.from_us, window.to_us, fill=False, linewidth=1.5)
+    if overruns(plan):
+        _over(axes, plan)
+    axes.set_xlim(0.0, plan.end_us)
+    axes.set_yticks([])
+    kinds = dict.fromkeys(one.kind for one in parts)
+    handles = [Patch(color=_colour(plan, kind), label=kind_of(plan.profile, kind).label) for kind in kinds]
+    axes.legend(
+        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles), fontsize=8, frameon=False
+    )
+    axes.set_title(strip_title(plan), fontsize=9, loc="left")
+
+
+def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
+    for number, lane in enumerate(lanes):
+        for event in lane.events:
+            _bar(axes, event, lane=number, colour=_colour(window, event.kind))
+    if overruns(window) and window.to_us > window.figures.available_us:
+        _over(axes, window)
+    axes.set_xlim(window.from_us, window.to_us)
+    axes.set_ylim(len(lanes) - 0.5, -0.5)
+    axes.set_yticks(range(len(lanes)), [lane.label for lane in lanes], fontsize=8)
+    axes.grid(visible=True, axis="x", linewidth=0.4, color="0.85")
+    axes.set_axisbelow(True)
+    axes.set_xlabel("time in the cycle [us]")
+    axes.set_title(charged(window), fontsize=9, loc="left")
+
+
+def _over(axes: Any, plan: Schedule) -> None:
+    """Show where the slice ends, and what lies beyond."""
+    part = beyond(plan)
+    axes.axvspan(part.start_us, part.end_us, color=_OVER, alpha=0.16, linewidth=0, zorder=0)
+    axes.axvline(part.start_us, color=_OVER, linewidth=1.5)
+
+
+def _legend(plan: Schedule) -> list[Patch]:
+    return [
+        Patch(
+            color=_colour(plan, one.kind),
+            label=f"{kind_of(plan.profile, one.kind).label}, {us(one.total_us)} us, {one.share * 100:.2f} %",
+        )
+        for one in totals(plan)
+    ]

@@ -1,0 +1,219 @@
+"""A timeline as one SVG, for a page or alone: bars stretch with the width, words keep their size, light and dark."""
+
+from collections.abc import Iterable, Sequence
+from textwrap import wrap
+from typing import Final, NamedTuple
+from xml.etree.ElementTree import Element, SubElement
+
+from busplan.analysis.timeline.schedule import Event, Schedule, totals
+from busplan.drawings.svg import LINE, Scale, drawing, inside, markup, text_at
+from busplan.drawings.timeline.kinds import event_title, kind_of
+from busplan.drawings.timeline.lanes import (
+    Stretch,
+    beyond,
+    charged,
+    drawn_window,
+    event_lanes,
+    has_event_lanes,
+    headline,
+    node_lanes,
+    only_owner,
+    overruns,
+    stretches,
+    strip_title,
+    subject,
+)
+from busplan.drawings.timeline.svg_style import stylesheet
+from busplan.forms.lines import us
+
+_LINE_CHARACTERS: Final = 44
+"""Characters of a line of words: what a phone shows at this size."""
+_BAR: Final = 18
+_GAP: Final = 14
+_PHONE: Final = 335
+"""Width that a phone shows, margins left away."""
+_GUTTER_PERCENT: Final = 15
+_MOST_TALL_LANES: Final = 24
+_MOST_BARS: Final = 400
+"""Bars in the lanes of a page: beyond them a transaction is one, for a page is read and not measured."""
+
+
+def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
+    """Draw the slice in one strip, the window in lanes, and the legend with what each kind takes.
+
+    It has no width of its own: it fills what it is put into, from 320 px on.
+
+    Parameters
+    ----------
+    plan
+        The schedule, narrowed to its window.
+    inline
+        For a page that has the style sheet once, and verdict, subject and legend in its own words: without these.
+    """
+    root = drawing(headline(plan), css="busplan-timeline")
+    SubElement(root, "desc").text = subject(plan)
+    if not inline:
+        SubElement(root, "style").text = stylesheet()
+        SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
+    body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
+    window = drawn_window(plan)
+    height = 0 if inline else _above(body, plan, window) + _GAP
+    height = _strip(body, plan, window, y=height)
+    if has_event_lanes(window):
+        height = _event_lanes(body, window, y=height + _GAP)
+    else:
+        height = _node_lanes(body, window, y=height + _GAP, coarse=inline and is_coarse(window))
+    if not inline:
+        height = _legend(body, plan, y=height + _GAP) + _GAP
+    root.set("height", str(height))
+    return markup(root)
+
+
+def is_coarse(window: Schedule) -> bool:
+    """Whether a page draws a transaction as one bar, and not its phases."""
+    return len(window.events) > _MOST_BARS
+
+
+def _above(body: Element, plan: Schedule, window: Schedule) -> int:
+    """The verdict and what is shown, in words; the height below them."""
+    height = _words(body, headline(plan), y=8, css="head" if plan.figures.fits else "head bad")
+    return _words(body, charged(window), y=height, css="small")
+
+
+def _words(parent: Element, text: str, *, y: int, css: str) -> int:
+    """Words in lines that a phone shows; the height below them."""
+    # Letters of some scripts are twice as wide.
+    for line in wrap(text, _LINE_CHARACTERS if text.isascii() else _LINE_CHARACTERS // 2):
+        y += LINE
+        text_at(parent, line, x="0", y=y - 5, css=css)
+    return y
+
+
+def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
+    """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
+    parts = stretches(plan.cycle_events)
+    y = _strip_legend(body, plan, parts, y=_words(body, strip_title(plan), y=y, css="head")) + 4
+    scale = Scale(0.0, plan.end_us)
+    if overruns(plan):
+        _over(body, plan, scale, y=y - 3, height=_BAR + 6)
+    _Bars(body, plan, scale).draw(plan.cycle_events, y=y, height=_BAR, coarse=True)
+    if overruns(plan):
+        _edge(body, plan, scale, y=y - 3, height=_BAR + 6)
+    if window.from_us > 0 or window.to_us < plan.end_us:
+        shown_part = plan.cycle_events[0]._replace(start_us=window.from_us, end_us=window.to_us)
+        scale.rect(body, shown_part, y=y - 2, height=_BAR + 4, css="window", title=_tip("drawn below", shown_part))
+    return scale.marks(body, top=y + _BAR, bottom=y + _BAR)
+
+
+def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], *, y: int) -> int:
+    """The colours of the strip, as many in a line as a phone shows; the height below them."""
+    x = 0
+    for key in dict.fromkeys(one.kind for one in parts):
+        kind = kind_of(plan.profile, key)
+        width = 30 + 7 * len(kind.label)
+        if x + width > _PHONE:
+            x, y = 0, y + LINE
+        SubElement(body, "rect", {"class": kind.ink, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
+        text_at(body, kind.label, x=str(x + 15), y=y + 15, css="small")
+        x += width
+    return y + LINE
+
+
+def _over(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int) -> None:
+    """Shade what lies beyond the slice, behind the bars."""
+    part = beyond(plan)
+    scale.rect(parent, part, y=y, height=height, css="over", title=_tip("beyond the slice", part))
+
+
+def _edge(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int) -> None:
+    """Draw the line where the slice ends, before the bars."""
+    x = f"{scale.percent(plan.figures.available_us):.5g}%"
+    SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(y), "y2": str(y + height), "class": "edge"})
+
+
+def _tip(label: str, event: Event) -> str:
+    return f"{label}, {us(event.duration_us)} us: {us(event.start_us)} to {us(event.end_us)} us"
+
+
+class _Bars(NamedTuple):
+    """Where bars are drawn."""
+
+    parent: Element
+    plan: Schedule
+    scale: Scale
+
+    def draw(self, events: Sequence[Event], *, y: int, height: int, coarse: bool = False) -> None:
+        """Draw events, or the transactions that they make."""
+        if not coarse:
+            for event in events:
+                self._bar(event.kind, event_title(event), event, y=y, height=height)
+            return
+        for one in stretches(events):
+            label = kind_of(self.plan.profile, one.kind).label
+            owner = label if one.event.node is None else f"{one.kind} of node {one.event.node}"
+            self._bar(one.kind, owner, one.event, y=y, height=height)
+
+    def _bar(self, kind: str, title: str, event: Event, *, y: int, height: int) -> None:
+        css = kind_of(self.plan.profile, kind).ink
+        self.scale.rect(self.parent, event, y=y, height=height, css=css, title=_tip(title, event))
+
+
+def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
+    """A lane for the bus and one for each node."""
+    lanes = node_lanes(window)
+    y = _words(body, f"{us(window.from_us)} to {us(window.to_us)} us, by node", y=y, css="head") + 4
+    scale = Scale(window.from_us, window.to_us)
+    pitch = _BAR + 4 if len(lanes) <= _MOST_TALL_LANES else _BAR - 3
+    area = inside(body, x_percent=_GUTTER_PERCENT, width_percent=100 - _GUTTER_PERCENT, y=0)
+    bottom = y + pitch * len(lanes)
+    below = scale.marks(area, top=y, bottom=bottom)
+    over = overruns(window) and window.to_us > window.figures.available_us
+    for number, lane in enumerate(lanes):
+        top = y + pitch * number
+        text_at(body, lane.label, x="0", y=top + pitch - 5, css="small")
+        SubElement(area, "rect", {"class": "track", "width": "100%", "y": str(top), "height": str(pitch - 3)})
+    if over:
+        _over(area, window, scale, y=y - 2, height=bottom - y + 2)
+    for number, lane in enumerate(lanes):
+        _Bars(area, window, scale).draw(lane.events, y=y + pitch * number, height=pitch - 3, coarse=coarse)
+    if over:
+        _edge(area, window, scale, y=y - 2, height=bottom - y + 2)
+    return below
+
+
+def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
+    """A lane for each event, its name above it."""
+    owner = only_owner(window)
+    title = f"{us(window.from_us)} to {us(window.to_us)} us{'' if owner is None else f', {owner}'}"
+    y = _words(body, title, y=y, css="head")
+    scale = Scale(window.from_us, window.to_us)
+    pitch = LINE + _BAR
+    over = overruns(window) and window.to_us > window.figures.available_us
+    bottom = y + pitch * len(window.events)
+    below = scale.marks(body, top=bottom - 4, bottom=bottom)
+    for number, lane in enumerate(event_lanes(window)):
+        top = y + pitch * number
+        (event,) = lane.events
+        text_at(body, f"{lane.label}, {us(event.duration_us)} us", x="0", y=top + LINE - 4, css="small")
+        SubElement(body, "rect", {"class": "track", "width": "100%", "y": str(top + LINE), "height": str(_BAR - 4)})
+        if over:
+            _over(body, window, scale, y=top + LINE, height=_BAR - 4)
+        _Bars(body, window, scale).draw((event,), y=top + LINE, height=_BAR - 4)
+        if over:
+            _edge(body, window, scale, y=top + LINE, height=_BAR - 4)
+    return below
+
+
+def _legend(body: Element, plan: Schedule, *, y: int) -> int:
+    """What each colour means, and what of the window it takes."""
+    text_at(body, "kind", x="20", y=y + 15, css="head")
+    text_at(body, "us", x="240", y=y + 15, css="head", anchor="end")
+    text_at(body, "share, %", x="310", y=y + 15, css="head", anchor="end")
+    for one in totals(plan):
+        y += LINE
+        kind = kind_of(plan.profile, one.kind)
+        SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
+        text_at(body, kind.label, x="20", y=y + 15)
+        text_at(body, us(one.total_us), x="240", y=y + 15, anchor="end")
+        text_at(body, f"{one.share * 100:.2f}", x="310", y=y + 15, anchor="end")
+    return y + LINE

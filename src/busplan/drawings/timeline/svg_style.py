@@ -1,0 +1,46 @@
+"""The style sheet of a timeline's SVG: literal colours, so that viewers without variables show them too."""
+
+from typing import Final
+
+from busplan.drawings.timeline.kinds import INKS
+
+DARK: Final = "@media screen and (prefers-color-scheme:dark)"
+"""Where colours on black hold: paper is white."""
+_STYLE: Final = """
+.busplan-timeline{font:13px system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
+.busplan-timeline text{fill:#1c2430}
+.busplan-timeline .paper{fill:#ffffff}
+.busplan-timeline .head{font-weight:600}
+.busplan-timeline .small{font-size:12px;fill:#526071}
+.busplan-timeline .bad{fill:#b3261e}
+.busplan-timeline .over{fill:#b3261e;fill-opacity:.16}
+.busplan-timeline .track{fill:#f4f6f8}
+.busplan-timeline .rule{stroke:#c9d0d8;stroke-width:1}
+.busplan-timeline .edge{stroke:#b3261e;stroke-width:2}
+.busplan-timeline .window{fill:none;stroke:#1c2430;stroke-width:2}
+"""
+_DARK_STYLE: Final = """
+.busplan-timeline text{fill:#e6ebf1}
+.busplan-timeline .paper{fill:#12161c}
+.busplan-timeline .small{fill:#a3b0bf}
+.busplan-timeline .bad{fill:#ff8a80}
+.busplan-timeline .over{fill:#ff8a80;fill-opacity:.22}
+.busplan-timeline .track{fill:#1a2029}
+.busplan-timeline .rule{stroke:#3a4452}
+.busplan-timeline .edge{stroke:#ff8a80}
+.busplan-timeline .window{stroke:#e6ebf1}
+"""
+
+
+def stylesheet() -> str:
+    """Colours on white, and those on black for who prefers them; nothing reaches beyond the drawing's own class."""
+    light, dark = fills(".busplan-timeline")
+    return f"{_STYLE}{light}{DARK}{{{_DARK_STYLE}{dark}}}\n"
+
+
+def fills(scope: str) -> tuple[str, str]:
+    """Rules that colour each ink inside a selector, on white and on black."""
+    light, dark = (
+        "".join(f"{scope} .{ink}{{fill:{colours[side]}}}\n" for ink, colours in INKS.items()) for side in (0, 1)
+    )
+    return light, dark

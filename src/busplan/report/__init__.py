@@ -1,1 +1,0 @@
-"""From results to text; nothing here prints."""

@@ -1,0 +1,74 @@
+"""What `busplan calibrate` says."""
+
+from busplan.analysis.calibration.calibrate import Calibration, calibrate
+from busplan.answers.calibration import calibration_lines, calibration_warnings, execution_changes, provenance
+from busplan.profile.measurements import Measurement, parse_measurements
+from busplan.profile.shipped import load, locate_measurements
+
+
+def run(rows: list[Measurement], *, form: str = "table", robust: bool = False) -> Calibration:
+    profile = load("paper-two-node").profile
+    return calibrate(profile, rows, source="m.csv", form="linear" if form == "linear" else "table", robust=robust)
+
+
+def rows(*values: tuple[int, float], kind: str = "write") -> list[Measurement]:
+    return [
+        Measurement(line, "read" if kind == "read" else "write", size, value, None)
+        for line, (size, value) in enumerate(values, start=2)
+    ]
+
+
+def said(result: Calibration) -> str:
+    return "\n".join(line.text for line in calibration_lines(result, source="m.csv"))
+
+
+def test_table_1_shows_what_the_model_leaves_unexplained() -> None:
+    example = parse_measurements(locate_measurements("table-1.csv").path.read_bytes(), name="table-1.csv")
+    text = said(run(list(example)))
+    assert "Left unexplained by the paper timing model: 3.131 us of T1+T2 on average, 3.463 us at most (13% of" in text
+    assert text.count("un-\n") == 1
+
+
+def test_only_repetitions_have_a_spread_and_only_reads_beside_writes_a_difference() -> None:
+    single = said(run(rows((4, 50.0), (64, 80.0))))
+    assert "scatter" not in single
+    assert "unexplained" not in single
+    both = run([*rows((4, 50.0), (4, 52.0)), Measurement(9, "read", 4, 54.0, None)])
+    assert "Repetitions scatter by 2.000 us at most (standard deviation)." in said(both)
+    assert "T_exec of reads and of writes, which differ by up to 3.000 us." in said(both)
+
+
+def test_warnings() -> None:
+    outside = calibration_warnings(run(rows((64, 80.0))))
+    assert outside == [
+        "the profile's payload of 4 bytes is outside the table, 64 to 64 bytes: measure it, or use --form linear."
+    ]
+    assert "is latency_us in us?" in calibration_warnings(run(rows((4, 48_700.0))))[0]
+    many = rows(*((4, 50.0 if index % 4 else 90.0 + index) for index in range(60)))
+    (warning,) = calibration_warnings(run(many, robust=True))
+    assert warning.startswith(
+        "15 outliers, more than 3.5 robust standard deviations off: line 2, 6, 10, 14, 18, 22, 26,"
+    )
+    assert warning.endswith("38 and 5 more; no pull on the robust fit.")
+
+
+def test_a_line_in_words_in_provenance_and_as_changes() -> None:
+    result = run(rows((4, 50.0), (64, 80.0)), form="linear")
+    base, slope = result.execution.execution_us(0), result.execution.execution_us(1) - result.execution.execution_us(0)
+    assert f"Line: {base:g} us + {slope:g} us/byte * payload, by least squares through all measurements." in said(
+        result
+    )
+    assert provenance(result, source="m.csv") == (
+        "busplan calibrate: linear (least squares) of 2 measurements in m.csv, packets by the paper model, "
+        "rms residual 0.000 us"
+    ).replace("0.000 us", f"{result.rms_residual_us:.3g} us" if 0 < result.rms_residual_us < 0.001 else "0.000 us")
+    changes = execution_changes(result.execution)
+    assert changes["node.execution.kind"] == "linear"
+    assert changes["node.execution.grade"] == "measured"
+    assert (changes["node.execution.payload_bytes"], changes["node.execution.time_us"]) == (None, None)
+
+
+def test_no_figure_of_the_table_is_rounding_dust() -> None:
+    text = said(run(rows((4, 50.0), (4, 50.0004), (4, 51.0))))
+    assert "e-" not in text
+    assert "-0.000" not in text

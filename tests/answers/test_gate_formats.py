@@ -1,0 +1,409 @@
+"""The gate's formats: each is what the programs that read it expect, whatever a file or key is called."""
+
+import json
+import os
+import re
+from collections.abc import Iterator
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote_to_bytes, urlsplit
+from xml.etree import ElementTree as ET
+
+import jsonschema
+import pytest
+from pydantic import ValidationError
+from pydantic_sarif.model import StaticAnalysisResultsFormatSarifVersion210JsonSchema as SarifLog
+
+from busplan.answers.gate import GateFormat, render
+from busplan.profile.document import Document
+from busplan.profile.schema import profile_schema
+from busplan.profile.shipped import load, shipped_names
+from busplan.rules.finding import Finding
+from busplan.rules.gate import FileResult, check_document
+from busplan.rules.registry import all_rules
+from busplan.rules.report import CheckReport
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "tests" / "rules" / "examples"
+CLEAN = (EXAMPLES / "BP001" / "valid.toml").read_text(encoding="utf-8")
+WARNS = CLEAN.replace('"optimal"', "63")
+FAILS = WARNS.replace("period_us = 4000", "period_us = 300")
+FORMATS: tuple[GateFormat, ...] = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
+
+HOSTILE = (
+    "plain.toml",
+    "100% of, it: a\r\nb.toml",
+    "::error::a.toml",
+    "a b/ü/日本.toml",
+    "a<b>&\"'.toml",
+    "\x00\x07\x1b[31m\x85\u2028\ufffe.toml",
+    "\udcff.toml",
+    "]]>.toml",
+    "#?;.toml",
+    "C:\\a.toml",
+)
+
+
+def checked(text: str, *, path: str = "p/a.toml") -> FileResult:
+    return check_document(Document(path, text))
+
+
+def report(*files: FileResult) -> CheckReport:
+    return CheckReport(files)
+
+
+def hostile() -> Iterator[FileResult]:
+    for number, name in enumerate(HOSTILE):
+        finding = Finding("BP002", "unknown-key", "error" if number % 2 else "warning", name, name, 1, 1)
+        yield FileResult(name, name, (finding, finding), {}, (name, name))
+    yield FileResult("gone\n.toml", None, (), {}, failure="gone\n.toml: no\x1bsuch, file: 100 %")
+
+
+@pytest.fixture
+def mixed() -> CheckReport:
+    return report(
+        checked(CLEAN, path="p/clean.toml"),
+        checked(FAILS, path="p/fails.toml"),
+        checked("a =", path="p/broken.toml"),
+        FileResult("gone.toml", None, (), {}, failure="gone.toml: no such file"),
+    )
+
+
+# JSON
+
+
+def test_json_holds_the_contract(mixed: CheckReport) -> None:
+    document = json.loads(render(mixed, file_format="json"))
+    assert list(document) == ["schema", "command", "files", "summary"]
+    assert (document["schema"], document["command"]) == (1, "check")
+    assert document["summary"] == {"files": 4, "errors": 2, "warnings": 1}
+    assert [(one["path"], one["profile"], one["status"]) for one in document["files"]] == [
+        ("p/clean.toml", "example", "ok"),
+        ("p/fails.toml", "example", "findings"),
+        ("p/broken.toml", None, "findings"),
+        ("gone.toml", None, "error"),
+    ]
+    for one in document["files"]:
+        assert set(one) - {"failure"} == {"path", "profile", "status", "findings"}
+    (first, second) = document["files"][1]["findings"]
+    assert list(first) == ["code", "rule", "severity", "message", "key", "line", "column"]
+    assert (first["code"], first["key"], first["line"], first["column"]) == ("BP110", "bus.gap_count", 7, 1)
+    assert (second["rule"], second["severity"]) == ("slice-overrun", "error")
+    assert document["files"][3]["failure"] == "gone.toml: no such file"
+
+
+# Every format takes everything
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_no_name_breaks_a_format(format_: GateFormat) -> None:
+    text = render(report(*hostile()), file_format=format_)
+    # As the command writes it: what is no UTF-8 as an escape.
+    written = text.encode("utf-8", "backslashreplace").decode("utf-8")
+    assert written.endswith("\n")
+    assert not re.search(r"[\x00-\x09\x0b-\x1f]", written)
+    if format_ in ("json", "gitlab", "sarif"):
+        json.loads(written)
+    else:
+        assert not re.search(r"[\x7f-\x9f\u2028]", written)
+    if format_ == "junit":
+        ET.fromstring(written)
+    if format_ in ("text", "github"):
+        assert len(written.splitlines()) == 2 * len(HOSTILE)
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_nothing_at_all_is_still_a_document(format_: GateFormat) -> None:
+    text = render(report(), file_format=format_)
+    assert (text == "") == (format_ in ("text", "full", "github"))
+
+
+# full
+
+
+def full_of(source: str, column: int) -> list[str]:
+    finding = Finding("BP002", "unknown-key", "error", "message", "key", 12, column)
+    return render(report(FileResult("a.toml", None, (finding,), {}, (source,))), file_format="full").split("\n")
+
+
+def test_full_shows_the_line_with_a_caret() -> None:
+    assert full_of("nodes = 2", 9) == [
+        "a.toml:12:9: BP002 message",
+        "   |",
+        "12 | nodes = 2",
+        "   |         ^ unknown-key (error)",
+        "",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("source", "column", "shown", "indent"),
+    [
+        ("\t\tnodes = 2", 3, "\t\tnodes = 2", "\t\t"),
+        ("a\tb = 2", 3, "a\tb = 2", " \t"),
+        ("日本 = 2", 3, "日本 = 2", "    "),
+        ("e\u0301 = 2", 3, "e\u0301 = 2", " "),
+        ("ü = 2", 3, "ü = 2", "  "),
+        ("\x1b[31m = 2", 3, " [31m = 2", "  "),
+        ("", 1, "", ""),
+        ("abc", 4, "abc", "   "),
+    ],
+)
+def test_the_caret_stands_below_its_column(source: str, column: int, shown: str, indent: str) -> None:
+    _, _, line, caret, *_ = full_of(source, column)
+    assert line == f"12 | {shown}"
+    assert caret == f"   | {indent}^ unknown-key (error)"
+
+
+@pytest.mark.parametrize("column", [1, 50, 5_000, 99_990, 100_001])
+def test_a_very_long_line_is_shown_around_its_column(column: int) -> None:
+    source = "".join(chr(ord("a") + number % 26) for number in range(100_000))
+    _, _, line, caret, *_ = full_of(source, column)
+    assert len(line) < 180
+    at = caret.index("^")
+    assert line[at : at + 3] == source[column - 1 : column + 2][: len(line) - at]
+    assert line.removeprefix("12 | ").strip(".") in source
+    assert line.startswith("12 | ...") == (column > 100)
+    assert line.endswith("...") == (column < 99_000)
+
+
+# GitHub
+
+
+def github_command(line: str) -> tuple[str, dict[str, str], str]:
+    """Read a workflow command as the runner does."""
+    match = re.fullmatch(r"::(\w+) ([^:]*)::(.*)", line)
+    assert match is not None, line
+
+    def plain(text: str, *escapes: tuple[str, str]) -> str:
+        for escaped, character in (("%0D", "\r"), ("%0A", "\n"), *escapes, ("%25", "%")):
+            text = text.replace(escaped, character)
+        return text
+
+    properties = dict(one.split("=", 1) for one in match[2].split(","))
+    escapes = (("%3A", ":"), ("%2C", ","))
+    return match[1], {key: plain(value, *escapes) for key, value in properties.items()}, plain(match[3])
+
+
+def test_github_commands_say_file_line_and_message(mixed: CheckReport) -> None:
+    commands = [github_command(line) for line in render(mixed, file_format="github").splitlines()]
+    assert [(level, one["file"], one["line"], one["col"]) for level, one, _ in commands] == [
+        ("warning", "p/fails.toml", "7", "1"),
+        ("error", "p/fails.toml", "11", "1"),
+        ("error", "p/broken.toml", "1", "4"),
+    ]
+    assert commands[0][1]["title"] == "BP110 gap-count-wasteful"
+    assert commands[0][2] == mixed.files[1].findings[0].message
+
+
+@pytest.mark.parametrize("name", ["100% of, it: a\r\nb.toml", "::error::a.toml", "%0A.toml", "a,line=9.toml"])
+def test_github_reads_hostile_names_as_they_are(name: str) -> None:
+    finding = Finding("BP002", "unknown-key", "error", f"{name}: unknown", name, 3, 4)
+    text = render(report(FileResult(name, None, (finding,), {}, ("",))), file_format="github")
+    assert text.count("\n") == 1
+    level, properties, message = github_command(text.removesuffix("\n"))
+    assert level == "error"
+    assert properties == {"file": name, "line": "3", "col": "4", "title": "BP002 unknown-key"}
+    assert message == f"{name}: unknown"
+
+
+# GitLab
+
+
+def test_gitlab_issues_have_what_its_report_needs(mixed: CheckReport) -> None:
+    issues = json.loads(render(mixed, file_format="gitlab"))
+    assert [(one["check_name"], one["severity"], one["location"]) for one in issues] == [
+        ("gap-count-wasteful", "minor", {"path": "p/fails.toml", "lines": {"begin": 7}}),
+        ("slice-overrun", "major", {"path": "p/fails.toml", "lines": {"begin": 11}}),
+        ("syntax", "major", {"path": "p/broken.toml", "lines": {"begin": 1}}),
+    ]
+    assert all(set(one) == {"description", "check_name", "fingerprint", "severity", "location"} for one in issues)
+    assert issues[1]["description"].startswith("BP101 cycle.period_us: ")
+
+
+def test_gitlab_fingerprints_are_unique() -> None:
+    issues = json.loads(render(report(*hostile(), checked(FAILS)), file_format="gitlab"))
+    assert len({one["fingerprint"] for one in issues}) == len(issues) == 2 * len(HOSTILE) + 2
+
+
+# JUnit
+
+
+def test_junit_has_one_case_a_profile_also_when_clean(mixed: CheckReport) -> None:
+    root = ET.fromstring(render(mixed, file_format="junit"))
+    assert root.tag == "testsuites"
+    (suite,) = root
+    assert suite.tag == "testsuite"
+    assert {key: suite.attrib[key] for key in ("tests", "failures", "errors")} == {
+        "tests": "4", "failures": "2", "errors": "1",
+    }  # fmt: skip
+    cases = suite.findall("testcase")
+    assert [case.attrib["name"] for case in cases] == ["p/clean.toml", "p/fails.toml", "p/broken.toml", "gone.toml"]
+    assert [[one.tag for one in case] for case in cases] == [[], ["failure", "system-out"], ["failure"], ["error"]]
+    failure = cases[1].find("failure")
+    assert failure is not None
+    assert failure.attrib["type"] == "BP101"
+    assert failure.attrib["message"].startswith("cycle.period_us: the cycle needs")
+    assert (failure.text or "").startswith("p/fails.toml:11:1: BP101 ")
+    assert (cases[1].findtext("system-out") or "").startswith("p/fails.toml:7:1: BP110 ")
+
+
+def test_junit_of_clean_and_of_warned_profiles_has_no_failures() -> None:
+    text = render(report(checked(CLEAN, path="a.toml"), checked(WARNS, path="b.toml")), file_format="junit")
+    (suite,) = ET.fromstring(text)
+    assert (suite.attrib["tests"], suite.attrib["failures"], suite.attrib["errors"]) == ("2", "0", "0")
+    assert [len(case.findall("failure")) for case in suite] == [0, 0]
+
+
+# SARIF
+
+
+def sarif(found: CheckReport) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(render(found, file_format="sarif"))
+    SarifLog.model_validate(document)
+    return document
+
+
+def test_sarif_is_valid_by_the_published_schema(mixed: CheckReport) -> None:
+    document = sarif(mixed)
+    assert (document["version"], document["$schema"]) == ("2.1.0", "https://json.schemastore.org/sarif-2.1.0.json")
+    for one in (report(), report(checked(CLEAN)), report(*hostile())):
+        sarif(one)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("runs", 0, "results", 0, "message", "text"),
+        ("runs", 0, "results", 0, "level"),
+        ("runs", 0, "results", 0, "locations", 0, "physicalLocation", "region", "startLine"),
+        ("runs", 0, "columnKind"),
+        ("runs", 0, "tool", "driver", "name"),
+        ("runs", 0, "invocations", 0, "executionSuccessful"),
+    ],
+)
+def test_the_schema_check_can_fail(mixed: CheckReport, path: tuple[str | int, ...]) -> None:
+    document = deepcopy(sarif(mixed))
+    *outer, last = path
+    at: Any = document
+    for part in outer:
+        at = at[part]
+    at[last] = -1
+    with pytest.raises(ValidationError):
+        SarifLog.model_validate(document)
+    at[f"{last}s"] = at.pop(last)
+    with pytest.raises(ValidationError):
+        SarifLog.model_validate(document)
+
+
+def test_sarif_results_point_to_their_rules(mixed: CheckReport) -> None:
+    (run,) = sarif(mixed)["runs"]
+    rules = run["tool"]["driver"]["rules"]
+    assert [rule["id"] for rule in rules] == list(all_rules())
+    assert len({rule["name"] for rule in rules}) == len(rules)
+    for result in run["results"]:
+        assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
+        assert result["level"] == all_rules()[result["ruleId"]].severity
+    assert run["invocations"] == [
+        {
+            "executionSuccessful": False,
+            "toolExecutionNotifications": [{"level": "error", "message": {"text": "gone.toml: no such file"}}],
+        }
+    ]
+    region = run["results"][0]["locations"][0]["physicalLocation"]["region"]
+    assert region == {"startLine": 7, "startColumn": 1}
+    assert run["columnKind"] == "unicodeCodePoints"
+
+
+def artifacts(*names: str) -> list[dict[str, str]]:
+    files = (FileResult(name, None, checked(WARNS).findings, {}, ("",)) for name in names)
+    results = sarif(report(*files))["runs"][0]["results"]
+    return [one["locations"][0]["physicalLocation"]["artifactLocation"] for one in results]
+
+
+@pytest.mark.parametrize(
+    ("name", "uri"),
+    [
+        ("p/a.toml", "p/a.toml"),
+        ("a b/ü.toml", "a%20b/%C3%BC.toml"),
+        ("100%.toml", "100%25.toml"),
+        ("a:b.toml", "a%3Ab.toml"),
+        ("#?.toml", "%23%3F.toml"),
+        ("\udcff.toml", "%FF.toml"),
+        ("<stdin>", "%3Cstdin%3E"),
+    ],
+)
+def test_sarif_paths_below_the_working_folder_are_relative(name: str, uri: str) -> None:
+    (artifact,) = artifacts(name)
+    assert artifact == {"uri": uri, "uriBaseId": "%SRCROOT%"}
+    parts = urlsplit(uri)
+    assert (parts.scheme, parts.netloc, parts.query, parts.fragment) == ("", "", "", "")
+    assert unquote_to_bytes(uri) == os.fsencode(name)
+
+
+def test_sarif_paths_elsewhere_are_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = tmp_path.resolve() / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    assert artifacts("../a b.toml", "/etc/ü.toml") == [
+        {"uri": f"{here.parent.as_uri()}/a%20b.toml"},
+        {"uri": "file:///etc/%C3%BC.toml"},
+    ]
+
+
+def test_sarif_fingerprints_stay_when_lines_are_inserted_above() -> None:
+    def prints(text: str) -> list[str]:
+        results = sarif(report(checked(text)))["runs"][0]["results"]
+        return [one["partialFingerprints"]["busplanFinding/v1"] for one in results]
+
+    before = prints(FAILS)
+    assert len(set(before)) == len(before) == 2
+    assert prints("# one\n\n" + FAILS.replace("[cycle]", "# two\n[cycle]")) == before
+    assert prints(FAILS.replace("[bus]", "[limits]\nmin_spare_axes = 99\n[bus]"))[1:] == before
+
+
+# The profile's own schema
+
+
+@pytest.fixture(scope="module")
+def validator() -> Any:
+    schema = profile_schema()
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def test_the_profile_schema_accepts_what_is_shipped(validator: Any) -> None:
+    for name in shipped_names():
+        validator.validate(load(name).document.data())
+
+
+@pytest.mark.parametrize("code", [code for code in all_rules() if not code.startswith("BP0")])
+def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any, code: str) -> None:
+    for path in (EXAMPLES / code).glob("*.toml"):
+        validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+
+
+@pytest.mark.parametrize("code", ["BP002", "BP003", "BP004", "BP005"])
+def test_the_profile_schema_refuses_what_has_another_shape(validator: Any, code: str) -> None:
+    for path in (EXAMPLES / code).glob("invalid*.toml"):
+        with pytest.raises(jsonschema.ValidationError):
+            validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+
+
+def test_every_key_of_the_profile_schema_is_described_with_its_unit() -> None:
+    schema = profile_schema()
+    units = {
+        "per_byte_us": "[us/byte]", "um_per_m": "[um/m]", "mm_per_min": "[mm/min]", "per_s2": "[1/s^2]",
+        "per_s": "[1/s]", "mm_s": "[mm/s]", "us": "[us]", "mm": "[mm]", "bytes": "[bytes]", "deg": "[deg]",
+        "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "s": "[s]",
+    }  # fmt: skip
+    sections = [schema, *schema["$defs"].values()]
+    keys = [(name, key) for section in sections for name, key in section.get("properties", {}).items()]
+    assert len(keys) > 60
+    for name, key in keys:
+        assert key.get("description"), name
+        unit = next((unit for ending, unit in units.items() if f"_{name}".endswith(f"_{ending}")), "")
+        assert unit in key["description"], name

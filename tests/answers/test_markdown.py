@@ -1,0 +1,56 @@
+"""Markdown: whatever a profile is called, a page shows those characters and does nothing else with them."""
+
+from collections.abc import Callable
+from html.parser import HTMLParser
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from busplan.forms.markdown import code, escaped, table
+
+HOSTILE = (
+    "<script>alert(1)</script>", "a|b", "`x`", "```", "`", "\\", "a\\|b", "[x](http://y)", "*a* _b_", "@team #1",
+    "# head", "## head", "###### h", "$x$", "&lt;", "![i](j)", "\\`", "a\\",
+)  # fmt: skip
+
+
+class Words(HTMLParser):
+    """Tags and text of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.cells: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        del attrs
+        self.tags.append(tag)
+        if tag in ("td", "th"):
+            self.cells.append("")
+
+    def handle_data(self, data: str) -> None:
+        if self.cells and self.tags[-1] in ("td", "th", "code"):
+            self.cells[-1] += data
+
+
+def rendered(markdown: str) -> Words:
+    words = Words()
+    words.feed(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown).replace("</td>\n", "</td>"))
+    return words
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("write", [code, escaped])
+def test_a_cell_shows_hostile_text_and_nothing_else(write: Callable[[str], str], text: str) -> None:
+    page = rendered("\n".join(table(["name", "value"], [[write(text), "1"]], left=1)))
+    assert set(page.tags) <= {"table", "thead", "tbody", "tr", "th", "td", "code"}
+    assert [cell.strip() for cell in page.cells] == ["name", "value", text, "1"]
+
+
+@given(st.text(st.characters(codec="utf-8", categories=["L", "N", "P", "S", "Zs"]), min_size=1, max_size=30))
+def test_a_cell_shows_any_text(text: str) -> None:
+    line = " ".join(text.split())
+    page = rendered("\n".join(table(["name", "value"], [[code(text), "1"], [escaped(text), "2"]], left=1)))
+    assert [cell.strip() for cell in page.cells] == ["name", "value", line, "1", line, "2"]

@@ -1,0 +1,423 @@
+"""The page of `busplan report`: its charts are the results, its colours can be read, its names are text."""
+
+import math
+import os
+import re
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+from html.parser import HTMLParser
+from importlib.resources import files
+from itertools import pairwise
+from xml.etree import ElementTree as ET
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from markdown_it import MarkdownIt
+
+from busplan.analysis.all_answers import AllAnswers, all_answers
+from busplan.analysis.capacity.node_steps import node_steps
+from busplan.analysis.circle.contour_profile import ContourProfile
+from busplan.answers.page.chapters import ReportedProfile, page
+from busplan.answers.page.commands import shell_word
+from busplan.answers.page.content import Page, ShownFigure
+from busplan.answers.page.markdown import page_markdown
+from busplan.buses import kind_named
+from busplan.buses.ieee1394.section import Ieee1394Profile
+from busplan.drawings.axes import axes_chart, drawn_range
+from busplan.drawings.bars import signed_bar
+from busplan.drawings.circle import circle_chart, magnified
+from busplan.drawings.terms import LEFT, terms_chart
+from busplan.drawings.timeline.kinds import INKS
+from busplan.forms.html import page_html
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.sections.profile import Profile
+
+PLACES = {"paper": "first", "standard": "second"}
+"""Where each timing model stands, which its colour goes by."""
+SVG = "{http://www.w3.org/2000/svg}"
+BASE = load("paper-4ms").profile
+TERMS = kind_named("ieee1394").term_figures
+NAMES = (
+    "</title><script>alert(1)</script>",
+    '"><img src=x onerror=alert(1)>',
+    "' autofocus onfocus='alert(1)",
+    "]]>--><!--",
+    "${x} {{7*7}} {% raw %} #{x}",
+    "</style></svg><b>&amp;&#60;",
+    "```\u05d0\u05d1\u05d2 | `x` *a* [x](javascript:alert(1)) <!--",
+    "W" * 100,
+)
+
+
+def changed(**changes: object) -> Profile:
+    return override(BASE, {key.replace("__", "."): value for key, value in changes.items()})
+
+
+def made(*profiles: Profile, title: str | None = None) -> Page:
+    subjects = [ReportedProfile(f"{number}.toml", all_answers(one, with_circle=False), other_period=False)
+                for number, one in enumerate(profiles)]  # fmt: skip
+    return page(subjects, title=title)
+
+
+@cache
+def simulated() -> AllAnswers:
+    return all_answers(changed(circle__radius_mm=25.0, circle__ramp_periods=20))
+
+
+class Tags(HTMLParser):
+    """Every tag with its attributes' names, comments, and all text outside style."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, tuple[str, ...]]] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, tuple(name for name, _ in attrs)))
+
+    def handle_comment(self, data: str) -> None:
+        self.tags.append((f"comment {data}", ()))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+# --- names ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_hostile_name_makes_no_element_and_no_attribute(name: str) -> None:
+    plain, hostile = (
+        Tags(page_html(made(changed(name=text, description=f"Why: {text}"), BASE, title=text)))
+        for text in ("plain", name)
+    )
+    assert hostile.tags == plain.tags
+    assert not {tag for tag, _ in hostile.tags} & {"script", "img", "iframe", "object", "link", "base", "form"}
+    assert not [one for _, attributes in hostile.tags for one in attributes if one.startswith("on")]
+    assert name in hostile.text
+    assert f"Why: {name}" in hostile.text
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_hostile_name_is_text_in_markdown(name: str) -> None:
+    markdown = page_markdown(made(changed(name=name, description=name), BASE, title=name))
+    reader = Tags(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown))
+    assert {tag for tag, _ in reader.tags} <= {
+        *("h1", "h2", "h3", "p", "a", "code", "pre", "strong", "ul", "li"),
+        *("table", "thead", "tbody", "tr", "th", "td"),
+    }
+    assert {attributes for _, attributes in reader.tags} <= {(), ("id",), ("href",), ("class",), ("style",)}
+    assert " ".join(name.split()) in " ".join(reader.text.split())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.binary(min_size=1, max_size=20).filter(lambda raw: b"\0" not in raw))
+def test_a_shell_gives_back_any_path(raw: bytes) -> None:
+    word = shell_word(os.fsdecode(raw))
+    assert word.isprintable()
+    shown = subprocess.run(["bash", "-c", f"printf %s {word}"], capture_output=True, check=True)
+    assert shown.stdout == (b"./" + raw if raw.startswith(b"-") and raw != b"-" else raw)
+
+
+# --- the page ---------------------------------------------------------------------------------------------
+
+
+def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
+    one = ReportedProfile("paper-4ms", simulated(), other_period=False)
+    html = page_html(page([one, one], title=None))
+    assert html == page_html(page([one, one], title=None))
+    assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)", html) == []
+    assert not re.search(r"url\(|@import|<script|<link|\ssrc=", html)
+    assert "None" not in html
+    ids = re.findall(r'\bid="([^"]*)"', html)
+    assert len(ids) == len(set(ids))
+    assert {"p1", "p2", "comparison", "p1-circle", "p2-circle"} <= set(ids)
+    assert set(re.findall(r'href="#([^"]*)"', html)) == {"p1", "p2"}
+
+
+def test_headings_go_down_one_by_one_and_tables_have_scopes() -> None:
+    for one in (made(BASE), made(BASE, changed(name="other"))):
+        tags = Tags(page_html(one)).tags
+        levels = [int(tag[1]) for tag, _ in tags if re.fullmatch("h[1-6]", tag)]
+        assert levels.count(1) == 1
+        assert all(lower <= upper + 1 for upper, lower in pairwise(levels))
+        assert all("scope" in attributes for tag, attributes in tags if tag == "th")
+        assert all({"role", "class"} <= set(names) or "aria-hidden" in names or "x" in names or "y" in names
+                   for tag, names in tags if tag == "svg")  # fmt: skip
+
+
+def test_only_the_parts_in_their_order() -> None:
+    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
+    assert [part.key for part in chapter.parts] == [
+        *("verdict", "models", "timeline", "terms", "axes", "circle", "sources", "assumptions", "commands"),
+    ]
+
+
+def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> None:
+    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
+    documents = {one.anchor: one for one in chapter.sources}
+    seen = 0
+    for table in (table for part in chapter.parts for table in part.tables):
+        for row in table.rows:
+            for column, cell in zip(table.columns, row.cells, strict=True):
+                model = next((one for one in (column.heading, column.group) if one in ("paper", "standard")), None)
+                if isinstance(cell, ShownFigure) and model is not None:
+                    owner = documents[cell.source].value("/".join(cell.pointer.split("/")[:3]))
+                    assert owner["timing_model"] == model
+                    assert owner.get("transaction", "") in column.group
+                    seen += 1
+    assert seen > 100
+
+
+def test_a_row_of_periods_holds_the_figures_of_its_period() -> None:
+    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
+    (part,) = (part for part in chapter.parts if part.key == "axes")
+    (source,) = (one for one in chapter.sources if one.anchor == part.commands[0])
+    for row in part.tables[0].rows:
+        figures = [cell for cell in row.cells if isinstance(cell, ShownFigure)]
+        periods = {source.value("/".join(cell.pointer.split("/")[:3]))["period_us"] for cell in figures}
+        assert periods == {figures[0].value}
+    assert [row.cells[0].text for row in part.tables[0].rows if row.level] == ["4000"]  # type: ignore[union-attr]
+
+
+def test_markdown_says_the_same_as_html() -> None:
+    content = page([ReportedProfile("paper-4ms", simulated(), other_period=False)], title=None)
+    markdown = page_markdown(content)
+    rendered = Tags(MarkdownIt("commonmark").enable("table").render(markdown)).text
+    for part in content.chapters[0].parts:
+        assert part.title in rendered
+        for table in part.tables:
+            for row in table.rows:
+                for cell in row.cells:
+                    text = getattr(cell, "text", cell if isinstance(cell, str) else "")
+                    assert " ".join(text.split()) in rendered
+    assert "```mermaid\ngantt\n" in markdown
+    assert "<svg" not in markdown
+
+
+# --- what cannot be shown is said -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("profile", "words"),
+    [
+        (changed(cycle__period_us=300.0), "Not drawn: the cycle does not fit the bus: 205.917 us needed of 150."),
+        (changed(servo__position_gain_per_s=1e5), "Not drawn: the position loop is unstable."),
+        (changed(cycle__period_us=4050.0), "The circle test cannot be run: "),
+        (changed(circle__feed_mm_per_min=60000.0), "The circle test cannot be run: "),
+        (changed(bus__nodes=5000), "Not drawn: bus.nodes = 5000: a timeline shows up to 1000 nodes"),
+        (
+            Ieee1394Profile.model_validate(BASE.model_dump(exclude_unset=True, include=Profile.model_fields.keys()
+                                           - {"servo", "circle", "tolerance", "delivery", "mechanics"})),
+            "The profile has no section for a circle test, so none was run.",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
+    content = page([ReportedProfile("x", all_answers(profile), other_period=False)], title=None)
+    assert words in Tags(page_html(content)).text
+    assert "nan" not in page_html(content).lower().replace("nano", "")
+    assert words.partition(":")[0] in page_markdown(content).replace("\\", "")
+
+
+@pytest.mark.parametrize(
+    ("nodes", "bars", "said"),
+    [(16, 2 * 9 * 16, ""), (62, 2 * 62, " A bar is a whole transaction."), (1000, 0, "1000 nodes are over the 62")],
+)
+def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
+    profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)
+    # A long circle is drawn no larger for more nodes: once is enough.
+    results = all_answers(profile, with_circle=nodes == 16)
+    html = page_html(page([ReportedProfile("x", results, other_period=False)], title=None))
+    assert len(html.encode()) < 300_000
+    assert said in Tags(html).text
+    lanes = re.findall(r"by node</text>.*?</svg>", html, re.DOTALL)
+    # The bus has a lane of its own, with the synchronous packet.
+    assert [lane.count("<title>") for lane in lanes] == ([bars + 1] if bars else [])
+
+
+def test_a_circle_that_was_left_out_is_said() -> None:
+    assert "The circle test was left out (--no-circle)." in Tags(page_html(made(BASE))).text
+
+
+# --- charts -----------------------------------------------------------------------------------------------
+
+
+def stairs(path: str) -> Iterator[tuple[float, float]]:
+    """Corners of a path of M, H and V."""
+    x = y = 0.0
+    for command, numbers in re.findall(r"([MHV])([^MHV]*)", path):
+        values = [float(one) for one in numbers.split()]
+        x = values[0] if command in "MH" else x
+        y = values[-1] if command in "MV" else y
+        yield x, y
+
+
+@pytest.mark.parametrize("profile", [BASE, changed(bus__max_hops=3), changed(cycle__period_us=100.0)])
+def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) -> None:
+    steps = [node_steps(profile, model=model) for model in ("paper", "standard")]
+    root = ET.fromstring(axes_chart(profile, steps))
+    from_us, to_us = drawn_range(profile, steps)
+    for one in steps:
+        (path,) = (
+            found for found in root.iter(f"{SVG}path") if found.get("class") == f"curve {PLACES[one.timing_model]}"
+        )
+        corners = list(stairs(path.get("d", "")))
+        wanted = [
+            1000 * math.log(at / from_us) / math.log(to_us / from_us) for at in one.from_us if from_us < at <= to_us
+        ]
+        assert sorted({x for x, _ in corners} - {0.0, 1000.0}) == pytest.approx(
+            sorted({round(x, 1) for x in wanted}), abs=0.06
+        )
+        heights = list(dict.fromkeys(y for _, y in corners))
+        assert len(heights) == len(wanted) + 1
+        assert all(
+            lower - upper == pytest.approx(heights[0] - heights[1], abs=0.11) for lower, upper in pairwise(heights)
+        )
+    marks = [(svg.get("x"), rect.get("class")) for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")]
+    own = f"{100 * math.log(profile.cycle.period_us / from_us) / math.log(to_us / from_us):.5g}%"
+    assert {(own, "mark first"), (own, "mark second")} <= set(marks)
+
+
+def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
+    steps = [node_steps(BASE, model=model) for model in ("paper", "standard")]
+    root = ET.fromstring(axes_chart(BASE, steps))
+    lines = [line for line in root.iter(f"{SVG}line") if line.get("class") == "rule" and line.get("x2") == "100%"]
+    figures = [text for text in root.iter(f"{SVG}text") if text.get("x") == "0" and text.get("class") == "small halo"]
+    heights = {
+        int((text.text or "").split()[0]): float(line.get("y1") or "")
+        for line, text in zip(lines, figures, strict=True)
+    }
+    most = max(heights)
+    per_axis = (heights[0] - heights[most]) / most
+    for axes, height in heights.items():
+        assert height == pytest.approx(heights[0] - axes * per_axis, abs=1)
+    (point,) = root.iter(f"{SVG}circle")
+    own_axes = BASE.bus.nodes * BASE.node.axes
+    assert float(point.get("cy") or "") == pytest.approx(heights[0] - own_axes * per_axis, abs=1)
+    marks = {rect.get("class"): svg for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")
+             if (svg.get("x") or "").endswith("%")}  # fmt: skip
+    for one in steps:
+        wanted = heights[0] - one.max_axes(BASE.cycle.period_us) * per_axis
+        assert float(marks[f"mark {PLACES[one.timing_model]}"].get("y") or "") == pytest.approx(wanted, abs=1)
+
+
+def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page() -> None:
+    results = all_answers(BASE, with_circle=False).capacity.results
+    root = ET.fromstring(terms_chart(results))
+    widths = [float((rect.get("width") or "").rstrip("%")) for rect in root.iter(f"{SVG}rect")]
+    bars = len([1 for one in results for term in TERMS if getattr(one, term.key) > 0])
+    alone = widths[-bars:]
+    longest = max(one.required_us for one in results)
+    shares = [one.required_us / longest * 100 for one in results]
+    first = len([1 for term in TERMS if getattr(results[0], term.key) > 0])
+    assert [sum(alone[:first]), sum(alone[first:])] == pytest.approx(shares, abs=0.01)
+
+
+def test_bars_are_the_terms_and_fill_the_slice() -> None:
+    results = simulated().capacity.results
+    root = ET.fromstring(terms_chart(results))
+    widths = [(rect.findtext(f"{SVG}title") or "", float((rect.get("width") or "").rstrip("%")))
+              for rect in root.iter(f"{SVG}rect")]  # fmt: skip
+    first = [term.key for term in TERMS if getattr(results[0], term.key) > 0]
+    shown = widths[: len(first) + 1]
+    wanted = [getattr(results[0], key) / results[0].available_us * 100 for key in (*first, "margin_us")]
+    assert [width for _, width in shown] == pytest.approx(wanted, rel=1e-3)
+    assert sum(width for _, width in shown) == pytest.approx(100.0, abs=0.01)
+    assert shown[-1][0] == "left of the slice, 1794.083 us"
+
+
+def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:
+    results = all_answers(changed(cycle__period_us=300.0), with_circle=False).capacity.results
+    root = ET.fromstring(terms_chart(results))
+    (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("class") == "edge")
+    assert float((edge.get("x1") or "").rstrip("%")) == pytest.approx(150 / results[1].required_us * 100, rel=1e-3)
+
+
+def radii(path: str) -> list[float]:
+    return [math.hypot(float(x), float(y)) for x, y in re.findall(r"(-?[\d.]+) (-?[\d.]+)", path)]
+
+
+def test_a_circle_is_drawn_as_far_out_as_its_error() -> None:
+    profile = ContourProfile((0.0, -0.01, 0.0, 0.0), (0.01, 0.0, 0.0, 0.0))
+    scale = magnified(profile, tolerance_mm=0.02)
+    assert scale is not None
+    assert (scale.largest_mm, scale.ring_um, scale.tolerance_mm) == (0.02, 10.0, 0.02)
+    assert scale.times(100.0) == pytest.approx(0.25 / 0.02 * 100)
+    root = ET.fromstring(circle_chart(profile, scale))
+    rings = {ring.get("class"): float(ring.get("r") or 0) for ring in root.iter(f"{SVG}circle")}
+    (path,) = root.iter(f"{SVG}path")
+    assert max(radii(path.get("d", ""))) == pytest.approx(rings["nominal"] * 1.125, abs=0.1)
+    assert min(radii(path.get("d", ""))) == pytest.approx(rings["nominal"] * 0.875, abs=0.1)
+    assert rings["tolerance"] == pytest.approx(rings["nominal"] * 1.25, abs=0.1)
+
+
+def test_a_gap_in_the_circle_stays_a_gap() -> None:
+    low: tuple[float | None, ...] = (None, 0.001, 0.001, None, 0.001, 0.001)
+    profile = ContourProfile(low, low)
+    scale = magnified(profile, tolerance_mm=None)
+    assert scale is not None
+    (path,) = ET.fromstring(circle_chart(profile, scale)).iter(f"{SVG}path")
+    assert [part.count("L") for part in path.get("d", "").split("M")[1:]] == [3, 3]
+
+
+@pytest.mark.parametrize("error_mm", [0.0, 1e-12])
+def test_no_error_is_no_drawing(error_mm: float) -> None:
+    assert magnified(ContourProfile((-error_mm,), (error_mm,)), tolerance_mm=0.01) is None
+
+
+def test_a_tolerance_far_outside_flattens_nothing() -> None:
+    scale = magnified(ContourProfile((0.0,), (0.001,)), tolerance_mm=0.1)
+    assert scale is not None
+    assert (scale.largest_mm, scale.tolerance_mm) == (0.001, None)
+
+
+def test_signed_bars_share_one_zero() -> None:
+    def bar(value: float) -> tuple[float, float, str]:
+        (rect,) = ET.fromstring(signed_bar(value, least=-1.0, most=3.0, title="x")).iter(f"{SVG}rect")
+        x, width = (float((rect.get(key) or "").rstrip("%")) for key in ("x", "width"))
+        return x, width, rect.get("class") or ""
+
+    assert bar(3.0) == (25.0, 75.0, "takes")
+    assert bar(-1.0) == (0.0, 25.0, "hides")
+    assert bar(0.0) == (25.0, 0.0, "takes")
+
+
+# --- colours ----------------------------------------------------------------------------------------------
+
+STYLE = (files("busplan.answers.page") / "templates" / "style.css").read_text(encoding="utf-8")
+SCHEMES = [
+    dict(re.findall(r"--([\w-]+): (#\w{6})", block)) for block in re.findall(r":root \{(.*?)\}", STYLE, re.DOTALL)
+]
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast of two colours (WCAG 2)."""
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=["light", "dark"])
+def test_words_and_curves_can_be_read_in_both_schemes(scheme: dict[str, str]) -> None:
+    for name in ("ink", "muted", "link", "good", "bad", "plain", "model-first", "model-second"):
+        assert contrast(scheme[name], scheme["paper"]) >= 4.5, name
+
+
+def test_letters_can_be_read_on_their_bars() -> None:
+    letters = dict.fromkeys(INKS, ("#10151c", "#10151c"))
+    letters |= dict.fromkeys(("sync", "request", "acknowledge", "reserve"), ("#ffffff", "#10151c"))
+    letters |= {"idle": (SCHEMES[0]["ink"], SCHEMES[1]["ink"]), "long-gap": ("#10151c", SCHEMES[1]["ink"])}
+    for term in (*TERMS, LEFT):
+        for letter, colour in zip(letters[term.ink], INKS[term.ink], strict=True):
+            assert contrast(letter, colour) >= 4.5, term

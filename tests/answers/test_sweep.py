@@ -1,0 +1,152 @@
+"""Rows of a sweep as text: the same characters that `capacity` writes, in any chunking."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from busplan.analysis.capacity.figures import capacity
+from busplan.analysis.sweep.blocks import Block, Column, figure_names, sweep
+from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
+from busplan.answers import documents
+from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
+from busplan.answers.sweep.top import Tally, TopRows
+from busplan.buses import kind_named
+from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.forms import json_and_csv
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.sections.profile import Profile
+
+BOTH: tuple[TimingModelName, ...] = ("paper", "standard")
+FIGURES = figure_names(load("paper-4ms").profile)
+AXES: dict[str, Values] = {
+    "bus.nodes": Steps(1, 16, 1, 3),
+    "bus.gap_count": Listed((63, "optimal")),
+    "cycle.period_us": Listed((250, 333.3, 4000)),
+}
+
+
+def blocks(chunk_points: int = 5) -> list[Block]:
+    profile = load("paper-4ms").profile
+    grid = checked_grid(profile, AXES, with_circle=False)
+    return list(sweep(profile, grid, timing_models=BOTH, chunk_points=chunk_points))
+
+
+def points() -> list[tuple[dict[str, object], Profile]]:
+    profile = load("paper-4ms").profile
+    grid = checked_grid(profile, AXES, with_circle=False)
+    changes = [chunk.point(0) for chunk in grid.chunks(1)]
+    return [(change, override(profile, change)) for change in changes]
+
+
+@pytest.mark.parametrize("chunk_points", [1, 4, 7, 100])
+def test_csv_is_what_capacity_writes_for_each_point(chunk_points: int) -> None:
+    columns = (*AXES, *FIGURES)
+    found = csv_header(columns) + "".join(block_text(block, columns, style="csv") for block in blocks(chunk_points))
+    expected = []
+    for changes, profile in points():
+        rows = csv.reader(
+            io.StringIO(json_and_csv.to_csv(documents.capacity_rows(capacity(profile, timing_models=BOTH))))
+        )
+        assert next(rows) == list(FIGURES)
+        expected += [[str(value) for value in changes.values()] + row for row in rows]
+    assert list(csv.reader(io.StringIO(found))) == [list(columns), *expected]
+
+
+def test_jsonl_is_what_capacity_writes_for_each_point() -> None:
+    columns = (*AXES, *FIGURES)
+    lines = "".join(block_text(block, columns, style="jsonl") for block in blocks()).splitlines()
+    expected = [
+        {**changes, **json.loads(json_and_csv.to_json(row))}
+        for changes, profile in points()
+        for row in documents.capacity_rows(capacity(profile, timing_models=BOTH))
+    ]
+    assert [json.loads(line) for line in lines] == expected
+    # Not only equal: 4.0 stays 4.0.
+    assert [repr(json.loads(line)["period_us"]) for line in lines] == [repr(row["period_us"]) for row in expected]
+
+
+def test_jsonl_begins_with_what_a_reader_must_know() -> None:
+    profile = load("paper-4ms").profile
+    header = json.loads(jsonl_header(profile.name, checked_grid(profile, AXES, with_circle=False), BOTH))
+    assert (header["schema"], header["command"], header["profile"]) == (1, "sweep", "paper-4ms")
+    assert (header["points"], header["rows"], header["varied"]["bus.gap_count"]) == (18, 36, 2)
+
+
+@pytest.mark.parametrize("chunk_points", [1, 5, 100])
+@pytest.mark.parametrize("complete", [True, False])
+def test_the_json_document_holds_the_rows_of_json_lines(chunk_points: int, complete: bool) -> None:
+    profile, columns = load("paper-4ms").profile, (*AXES, *FIGURES)
+    grid, parts = checked_grid(profile, AXES, with_circle=False), blocks(chunk_points)
+    # A sweep that was stopped has written some of its blocks.
+    written = parts if complete else parts[:1]
+    rows = "".join(json_rows(block, columns) for block in written)
+    document = json.loads(json_header(profile.name, grid, BOTH) + rows + json_footer(complete=complete))
+    lines = "".join(block_text(block, columns, style="jsonl") for block in written).splitlines()
+    assert document.pop("rows") == [json.loads(line) for line in lines]
+    assert document.pop("complete") is complete
+    header = json.loads(jsonl_header(profile.name, grid, BOTH))
+    assert header.pop("rows") == 36
+    assert document == header
+
+
+def test_a_json_document_without_rows_is_one() -> None:
+    profile = load("paper-4ms").profile
+    grid = checked_grid(profile, AXES, with_circle=False)
+    assert json.loads(json_header(profile.name, grid, BOTH) + json_footer(complete=False))["rows"] == []
+
+
+def test_what_does_not_exist_is_null_and_empty() -> None:
+    (block,) = blocks(100)
+    missing = Column(np.full(block.chunk.shape, np.nan))
+    holed = block._replace(models=tuple({**one, "phase_margin_deg": missing} for one in block.models))
+    assert '"phase_margin_deg": null}' in block_text(holed, ("fits", "phase_margin_deg"), style="jsonl")
+    assert block_text(holed, ("fits", "phase_margin_deg"), style="csv").splitlines()[0] == "true,"
+    top = TopRows(("bus.nodes", "phase_margin_deg"), sort_by="phase_margin_deg", ascending=True, top=3)
+    top.add(holed)
+    assert top.rows == []
+
+
+@pytest.mark.parametrize("ascending", [True, False])
+@pytest.mark.parametrize("top", [1, 4, 1000])
+def test_top_rows_are_those_of_a_whole_sort(ascending: bool, top: int) -> None:
+    kept = TopRows(("bus.nodes", "margin_us", "max_axes"), sort_by="max_axes", ascending=ascending, top=top)
+    rows = []
+    for block in blocks():
+        kept.add(block)
+        rows += [block.row(index, ("bus.nodes", "margin_us", "max_axes")) for index in range(2 * block.chunk.points)]
+    rows.sort(key=lambda row: row["max_axes"] * (1 if ascending else -1))
+    assert kept.rows == rows[:top]
+
+
+def test_without_a_sort_the_top_rows_are_the_first() -> None:
+    kept = TopRows(("bus.nodes", "timing_model"), sort_by=None, ascending=False, top=3)
+    for block in blocks(1):
+        kept.add(block)
+    assert [row["timing_model"] for row in kept.rows] == ["paper", "standard", "paper"]
+
+
+def test_the_summary_counts_points_under_each_model() -> None:
+    tally = Tally(kind_named("ieee1394"), BOTH)
+    for block in blocks(4):
+        tally.add(block)
+    fits = [[figures.fits for figures in capacity(profile, timing_models=BOTH).results] for _, profile in points()]
+    by_hand = [sum(column) for column in zip(*fits, strict=True)]
+    unsafe = sum(not capacity(profile).results[0].gap_count_safe for _, profile in points())
+    lines = [line.text for line in tally.lines("p", expected=18)]
+    assert lines[0] == f"p: 18 points; {by_hand[0]} by the paper model and {by_hand[1]} by the standard model fit."
+    assert (len(lines) == 2) == (unsafe > 0)
+    assert "18 points of 20 (interrupted)" in tally.lines("p", expected=20)[0].text
+
+
+def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
+    profile = load("paper-4ms").profile
+    grid = checked_grid(profile, {"bus.gap_count": Steps(0, 1, 1, 64)}, with_circle=False)
+    tally = Tally(kind_named("ieee1394"), BOTH)
+    for block in sweep(profile, grid, timing_models=BOTH):
+        tally.add(block)
+    # Two hops need 7: 0 to 6 are unsafe.
+    assert tally.lines("p", expected=64)[1].text.startswith("At 7 points the gap count is unsafe (gap_count_safe).")

@@ -1,0 +1,215 @@
+"""The drawings of a timeline: to scale, whole, and safe with any name."""
+
+import re
+from xml.etree import ElementTree as ET
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
+from busplan.answers.timeline import timeline_document, timeline_rows
+from busplan.buses import kind_named
+from busplan.buses.bus import IDLE
+from busplan.drawings.scale import ticks
+from busplan.drawings.timeline.characters import timeline_lines
+from busplan.drawings.timeline.lanes import node_lanes, stretches
+from busplan.drawings.timeline.mermaid import timeline_mermaid
+from busplan.drawings.timeline.png import timeline_png
+from busplan.drawings.timeline.svg import timeline_svg
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+
+SVG = "{http://www.w3.org/2000/svg}"
+HOSTILE = '<b>$x_1$ & %%{init: {"theme":"dark"}}%%; ]]> "q" # end: </svg>機械'
+
+
+def plan(**changes: object) -> Schedule:
+    return schedule(override(load("paper-4ms").profile, {key.replace("__", "."): v for key, v in changes.items()}))
+
+
+def drawn(one: Schedule, width: int = 80) -> list[str]:
+    return [line.text for line in timeline_lines(one, width=width)]
+
+
+def row(lines: list[str], label: str) -> str:
+    return next(line.split("|")[1] for line in lines if line.split("|")[0].strip() == label)
+
+
+def test_every_kind_has_its_own_mark() -> None:
+    bus = kind_named("ieee1394")
+    kinds = (*bus.event_kinds, IDLE)
+    assert len({kind.mark for kind in kinds}) == len(kinds) == 10
+    # The strip of the whole slice has whole transactions, and what belongs to no node.
+    strip = (bus.event_kind("sync"), *bus.stretch_kinds, bus.event_kind("nonperiodic"), IDLE)
+    assert len({kind.mark for kind in strip}) == len(strip) == 5
+    assert all(kind.mark.isascii() for kind in (*kinds, *strip))
+
+
+def test_the_request_is_the_hosts_and_its_acknowledge_the_nodes() -> None:
+    assert [one.label for one in plan().events[1:10]] == [
+        "host arbitration",
+        "host data",
+        "node acknowledge",
+        "node execution",
+        "node arbitration",
+        "node data",
+        "host acknowledge",
+        "subaction gap",
+        "arbitration reset gap",
+    ]
+
+
+@pytest.mark.parametrize("width", [60, 80, 132])
+@pytest.mark.parametrize("nodes", [1, 2, 16, 62])
+def test_a_drawing_fits_the_width_and_is_ascii(width: int, nodes: int) -> None:
+    lines = drawn(plan(bus__nodes=nodes, bus__max_hops=3, cycle__nonperiodic_us=50.0), width)
+    bars = [line for line in lines if line.count("|") == 2]
+    assert len(bars) >= min(nodes, 20)
+    assert {len(line) for line in bars} == {width}
+    assert all(line.isascii() for line in lines)
+
+
+def test_a_drawing_is_to_scale() -> None:
+    one = plan(bus__nodes=8)
+    lines = drawn(one, 132)
+    strip = row(lines, "cycle")
+    for mark, kinds in {"R": "read", "W": "write", "~": "idle"}.items():
+        part_us = sum(part.event.duration_us for part in stretches(one.events) if part.kind == kinds)
+        assert strip.count(mark) == pytest.approx(part_us / one.end_us * len(strip), abs=1.01)
+    for number in range(1, 9):
+        own = [event for event in one.events if event.node == number]
+        lane = row(lines, f"node {number}")
+        column_us = one.used_us / len(lane)
+        assert len(lane) - len(lane.lstrip()) == int(own[0].start_us / column_us)
+        assert len(lane.rstrip()) - 1 == pytest.approx(own[-1].end_us / column_us, abs=1.01)
+        execution_us = sum(event.duration_us for event in own if event.kind == "execution")
+        assert lane.count("=") == pytest.approx(execution_us / column_us, abs=2.01)
+
+
+def test_a_column_shows_what_takes_most_of_it() -> None:
+    # 2.9 us a column: arbitration takes 2.4 us of the first, and execution most of the second behind 1.5 us of others.
+    assert row(drawn(plan()), "node 1").split() == ["a=============a.::", "aa============a.:::"]
+
+
+def test_an_overrun_is_said_and_seen() -> None:
+    one = plan(cycle__period_us=300.0)
+    lines = drawn(one)
+    assert "does not fit, 55.917 us short, 205.917 us needed of 150.000 us (paper model)" in lines[0]
+    assert timeline_lines(one, width=80)[0].tone == "bad"
+    over = row(lines, "over")
+    assert over.lstrip() == "!" * over.count("!")
+    assert over.count("!") / len(over) == pytest.approx(55.917 / 205.917, abs=0.03)
+    assert "idle" not in "\n".join(lines)
+    assert "crit" in timeline_mermaid(one)
+    assert "beyond the slice, 55.917 us: 150.000 to 205.917 us" in timeline_svg(one)
+    document = timeline_document(one)
+    assert (document["fits"], document["exceeded"]) == (False, ["time"])
+    assert document["margin_us"] < 0
+    whole = "\n".join(drawn(plan()))
+    assert "beyond" not in whole + timeline_svg(plan())
+    assert "crit" not in timeline_mermaid(plan())
+
+
+def test_an_unsafe_gap_count_is_warned_of() -> None:
+    one = plan(bus__gap_count=5)
+    assert any("gap count 5 is unsafe" in line for line in drawn(one))
+    assert "gap count 5 is unsafe" in timeline_document(one)["warnings"][0]
+
+
+def test_a_single_transaction_is_drawn_event_by_event() -> None:
+    lines = drawn(zoom(plan(), transaction=("write", 2)))
+    assert any(line.startswith("The write of node 2, 154.538 to 205.917 us") for line in lines)
+    assert re.search(r"^node execution +36\.433 \| +=+ +\|$", "\n".join(lines), re.MULTILINE)
+    assert row(lines, "window").strip() == "^^^"
+    short = drawn(zoom(plan(), from_us=10.0, to_us=10.001))
+    assert row(short, "window").strip() == "^"
+
+
+@pytest.mark.parametrize(
+    "one",
+    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__nodes=62)],
+    ids=["whole", "overrun", "window", "many"],
+)
+def test_svg_bars_are_the_events(one: Schedule) -> None:
+    root = ET.fromstring(timeline_svg(one))
+    assert root.tag == f"{SVG}svg"
+    assert root.get("width") == "100%"
+    style = root.findtext(f"{SVG}style")
+    assert style is not None
+    assert "prefers-color-scheme:dark" in style
+    tips = [rect.findtext(f"{SVG}title") or "" for rect in root.iter(f"{SVG}rect")]
+    executions = [tip for tip in tips if "node execution" in tip]
+    assert len(executions) == sum(event.kind == "execution" for event in one.events)
+    widths = [
+        float((rect.get("width") or "").rstrip("%"))
+        for rect in root.iter(f"{SVG}rect")
+        if "node execution" in (rect.findtext(f"{SVG}title") or "")
+    ]
+    whole_us = (one.used_us if one.is_whole else one.to_us) - one.from_us
+    wanted = [event.duration_us / whole_us * 100 for event in one.events if event.kind == "execution"]
+    assert widths == pytest.approx(wanted, rel=1e-2)
+
+
+def test_hostile_names_are_text_in_every_form() -> None:
+    one = plan(name=HOSTILE)
+    root = ET.fromstring(timeline_svg(one))
+    assert (root.findtext(f"{SVG}title") or "").startswith(HOSTILE)
+    assert {element.tag.removeprefix(SVG) for element in root.iter()} <= {
+        *("svg", "title", "desc", "style", "rect", "line", "text")
+    }
+    title = timeline_mermaid(one).splitlines()[1]
+    assert re.fullmatch(r"    title (?:[A-Za-z0-9 .,()+/-]|#\d+;)+", title)
+    assert re.sub(r"#(\d+);", lambda code: chr(int(code[1])), title).startswith(f"    title {HOSTILE}")
+    assert timeline_png(one).startswith(b"\x89PNG")
+
+
+def test_mermaid_counts_nanoseconds_and_groups_many_events() -> None:
+    text = timeline_mermaid(zoom(plan(), transaction=("read", 1)))
+    assert "    dateFormat x\n    axisFormat %s us\n    section read of node 1\n" in text
+    assert "    host arbitration, 2.388 us :400, 2788\n" in text
+    spans = [tuple(map(int, pair)) for pair in re.findall(r":(?:\w+, )?(\d+), (\d+)$", text, re.MULTILINE)]
+    assert [start for start, _ in spans[1:]] == [end for _, end in spans[:-1]]
+    many = timeline_mermaid(plan(bus__nodes=10))
+    assert [line.strip() for line in many.splitlines() if "section" in line] == [
+        "section start of the cycle",
+        "section reads",
+        "section writes",
+        "section end of the cycle",
+    ]
+    assert many.count("node 10, ") == 2
+
+
+def test_png_is_the_same_for_the_same_schedule() -> None:
+    assert timeline_png(zoom(plan(), to_us=60.0)) == timeline_png(zoom(plan(), to_us=60.0))
+    assert timeline_png(plan(cycle__period_us=300.0, bus__nodes=20, bus__max_hops=2)).startswith(b"\x89PNG")
+
+
+def test_documents_hold_the_schedules_own_numbers() -> None:
+    one = zoom(plan(), to_us=50.0)
+    document = timeline_document(one)
+    assert [(row["start_us"], row["end_us"]) for row in document["events"]] == [one[1:] for one in spans(one)]
+    assert document["required_us"] == one.figures.required_us
+    assert [row["share"] for row in document["totals"]] == [part.share for part in totals(one)]
+    assert {row["profile"] for row in timeline_rows(one)} == {"paper-4ms"}
+
+
+def spans(one: Schedule) -> list[tuple[str, float, float]]:
+    return [(event.kind, event.start_us, event.end_us) for event in one.events]
+
+
+def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
+    one = plan(bus__nodes=12)
+    assert [lane.label for lane in node_lanes(one)] == ["bus", *(f"node {number}" for number in range(1, 13))]
+    assert [lane.label for lane in node_lanes(zoom(one, transaction=("write", 11)))] == ["node 11"]
+
+
+@settings(max_examples=200, deadline=None)
+@given(start=st.floats(0.0, 1e6), width=st.floats(1e-3, 1e6), most=st.integers(1, 12))
+def test_ticks_are_round_inside_the_window_and_few(start: float, width: float, most: int) -> None:
+    end = start + width
+    marks = ticks(start, end, most=most)
+    assert len(marks) <= most
+    assert all(start - width * 1e-6 <= mark.at_us <= end + width * 1e-6 for mark in marks)
+    assert len({mark.label for mark in marks}) == len(marks)
+    assert all(float(mark.label) == pytest.approx(mark.at_us, abs=width * 1e-6) for mark in marks)
