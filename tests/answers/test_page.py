@@ -26,7 +26,7 @@ from busplan.answers.page.markdown import page_markdown
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.drawings.axes import axes_chart, drawn_range
-from busplan.drawings.bars import signed_bar
+from busplan.forms.signed_bar import signed_bar
 from busplan.drawings.circle import circle_chart, magnified
 from busplan.drawings.terms import LEFT, terms_chart
 from busplan.drawings.timeline.kinds import INKS

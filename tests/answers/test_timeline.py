@@ -11,7 +11,7 @@ from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
 from busplan.answers.timeline import timeline_document, timeline_rows
 from busplan.buses import kind_named
 from busplan.buses.bus import IDLE
-from busplan.drawings.scale import ticks
+from busplan.forms.scale import ticks
 from busplan.drawings.timeline.characters import timeline_lines
 from busplan.drawings.timeline.lanes import node_lanes, stretches
 from busplan.drawings.timeline.mermaid import timeline_mermaid

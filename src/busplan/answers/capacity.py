@@ -1,41 +1,118 @@
-"""`busplan capacity` for people."""
+"""Answer of `busplan capacity`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import accumulate
 
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.verdict_sentences import verdict_lines
+from busplan.answers.documents import document, with_profile
+from busplan.answers.figure_tables import Owner, figure_table
+from busplan.answers.verdict import places_of, verdict_sentences, warnings
 from busplan.buses import figure
 from busplan.buses.bus import Bus
-from busplan.forms.lines import BLANK, GridRow, Line, figure_row, grid, plural
+from busplan.buses.figure import Figure
+from busplan.forms.blocks import Block, Code, Column, Document, Record, Report, Sentence, Table, count_value, sentence
+from busplan.forms.numbers import nouns
+from busplan.forms.terminal import sentence_text
 from busplan.sections.profile import Profile
 
 
-def capacity_table_rows(bus: Bus) -> tuple[GridRow, ...]:
-    """Rows of the table: the cycle and its terms, the slice, what the kind of bus adds, and what would fit."""
-    return (
-        *map(figure_row, (figure.AVAILABLE, figure.REQUIRED)),
-        *(figure_row(term, level=1) for term in bus.term_figures),
-        *map(figure_row, (figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE)),
-        *map(figure_row, bus.table_figures),
-        *map(figure_row, (figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES)),
-        *map(figure_row, (figure.LIMITED_BY, figure.FITS)),
+def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
+    """Answer the question of `capacity`."""
+    return Report(
+        Sentence(("Capacity of ", Code(result.profile.name))),
+        lambda: tuple(_blocks(result, verdicts)),
+        partial(capacity_document, result, verdicts),
+        lambda: with_profile(result.profile.name, capacity_records(result)),
     )
 
 
-def capacity_lines(result: Capacity, verdicts: Sequence[Verdict]) -> list[Line]:
+def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
     """Verdict and figures of each period, the models side by side."""
-    lines: list[Line] = []
-    for figures, verdict in zip(result.periods, verdicts, strict=True):
-        if lines:
-            lines.append(BLANK)
-        lines.extend((*verdict_lines(verdict, result.profile), BLANK, *_grid(result.profile, figures)))
-    return lines
+    for number, (figures, verdict, start) in enumerate(zip(result.periods, verdicts, _starts(result), strict=False)):
+        places = places_of(figures, start=start, change=number)
+        yield from verdict_sentences(verdict, result.profile, places=places)
+        yield capacity_table(result.profile, figures, start=start)
 
 
-def _grid(profile: Profile, figures: Sequence[CapacityFigures]) -> list[Line]:
+def _starts(result: Capacity) -> Iterator[int]:
+    """Number of each period's first set of figures among all of them."""
+    return accumulate(map(len, result.periods), initial=0)
+
+
+def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, start: int = 0) -> Table:
+    """Figures of one period, the timing models side by side.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    figures
+        A set for each timing model.
+    start
+        Number of the first among the results of the document.
+    """
     first, bus = figures[0], bus_of(profile)
-    setup = ", ".join(bus.setup_words(network_of(profile)))
-    heading = f"{plural(first.nodes, 'node')}, {plural(first.axes, 'axis')}\n{setup}"
-    return grid(heading, [(one.timing_model, one) for one in figures], capacity_table_rows(bus))
+    caption = sentence(
+        "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + "; {}",
+        count_value(first.nodes, "nodes", at=f"/results/{start}/nodes"),
+        count_value(first.axes, "axes", at=f"/results/{start}/axes"),
+        ", ".join(bus.setup_words(network_of(profile))),
+    )
+    owners = [Owner(Column(one.timing_model), one, f"/results/{start + number}") for number, one in enumerate(figures)]
+    return figure_table(_rows(bus), owners, caption=caption)
+
+
+def _rows(bus: Bus) -> list[tuple[Figure, int]]:
+    """The cycle and its terms, the slice, what the kind of bus adds, and what would fit; terms are of level 1."""
+    above = (figure.AVAILABLE, figure.REQUIRED)
+    below = (
+        *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
+        *bus.table_figures,
+        *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES),
+        *(figure.LIMITED_BY, figure.FITS),
+    )
+    return [*((one, 0) for one in above), *((one, 1) for one in bus.term_figures), *((one, 0) for one in below)]
+
+
+def capacity_records(result: Capacity) -> list[Record]:
+    """One row a period and timing model."""
+    return [{**figures.by_key(), "exceeded": list(figures.exceeded)} for figures in result.results]
+
+
+def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> Document:
+    """Document of `busplan capacity --format json`."""
+    return document(
+        "capacity",
+        profile=result.profile.name,
+        results=capacity_records(result),
+        verdicts=[_verdict(verdict, result) for verdict in verdicts],
+    )
+
+
+def _verdict(verdict: Verdict, result: Capacity) -> Document:
+    change = verdict.change
+    return {
+        "period_us": verdict.period_us,
+        "timing_model": verdict.deciding.timing_model,
+        "fits": verdict.deciding.fits,
+        "models_agree": verdict.models_agree,
+        **safety_record(verdict.deciding, result.profile),
+        "cheapest_change": change
+        and {
+            "changes": change.changes,
+            "nodes": change.nodes,
+            "fits": change.figures.fits,
+            "margin_us": change.figures.margin_us,
+        },
+        "warnings": warnings(result.profile, nodes=verdict.deciding.nodes, most=verdict.deciding.max_nodes),
+        "text": " ".join(map(sentence_text, verdict_sentences(verdict, result.profile))),
+    }
+
+
+def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
+    """Whether the bus is set safely, under the name that its kind has for it."""
+    safety = bus_of(profile).safety_figure
+    return {} if safety is None else {safety.key: figures.safe}

@@ -1,55 +1,64 @@
-"""`busplan latency` for people."""
+"""Answer of `busplan latency`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
 
 from busplan.analysis.latency import LatencyResult, Transaction, with_payload
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.verdict_sentences import execution_line, warnings
-from busplan.buses.bus import Bus
+from busplan.answers.documents import document, with_profile
+from busplan.answers.figure_tables import Owner, figure_table
+from busplan.answers.verdict import execution_sentence, warning_sentences
 from busplan.buses.figure import REQUIRED
-from busplan.forms.lines import BLANK, GridRow, Line, figure_row, grid
+from busplan.forms.blocks import Block, Code, Column, Document, Record, Report, Sentence, Table
 from busplan.sections.profile import Profile
 
 
-def latency_table_rows(bus: Bus) -> tuple[GridRow, ...]:
-    """Rows of the table: each phase of a transaction, all of them in us."""
-    figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
-    return tuple(figure_row(figure)._replace(unit="") for figure in figures)
+def latency_report(result: LatencyResult, profile: Profile) -> Report:
+    """Answer the question of `latency`."""
+    return Report(
+        Sentence(("Latency of ", Code(result.profile))),
+        lambda: tuple(_blocks(result, profile)),
+        partial(latency_document, result),
+        lambda: with_profile(result.profile, latency_records(result)),
+    )
 
 
-def latency_lines(result: LatencyResult, profile: Profile) -> list[Line]:
+def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
     """Phases of each transaction, the models side by side; one table for each payload."""
-    bus = bus_of(profile)
-    rows = latency_table_rows(bus)
-    lines: list[Line] = []
-    for _, group in groupby(_numbered(result.transactions), key=lambda pair: pair[0]):
-        lines.extend((*grid("phase, us", [_column(one) for _, one in group], rows), BLANK))
     network = network_of(profile)
-    lines.append(Line(f"{result.profile}: {bus.latency_subject(network)}."))
-    lines.extend(execution_line(profile))
-    lines.extend(Line(f"Warning: {words}.", "warning") for words in _over(result, profile))
-    lines.extend(Line(warning, "warning") for warning in warnings(profile, nodes=network.nodes, most=0))
-    return lines
+    yield from latency_tables(result, profile)
+    yield Sentence((f"{result.profile}: {bus_of(profile).latency_subject(network)}.",))
+    yield from execution_sentence(profile)
+    yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
+    yield from warning_sentences(profile, nodes=network.nodes, most=0)
 
 
-def _numbered(transactions: Sequence[Transaction]) -> list[tuple[int, Transaction]]:
-    """Each transaction with the number of its table: one that is there already begins a new one."""
-    found: list[tuple[int, Transaction]] = []
+def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
+    """Each phase of the transactions, all of them in us; one table for each payload."""
+    bus = bus_of(profile)
+    figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
+    caption = Sentence((f"Phases in us, {bus.latency_subject(network_of(profile))}",))
+    for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
+        owners = [Owner(_column(one), one.phases, f"/transactions/{place}") for _, place, one in group]
+        yield figure_table([(figure, 0) for figure in figures], owners, caption=caption, unit=False)
+
+
+def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:
+    """Each transaction with the number of its table and its own: one that is there already begins a new table."""
     seen: set[tuple[str, str]] = set()
     number = 0
-    for one in transactions:
+    for place, one in enumerate(transactions):
         key = (one.timing_model, one.transaction)
         if key in seen:
             number, seen = number + 1, set()
         seen.add(key)
-        found.append((number, one))
-    return found
+        yield number, place, one
 
 
-def _column(one: Transaction) -> tuple[str, object]:
+def _column(one: Transaction) -> Column:
     payload = "" if one.payload_bytes is None else f" {one.payload_bytes} B"
-    return f"{one.transaction}{payload}\n{one.timing_model}", one.phases
+    return Column(one.timing_model, group=f"{one.transaction}{payload}")
 
 
 def _over(result: LatencyResult, profile: Profile) -> list[str]:
@@ -58,3 +67,19 @@ def _over(result: LatencyResult, profile: Profile) -> list[str]:
     networks = [network_of(with_payload(profile, size)) for size in sizes] or [network_of(profile)]
     broken = (limit.words(network) for network in networks for limit in bus_of(profile).broken(network))
     return list(dict.fromkeys(broken))
+
+
+def latency_records(result: LatencyResult) -> list[Record]:
+    """One row a transaction, phases flat beside what they belong to."""
+    return [_record(transaction) for transaction in result.transactions]
+
+
+def _record(transaction: Transaction) -> Record:
+    record = transaction._asdict()
+    phases = record.pop("phases")
+    return {**record, **{key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}}
+
+
+def latency_document(result: LatencyResult) -> Document:
+    """Document of `busplan latency --format json`."""
+    return document("latency", profile=result.profile, transactions=latency_records(result))

@@ -2,11 +2,12 @@
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from busplan.forms.lines import Line, plain_text
+from busplan.forms import render
+from busplan.forms.blocks import Report
+from busplan.forms.terminal import block_lines
 
 
 class Answer(ABC):
@@ -14,9 +15,9 @@ class Answer(ABC):
 
     __slots__ = ()
 
-    @abstractmethod
     def to_json(self) -> str:
         """Write the document of the command's `--format json`, as text with a line end."""
+        return render(self._report(), "json")
 
     def to_dict(self) -> dict[str, Any]:
         """Give the document of the command's `--format json` as plain data, anew with each call."""
@@ -25,15 +26,15 @@ class Answer(ABC):
         return document
 
     @abstractmethod
-    def _report(self) -> Sequence[Line]:
-        """Lines that the command prints."""
+    def _report(self) -> Report:
+        """What the command answers."""
 
     def _headline(self) -> str:
         """The answer in one line."""
-        return self._report()[0].text
+        return next(block_lines(self._report().blocks())).text
 
     def __str__(self) -> str:
-        return plain_text(self._report()).removesuffix("\n")
+        return render(self._report(), "table").removesuffix("\n")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._headline()}>"

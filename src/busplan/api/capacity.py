@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from busplan.analysis.capacity import figures as analysis
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict, verdicts
-from busplan.answers import documents
-from busplan.answers.capacity import capacity_lines
+from busplan.answers.capacity import capacity_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
-from busplan.forms.json_and_csv import to_json
-from busplan.forms.lines import Line
+from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 
 
@@ -38,12 +36,8 @@ class CapacityAnswer(Answer):
         """All sets of figures in one row: a period after the other, a timing model after the other within each."""
         return self._found.results
 
-    def to_json(self) -> str:
-        """Write the document of `busplan capacity --format json`."""
-        return to_json(documents.capacity_document(self._found, self.verdicts))
-
-    def _report(self) -> list[Line]:
-        return capacity_lines(self._found, self.verdicts)
+    def _report(self) -> Report:
+        return capacity_report(self._found, self.verdicts)
 
     @property
     def _found(self) -> Capacity:

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 from busplan.analysis import latency as analysis
 from busplan.analysis.latency import Transaction
-from busplan.answers import documents
-from busplan.answers.latency import latency_lines
+from busplan.answers.latency import latency_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
-from busplan.forms.json_and_csv import to_json
-from busplan.forms.lines import Line, plural
+from busplan.forms.blocks import Report
+from busplan.forms.numbers import plural
 from busplan.sections.profile import Profile
 
 
@@ -29,12 +28,8 @@ class LatencyAnswer(Answer):
     profile: Profile
     transactions: tuple[Transaction, ...]
 
-    def to_json(self) -> str:
-        """Write the document of `busplan latency --format json`."""
-        return to_json(documents.latency_document(self._found))
-
-    def _report(self) -> list[Line]:
-        return latency_lines(self._found, self.profile)
+    def _report(self) -> Report:
+        return latency_report(self._found, self.profile)
 
     def _headline(self) -> str:
         return f"{self.profile.name}: {plural(len(self.transactions), 'transaction')} of the farthest node"

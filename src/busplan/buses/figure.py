@@ -163,7 +163,7 @@ BINDING_TERM: Final = Figure(
     "binding_term", "binding term", _SLICE, "the largest part of what the cycle needs", sort="word"
 )
 UTILISATION: Final = Figure(
-    "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", better="less"
+    "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"
 )
 MARGIN: Final = Figure(
     "margin_us", "margin", _CYCLE, "what is left of the slice", "margin", better="more", scale="available_us"

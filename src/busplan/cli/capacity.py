@@ -1,9 +1,12 @@
 """`busplan capacity`."""
 
+from busplan.cli.answering import answer
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     NO_CHANGES,
     Changes,
     FormatOption,
+    OutputOption,
     PeriodsOption,
     ProfileArgument,
     TimingOption,
@@ -12,7 +15,6 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_models,
 )
-from busplan.cli.output import emit, emit_document
 
 
 @takes_bus_options
@@ -21,7 +23,8 @@ def capacity_command(
     period: PeriodsOption = None,
     changes: Changes = NO_CHANGES,
     timing: TimingOption = "both",
-    format_: FormatOption = "table",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
@@ -30,25 +33,11 @@ def capacity_command(
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
-    from busplan.analysis.capacity.figures import capacity
-    from busplan.analysis.capacity.verdict import verdicts
+    with answer(format_, output, inputs=profile_files(profile)) as give:
+        from busplan.analysis.capacity.figures import capacity
+        from busplan.analysis.capacity.verdict import verdicts
+        from busplan.answers.capacity import capacity_report
 
-    plan = load_changed(profile, changes)
-    result = capacity(
-        plan,
-        periods_us=periods_us(period, plan),
-        timing_models=timing_models(timing, plan),
-    )
-    if format_ == "table":
-        from busplan.answers.capacity import capacity_lines
-
-        emit(capacity_lines(result, verdicts(result)))
-        return
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
-
-    emit_document(
-        json_and_csv.to_json(documents.capacity_document(result, verdicts(result)))
-        if format_ == "json"
-        else json_and_csv.to_csv(documents.with_profile(plan.name, documents.capacity_rows(result)))
-    )
+        plan = load_changed(profile, changes)
+        result = capacity(plan, periods_us=periods_us(period, plan), timing_models=timing_models(timing, plan))
+        give(capacity_report(result, verdicts(result)))

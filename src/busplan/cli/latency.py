@@ -4,10 +4,13 @@ from typing import Annotated
 
 import typer
 
+from busplan.cli.answering import answer
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     NO_CHANGES,
     Changes,
     FormatOption,
+    OutputOption,
     ProfileArgument,
     TimingOption,
     load_changed,
@@ -15,7 +18,6 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_models,
 )
-from busplan.cli.output import emit, emit_document
 
 
 @takes_bus_options
@@ -33,7 +35,8 @@ def latency_command(
     ] = None,
     changes: Changes = NO_CHANGES,
     timing: TimingOption = "both",
-    format_: FormatOption = "table",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Show where the microseconds of one read and one write go, phase by phase, under both timing models.
 
@@ -42,24 +45,14 @@ def latency_command(
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
-    from busplan.analysis.latency import latency
+    with answer(format_, output, inputs=profile_files(profile)) as give:
+        from busplan.analysis.latency import latency
+        from busplan.answers.latency import latency_report
 
-    plan = load_changed(profile, changes)
-    result = latency(
-        plan,
-        payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
-        timing_models=timing_models(timing, plan),
-    )
-    if format_ == "table":
-        from busplan.answers.latency import latency_lines
-
-        emit(latency_lines(result, plan))
-        return
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
-
-    emit_document(
-        json_and_csv.to_json(documents.latency_document(result))
-        if format_ == "json"
-        else json_and_csv.to_csv(documents.with_profile(plan.name, documents.latency_rows(result)))
-    )
+        plan = load_changed(profile, changes)
+        result = latency(
+            plan,
+            payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
+            timing_models=timing_models(timing, plan),
+        )
+        give(latency_report(result, plan))

@@ -7,19 +7,19 @@ from functools import wraps
 from inspect import Parameter, signature
 from math import isinf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
 from busplan.errors import BusplanError
+from busplan.forms import ENDINGS, Form
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from busplan.sections.profile import Profile
 
-Form = TypeVar("Form", bound=str)
-Format = Literal["table", "json", "csv"]
+AnyForm = TypeVar("AnyForm", bound=str)
 
 _TIME: Final = re.compile(r"(?P<value>[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]{1,3})?|\.[0-9]+)\s*(?P<unit>us|ms|s)")
 MAX_BYTES: Final = 1_000_000
@@ -80,7 +80,6 @@ TimingOption = Annotated[
         "the standard's clock and packets.",
     ),
 ]
-FormatOption = Annotated[Format, typer.Option("--format", help="Form of the document on standard output.")]
 
 
 def bus_changes(*, nodes: int | None, gap_count: str | None) -> dict[str, object]:
@@ -273,7 +272,20 @@ def _file_unless_dash(text: str) -> Path | None:
     return None if text == "-" else Path(text)
 
 
-def form_of_file(given: Form | None, output: Path | None, *, forms: "Mapping[str, Form]", default: Form) -> Form:
+FormatOption = Annotated[
+    Form | None,
+    typer.Option(
+        "--format",
+        help="Form of the answer; a table is text in lines.  [default: by the ending of --output, else table]",
+        show_default=False,
+    ),
+]
+OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
+
+
+def form_of_file(
+    given: AnyForm | None, output: Path | None, *, forms: "Mapping[str, AnyForm]", default: AnyForm
+) -> AnyForm:
     """The form of a document: what --format says, else what the name of --output says, else the default.
 
     Raises

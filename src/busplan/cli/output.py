@@ -4,28 +4,23 @@ import io
 import os
 import stat
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from errno import EISDIR
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from busplan.cli.interrupt import StoppedError
 from busplan.errors import BusplanError
-
-if TYPE_CHECKING:
-    from busplan.forms.lines import Line
 
 PLAN_FAILS: int = 1
 """Exit code of a plan that does not hold."""
 CANNOT: int = 2
 """Exit code of a run that could not do its job."""
 
-_NARROWEST = 40
 _LONG_NAME = 200
 _NEW_MODE = 0o666
 """Permissions of a new file, less what the user's umask takes."""
-_STYLES = {"good": "bold green", "bad": "bold red", "warning": "yellow", "heading": "bold", "plain": "", "table": ""}
 
 
 class PlanFailsError(Exception):
@@ -100,28 +95,9 @@ def write_document(document: str | bytes, output: Path | None, *, quiet: bool = 
         say(f"wrote {output}")
 
 
-def emit(lines: Iterable["Line"]) -> None:
-    """Write a report to stdout: with colours on a terminal only, and none under NO_COLOR."""
-    from busplan.forms.lines import plain_text
-
-    # A pipe gets plain lines, and does not wait for the renderer to load.
-    styled = os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()
-    emit_text((_styled if styled else plain_text)(lines))
-
-
-def _styled(lines: Iterable["Line"]) -> str:
-    from rich.console import Console
-    from rich.text import Text
-
-    from busplan.printable import printable
-
-    buffer = io.StringIO()
-    console = Console(file=buffer, force_terminal=True, highlight=False, markup=False, emoji=False)
-    # On a terminal too narrow for a sentence, and for the lines of a table, the terminal breaks: no figure is ever cut.
-    console.width = max(console.width, _NARROWEST)
-    for line in lines:
-        console.print(Text(printable(line.text), style=_STYLES[line.tone]), soft_wrap=line.tone in ("table", "heading"))
-    return buffer.getvalue()
+def is_styled() -> bool:
+    """Whether to write with colours: on a terminal, or where FORCE_COLOR asks for them."""
+    return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()
 
 
 def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:

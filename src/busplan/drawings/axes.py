@@ -8,9 +8,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.capacity.node_steps import NodeSteps
 from busplan.answers.verdict_sentences import period
-from busplan.drawings.scale import round_steps
-from busplan.drawings.svg import drawing, markup, text_at
 from busplan.forms.lines import plural
+from busplan.forms.scale import round_steps
+from busplan.forms.svg import drawing, markup, text_at
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
 

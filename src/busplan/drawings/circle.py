@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.drawings.circle_plot import ERROR_SHARE, nice_step
-from busplan.drawings.svg import drawing, markup, text_at
+from busplan.forms.svg import drawing, markup, text_at
 
 _WIDTH: Final = 470
 _HEIGHT: Final = 400

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from busplan.drawings.scale import round_steps
 from busplan.errors import BusplanError
+from busplan.forms.scale import round_steps
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures, CircleTest

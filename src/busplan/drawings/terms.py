@@ -7,8 +7,8 @@ from xml.etree.ElementTree import Element, SubElement
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.buses import kind_named
 from busplan.buses.figure import MARGIN, Figure
-from busplan.drawings.svg import LINE, Scale, drawing, markup, text_at
 from busplan.forms.lines import us
+from busplan.forms.svg import LINE, Scale, drawing, markup, text_at
 
 _THIN: Final = 12
 _THICK: Final = 28

@@ -1,24 +1,38 @@
-"""A page as one HTML file: no network, no script, light and dark, phone and paper."""
+"""An answer as one HTML file: no network, no script, light and dark, phone and paper."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from busplan.answers.page import content
-from busplan.drawings.timeline.svg_style import DARK, fills, stylesheet
+from busplan import __version__
+from busplan.forms import blocks as made_of
+from busplan.forms.blocks import Bar, Block, Chart, Command, Report, Section, Sentence, Table, Value
+from busplan.forms.columns import cell_text
+from busplan.forms.inks import DARK, fills
+from busplan.forms.numbers import MISSING, with_unit, written
+from busplan.forms.signed_bar import signed_bar
+from busplan.forms.terminal import sentence_text
+from busplan.printable import json_text
+
+_TYPES: Final = ("Value", "Words", "Code", "Link", "Swatch", "Bar", "Command", "Sentence")
+_BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Steps", "Question", "Section")
 
 
-def page_html(page: content.Page) -> str:
-    """Write a page; whatever a profile is called, it is text.
+def page(report: Report) -> str:
+    """Write an answer; whatever a profile is called, it is text.
 
     Parameters
     ----------
-    page
-        Its content.
+    report
+        The answer.
 
     Returns
     -------
     str
-        The whole document; the same for the same content.
+        The whole document; the same for the same answer.
     """
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
@@ -28,14 +42,71 @@ def page_html(page: content.Page) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.tests["figure"] = lambda cell: isinstance(cell, content.ShownFigure)
-    environment.tests["drawing"] = lambda cell: isinstance(cell, content.Drawing)
-    environment.tests["swatch"] = lambda cell: isinstance(cell, content.Swatch)
-    environment.tests["link"] = lambda cell: isinstance(cell, content.ChapterLink)
-    environment.tests["code"] = lambda cell: isinstance(cell, content.Code)
-    environment.tests["source"] = lambda cell: isinstance(cell, content.SourceCommand)
-    # An SVG of ours is markup: its writer has escaped what it says.
-    environment.filters["svg"] = Markup
+    for name in (*_TYPES, *_BLOCKS):
+        kind = getattr(made_of, name)
+        environment.tests[name.lower()] = lambda one, kind=kind: isinstance(one, kind)
+    environment.filters |= {
+        "exact": lambda value: json_text(value.value),
+        "written": written,
+        "unit": _unit,
+        "plain": sentence_text,
+        "runs": lambda found: list(_runs(found)),
+        "groups": _groups,
+        "words": cell_text,
+        "bar": _bar,
+        # An SVG of ours is markup: its writer has escaped what it says.
+        "svg": Markup,
+        "holds_sections": lambda section: any(isinstance(one, Section) for one in section.blocks),
+    }
+    found = report.blocks()
     light, dark = fills(".chart")
-    colours = Markup(f"{stylesheet()}{light}{DARK}{{\n{dark}}}\n")  # noqa: S704 - constants of ours
-    return environment.get_template("page.html.j2").render(page=page, colours=colours)
+    styles = dict.fromkeys(chart.drawing.stylesheet for chart in _charts(found))
+    colours = Markup(f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n")  # noqa: S704 - constants of ours
+    return environment.get_template("page.html.j2").render(
+        title=report.title,
+        blocks=found,
+        program=f"busplan {__version__}",
+        colours=colours,
+    )
+
+
+def _unit(value: Value) -> str:
+    """What stands behind a figure in a sentence."""
+    return with_unit(value).removeprefix(written(value)) if written(value) != MISSING else ""
+
+
+def _charts(blocks: Sequence[Block]) -> Iterator[Chart]:
+    for block in blocks:
+        if isinstance(block, Chart):
+            yield block
+        elif isinstance(block, Section):
+            yield from _charts(block.blocks)
+
+
+def _runs(blocks: Sequence[Block]) -> Iterator[tuple[str, list[Block]]]:
+    """Neighbouring blocks that are set in one way."""
+    for role, run in groupby(blocks, key=_role):
+        yield role, list(run)
+
+
+def _role(block: Block) -> str:
+    match block:
+        case Sentence():
+            return "words"
+        case Command():
+            return "commands"
+        case Section():
+            return "sections"
+    return "body"
+
+
+def _groups(table: Table) -> list[tuple[str, int]]:
+    """The headings above the columns' own with how many columns each spans; nothing where there are none."""
+    found = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
+    return found if any(name for name, _ in found) else []
+
+
+def _bar(bar: Bar) -> Markup:
+    title = f"{written(bar.value)} {bar.value.unit}"
+    drawn = signed_bar(float(bar.value.value), least=bar.least, most=bar.most, title=title)
+    return Markup(drawn)  # noqa: S704 - an SVG of ours

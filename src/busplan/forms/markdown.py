@@ -1,73 +1,165 @@
-"""GitHub's Markdown: tables and words in which nothing of a profile's text is markup."""
+"""An answer as Markdown, for a repository's page or a comment: nothing of a profile's text is markup."""
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import Final
 
-from busplan.printable import printable
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Chart,
+    Code,
+    Command,
+    Facts,
+    Link,
+    Part,
+    Question,
+    Report,
+    Section,
+    Sentence,
+    Snippet,
+    Steps,
+    Swatch,
+    Table,
+    Value,
+    Words,
+)
+from busplan.forms.columns import cell_text
+from busplan.forms.markdown_words import code, escaped, table
+from busplan.forms.numbers import with_unit
 
-_INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:$]|(?<=www)\.")
-"""Markup inside a line, and what makes a link, a mention or a formula of bare words."""
-_AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=#])")
-"""What makes a list, a heading or a rule of the line that it begins."""
-
-BAR: Final = r"\|"
-"""A bar inside a cell, also inside code: the table is taken apart before its cells are read."""
-
-
-def escaped(text: str) -> str:
-    r"""Escape Markdown.
-
-    Examples
-    --------
-    >>> escaped("a *b*")
-    'a \\*b\\*'
-    """
-    return _AT_START.sub(r"\1\\\2", _INSIDE.sub(r"\\\g<0>", printable(" ".join(text.split()))))
-
-
-def code(text: str) -> str:
-    """Write text as code: nothing in it is markup, no mention and no link, and nothing commands a terminal.
-
-    Parameters
-    ----------
-    text
-        Any text; line ends become spaces.
-
-    Examples
-    --------
-    >>> code("bus.nodes"), code("a ` b")
-    ('`bus.nodes`', '`` a ` b ``')
-    """
-    line = printable(" ".join(text.split()))
-    longest = max(map(len, re.findall("`+", line)), default=0)
-    fence = "`" * (longest + 1)
-    # A backtick at an edge would join the fence.
-    space = " " if longest else ""
-    return f"{fence}{space}{line}{space}{fence}" if line else "` `"
+_COMMENT_LEVEL: Final = 3
+"""Level of the title of what has no sections: it is read inside another page, as a comment on a change."""
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) -> list[str]:
-    r"""Lay out a table.
+def text(report: Report) -> str:
+    """Write an answer in Markdown.
 
     Parameters
     ----------
-    headings
-        One a column.
-    rows
-        Cells, as many as headings; Markdown already, but for the bars that would part them.
-    left
-        How many of the first columns are words, set to the left; the others are figures, set to the right.
-
-    Returns
-    -------
-    list
-        Lines of Markdown, without line ends.
-
-    Examples
-    --------
-    >>> table(["name", "us"], [["`a | b`", "1"]], left=1)[-1]
-    '| `a \\| b` | 1 |'
+    report
+        The answer.
     """
-    rule = [":---" if number < left else "---:" for number in range(len(headings))]
-    return [f"| {' | '.join(cell.replace('|', BAR) for cell in row)} |" for row in (headings, rule, *rows)]
+    blocks = report.blocks()
+    level = 1 if any(isinstance(block, Section) for block in blocks) else _COMMENT_LEVEL
+    lines = (f"{'#' * level} {_sentence(report.title)}", *_blocks(blocks, level=level + 1))
+    return "\n".join(lines) + "\n"
+
+
+def _blocks(blocks: Sequence[Block], *, level: int) -> Iterator[str]:
+    """Lines of blocks, a blank one in front of each; commands in a row are one listing."""
+    for are_commands, run in groupby(blocks, key=lambda block: isinstance(block, Command)):
+        if are_commands:
+            yield from ("", "```sh", *(one.line for one in run if isinstance(one, Command)), "```")
+            continue
+        for block in run:
+            lines = list(_lines(block, level=level))
+            yield from ("", *lines) if lines else ()
+
+
+def _lines(block: Block, *, level: int) -> Iterator[str]:
+    match block:
+        case Sentence():
+            words = _sentence(block)
+            yield f"**{words}**" if block.state in ("passes", "fails") else words
+        case Facts():
+            yield f"{_facts(block)}."
+        case Table():
+            yield from _caption(block.caption)
+            yield from _table(block)
+        case Chart():
+            drawn = block.drawing.mermaid()
+            if drawn is not None:
+                yield from (*_caption(block.caption), "```mermaid", drawn.rstrip("\n"), "```")
+        case Snippet():
+            yield from (f"```{block.language}", *block.lines, "```")
+        case Steps():
+            yield from _steps(block)
+        case Question():
+            yield from (f"**{escaped(block.question)} {escaped(block.answer.text)}.**", "")
+            yield from (f"- {_sentence(one)}" for one in block.sentences)
+            if block.facts.items:
+                yield from ("", f"{_facts(block.facts)}.")
+        case Section():
+            yield from (f'<a id="{block.key}"></a>', "") if block.key else ()
+            yield f"{'#' * level} {_sentence(block.title)}"
+            yield from _blocks(block.blocks, level=level + 1)
+        case Command():
+            yield code(block.line)
+
+
+def _caption(caption: Sentence | None) -> tuple[str, ...]:
+    return (f"{_sentence(caption).removesuffix('.')}:", "") if caption else ()
+
+
+def _facts(facts: Facts) -> str:
+    return ", ".join(f"{escaped(name)} {_part(value)}" for name, value in facts.items)
+
+
+def _sentence(sentence: Sentence) -> str:
+    # As a whole: what begins a line or makes a link may lie across a figure. Code is text whatever it holds.
+    pieces: list[str] = []
+    for is_code, run in groupby(sentence.parts, key=lambda part: isinstance(part, Code)):
+        if is_code:
+            pieces += map(_part, run)
+        else:
+            words = "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in run)
+            before, after = (" " if words[at : at + 1].isspace() else "" for at in (0, len(words) - 1))
+            pieces.append(f"{before}{escaped(words)}{after}")
+    return "".join(pieces).strip()
+
+
+def _part(part: Part) -> str:
+    match part:
+        case Value():
+            return escaped(with_unit(part))
+        case Code():
+            return code(part.text)
+    return escaped(part)
+
+
+def _table(one: Table) -> list[str]:
+    # A drawing has no place here; what it shows stands in figures beside it.
+    shown = [number for number, column in enumerate(one.columns) if column.kind != "drawing"]
+    columns = [one.columns[number] for number in shown]
+    headings = [
+        escaped(", ".join(filter(None, (" ".join(filter(None, (column.group, column.heading))), column.unit)))) or " "
+        for column in columns
+    ]
+    rows = ([_in_row(_cell(row.cells[number]), sought=row.sought) for number in shown] for row in one.rows)
+    figures = (place for place, column in enumerate(columns) if column.kind == "figures" and not one.stacks)
+    return table(headings, rows, left=next(figures, len(columns)))
+
+
+def _in_row(words: str, *, sought: bool) -> str:
+    return f"**{words}**" if sought and words and not words.startswith("**") else words
+
+
+def _cell(cell: Cell) -> str:
+    match cell:
+        case Value() | Words():
+            words = escaped(cell_text(cell))
+            return f"**{words}**" if cell.state == "fails" and words else words
+        case Link():
+            origin = "" if cell.origin == cell.text else f" {code(cell.origin)}"
+            return f"[{code(cell.text)}](#{cell.key}){origin}"
+        case Command() | Code():
+            return code(cell_text(cell))
+        case Swatch():
+            # Its mark stands for a colour, which is not here.
+            return escaped(cell.text)
+    return escaped(cell_text(cell))
+
+
+def _steps(steps: Steps) -> list[str]:
+    rows = (
+        [
+            str(number),
+            escaped(step.reference),
+            code(f"{step.symbol} = {step.formula}" if step.formula else step.symbol),
+            code(step.numbers) if step.numbers else "",
+            escaped(with_unit(step.result) if isinstance(step.result, Value) else step.result.text),
+        ]
+        for number, step in enumerate(steps.steps, start=1)
+    )
+    return table(["step", "eq", "formula", "numbers", "result"], rows, left=4)

@@ -8,9 +8,9 @@ from busplan.analysis.circle.roundness import CircleFigures
 from busplan.answers.circle import circle_verdict_lines, signed_um, two_decimals, um
 from busplan.answers.page.bus import plain
 from busplan.answers.page.content import Chart, Drawing, Part, Row, ShownVerdict, SourceCommand, Table, TableColumn
-from busplan.drawings.bars import signed_bar
 from busplan.drawings.circle import Magnified, circle_chart, magnified
 from busplan.forms.lines import GridRow, count, yes
+from busplan.forms.signed_bar import signed_bar
 
 _QUESTION: Final = "Is the circle still round?"
 _ROWS: Final = (

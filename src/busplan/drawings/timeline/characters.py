@@ -7,7 +7,6 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Event, Schedule, totals
 from busplan.answers.verdict_sentences import warnings
 from busplan.buses.bus import IDLE
-from busplan.drawings.scale import ticks
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import (
     Lane,
@@ -24,6 +23,7 @@ from busplan.drawings.timeline.lanes import (
     strip_title,
 )
 from busplan.forms.lines import BLANK, Line, table, us
+from busplan.forms.scale import ticks
 
 NARROWEST: Final = 60
 """Columns below which a drawing would show nothing."""

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from busplan.analysis.timeline.schedule import Event, Schedule, totals
-from busplan.drawings.timeline.kinds import INKS, kind_of
+from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import (
     Lane,
     beyond,
@@ -24,6 +24,7 @@ from busplan.drawings.timeline.lanes import (
     stretches,
     strip_title,
 )
+from busplan.forms.inks import INKS
 from busplan.forms.lines import us
 
 _OVER: Final = "#b3261e"

@@ -6,7 +6,6 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.timeline.schedule import Event, Schedule, totals
-from busplan.drawings.svg import LINE, Scale, drawing, inside, markup, text_at
 from busplan.drawings.timeline.kinds import event_title, kind_of
 from busplan.drawings.timeline.lanes import (
     Stretch,
@@ -25,6 +24,7 @@ from busplan.drawings.timeline.lanes import (
 )
 from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.lines import us
+from busplan.forms.svg import LINE, Scale, drawing, inside, markup, text_at
 
 _LINE_CHARACTERS: Final = 44
 """Characters of a line of words: what a phone shows at this size."""

@@ -2,10 +2,8 @@
 
 from typing import Final
 
-from busplan.drawings.timeline.kinds import INKS
+from busplan.forms.inks import DARK, fills
 
-DARK: Final = "@media screen and (prefers-color-scheme:dark)"
-"""Where colours on black hold: paper is white."""
 _STYLE: Final = """
 .busplan-timeline{font:13px system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif}
 .busplan-timeline text{fill:#1c2430}
@@ -36,11 +34,3 @@ def stylesheet() -> str:
     """Colours on white, and those on black for who prefers them; nothing reaches beyond the drawing's own class."""
     light, dark = fills(".busplan-timeline")
     return f"{_STYLE}{light}{DARK}{{{_DARK_STYLE}{dark}}}\n"
-
-
-def fills(scope: str) -> tuple[str, str]:
-    """Rules that colour each ink inside a selector, on white and on black."""
-    light, dark = (
-        "".join(f"{scope} .{ink}{{fill:{colours[side]}}}\n" for ink, colours in INKS.items()) for side in (0, 1)
-    )
-    return light, dark

@@ -2,7 +2,7 @@
 
 from xml.etree.ElementTree import SubElement
 
-from busplan.drawings.svg import drawing, markup
+from busplan.forms.svg import drawing, markup
 
 _HEIGHT = 16
 

@@ -3,7 +3,7 @@
 from typing import Final, Protocol
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from busplan.drawings.scale import ticks
+from busplan.forms.scale import ticks
 
 LINE: Final = 20
 """Height of a line of words."""

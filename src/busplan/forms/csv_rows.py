@@ -1,26 +1,16 @@
-"""Plain data as JSON and CSV text."""
+"""The rows of a record as CSV."""
 
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from busplan.printable import json_text
+from busplan.errors import BusplanError
+from busplan.forms.blocks import Report
 
 _BLOCK: Final = 1 << 16
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 """How a text begins that spreadsheets take for a formula: it may run a program, or send the sheet away."""
-
-
-def to_json(document: Mapping[str, Any]) -> str:
-    """Write one JSON document, indented, with a line end.
-
-    Raises
-    ------
-    ValueError
-        A number is not finite: such a document must not leave the program.
-    """
-    return json_text(document, indent=2) + "\n"
 
 
 def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -73,3 +63,16 @@ def spelled(value: object) -> object:
     if isinstance(value, list):
         return " ".join(map(str, value))
     return value
+
+
+def text(report: Report) -> str:
+    """Write the rows of an answer.
+
+    Raises
+    ------
+    BusplanError
+        Its figures are no one table.
+    """
+    if report.records is None:
+        raise BusplanError("CSV is one table, and this answer has several; its JSON has all of them")
+    return to_csv(report.records())

@@ -1,0 +1,310 @@
+"""What an answer is made of: sentences, tables, charts and commands, in sections.
+
+A block says what there is, and never how it looks: a figure keeps its exact value, a state is said, not coloured. Each
+form writes every block in its own way.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from string import Formatter
+from typing import Any, ClassVar, Literal, NamedTuple
+
+from busplan.buses.figure import Figure, Ink
+from busplan.forms.lines import Line
+
+State = Literal["passes", "fails", "warns", "neutral"]
+"""What something says of the plan."""
+Document = dict[str, Any]
+Record = dict[str, Any]
+"""One row of plain data, by column."""
+
+
+class Value(NamedTuple):
+    """One figure: exact, with what it takes to write it."""
+
+    value: Any
+    """As the JSON document has it; None where there is none."""
+    key: str = ""
+    """Its key, in the register of figures and in JSON; its end says the unit of the value."""
+    unit: str = ""
+    """Unit to write it in: "um" for a key in mm, "%" for a share."""
+    decimals: int | None = None
+    """Decimals of a number; None for as many as it has."""
+    signed: bool = False
+    """Whether a plus is written, too."""
+    at: str = ""
+    """Place in the answer's JSON document (RFC 6901); empty where it has none."""
+    state: State = "neutral"
+    command: str = ""
+    """Id of the `Command` whose document that is, where the answer holds several."""
+
+
+class Words(NamedTuple):
+    """Words with a state."""
+
+    text: str
+    state: State = "neutral"
+
+
+class Code(NamedTuple):
+    """Words of a file, a shell or a user, as they are."""
+
+    text: str
+
+
+class Link(NamedTuple):
+    """A name that leads to a section."""
+
+    text: str
+    key: str
+    """Key of the section."""
+    origin: str
+    """Where it is from, as a shell takes it: names may be the same."""
+
+
+class Swatch(NamedTuple):
+    """A part of the time: its colour, its letter or mark, and what it is called."""
+
+    ink: Ink
+    letter: str
+    text: str
+
+
+class Bar(NamedTuple):
+    """A value as a bar on a scale that it shares with the rows above and below; zero is on the scale."""
+
+    value: Value
+    least: float
+    most: float
+
+
+class Command(NamedTuple):
+    """A command, as a shell takes it."""
+
+    line: str
+    purpose: str = ""
+    """What it gives, in a few words."""
+    key: str = ""
+    """Id that values refer to."""
+
+
+Part = str | Value | Code
+"""A piece of a sentence."""
+Cell = str | Value | Words | Code | Link | Swatch | Bar | Command
+
+
+class Sentence(NamedTuple):
+    """Words with figures between them, one sentence or a few that belong together."""
+
+    parts: tuple[Part, ...]
+    state: State = "neutral"
+
+
+class Column(NamedTuple):
+    """A column of a table."""
+
+    heading: str
+    unit: str = ""
+    kind: Literal["words", "figures", "drawing"] = "figures"
+    group: str = ""
+    """What stands above it and its neighbours of the same group."""
+
+
+class Row(NamedTuple):
+    """A row of a table."""
+
+    cells: tuple[Cell, ...]
+    level: int = 0
+    """1 for a part of the row above it."""
+    sought: bool = False
+    """Whether it is the row that a reader looks for."""
+
+
+class Table(NamedTuple):
+    """A table."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    caption: Sentence | None = None
+    stacks: bool = False
+    """Whether its rows are read one by one: nobody compares them down a column."""
+
+
+class Facts(NamedTuple):
+    """Figures with their names, in a row."""
+
+    items: tuple[tuple[str, Value | Code], ...]
+
+
+class Drawing(ABC):
+    """What a chart shows, drawn in the ways that it has; None in a way that it has not."""
+
+    stylesheet: ClassVar[str] = ""
+    """Style of its SVG, once a page."""
+    shape: ClassVar[Literal["wide", "round"]] = "wide"
+
+    @abstractmethod
+    def svg(self) -> str | None:
+        """Draw it as markup that fills the width of its place."""
+
+    def characters(self, width: int) -> list[Line] | None:  # noqa: ARG002 - not every drawing has this way
+        """Draw it in characters, in so many columns."""
+        return None
+
+    def mermaid(self) -> str | None:
+        """Write it for Mermaid."""
+        return None
+
+
+class Chart(NamedTuple):
+    """A drawing with what it shows in words."""
+
+    drawing: Drawing
+    caption: Sentence
+
+
+class Snippet(NamedTuple):
+    """Lines to copy into a file."""
+
+    lines: tuple[str, ...]
+    language: str = "toml"
+
+
+class Step(NamedTuple):
+    """One step of a derivation: symbol = formula = numbers = result."""
+
+    reference: str
+    symbol: str
+    formula: str
+    numbers: str
+    result: Value | Words
+
+
+class Steps(NamedTuple):
+    """A derivation."""
+
+    steps: tuple[Step, ...]
+
+
+class Question(NamedTuple):
+    """A question with its answer in a word, why, and the figures to look at first."""
+
+    question: str
+    answer: Words
+    sentences: tuple[Sentence, ...]
+    facts: Facts
+    at: str = ""
+    """Place of the sentences, joined, in the JSON document; empty where they have none."""
+    command: str = ""
+    """As for `Value`."""
+
+
+class Section(NamedTuple):
+    """Blocks under a title."""
+
+    title: Sentence
+    blocks: "tuple[Block, ...]"
+    kind: str = ""
+    """What it is about, for a style sheet."""
+    key: str = ""
+    """Its name on a page, where a link leads to it."""
+
+
+Block = Sentence | Facts | Table | Chart | Command | Snippet | Steps | Question | Section
+
+
+class Report(NamedTuple):
+    """An answer, ready for every form; each part is made when a form asks for it."""
+
+    title: Sentence
+    """Heading of a page."""
+    blocks: Callable[[], Sequence[Block]]
+    """For people."""
+    document: Callable[[], Mapping[str, Any]]
+    """For JSON: the record, and not the blocks."""
+    records: Callable[[], Sequence[Record]] | None = None
+    """For CSV: the rows of the record; None where they are no one table."""
+
+
+def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
+    """Put figures into words.
+
+    Parameters
+    ----------
+    template
+        The words, with {} for each part.
+    parts
+        What stands there.
+    state
+        What it says of the plan.
+
+    Examples
+    --------
+    >>> sentence("Set {} first.", Code("bus.gap_count")).parts
+    ('Set ', Code(text='bus.gap_count'), ' first.')
+    """
+    given = iter(parts)
+
+    def pieces() -> Iterator[Part]:
+        for words, field, _, _ in Formatter().parse(template):
+            if words:
+                yield words
+            if field is not None:
+                yield next(given)
+
+    return Sentence(tuple(pieces()), state)
+
+
+def joined(*sentences: Sentence, by: str = " ") -> Sentence:
+    """Put sentences, or pieces of one, behind one another; the state is that of the first."""
+    parts: list[Part] = []
+    for one in sentences:
+        parts += [by, *one.parts] if parts else one.parts
+    return Sentence(tuple(parts), sentences[0].state)
+
+
+def figure_value(figure: Figure, value: Any, *, at: str = "", state: State = "neutral") -> Value:
+    """A value of a registered figure, as tables write it."""
+    decimals = figure.decimals if figure.sort == "number" else None
+    return Value(value, figure.key, figure.column or figure.unit, decimals, at=at, state=state)
+
+
+def count_value(value: float, key: str = "", *, at: str = "") -> Value:
+    """A number of things."""
+    return Value(value, key, at=at)
+
+
+def state_of(passes: object) -> State:
+    """State of what passes or fails."""
+    return "passes" if passes else "fails"
+
+
+def values_in(block: Block) -> Iterator[Value]:
+    """Every figure of a block, in reading order."""
+    match block:
+        case Sentence():
+            yield from (part for part in block.parts if isinstance(part, Value))
+        case Facts():
+            yield from (value for _, value in block.items if isinstance(value, Value))
+        case Table():
+            if block.caption:
+                yield from values_in(block.caption)
+            for row in block.rows:
+                yield from (
+                    cell.value if isinstance(cell, Bar) else cell for cell in row.cells if isinstance(cell, Value | Bar)
+                )
+        case Chart():
+            yield from values_in(block.caption)
+        case Steps():
+            yield from (step.result for step in block.steps if isinstance(step.result, Value))
+        case Question():
+            yield from _values_of((*block.sentences, block.facts))
+        case Section():
+            yield from _values_of((block.title, *block.blocks))
+        case _:
+            return
+
+
+def _values_of(blocks: "Sequence[Block]") -> Iterator[Value]:
+    for block in blocks:
+        yield from values_in(block)

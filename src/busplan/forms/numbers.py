@@ -1,0 +1,120 @@
+"""How a figure is written: its digits and its unit."""
+
+from math import isnan
+from typing import Final
+
+from busplan.buses.figure import unit_of
+from busplan.forms.blocks import Value
+
+MISSING: Final = "-"
+_FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6}
+"""From the unit of a key to the one it is written in."""
+_MILLISECOND_US: Final = 1e3
+_SECOND_US: Final = 1e6
+_SILENT: Final = frozenset(("", "1", "nodes", "axes"))
+"""Units that words say, where a figure stands in a sentence."""
+_ROUNDING_UM: Final = 1e-6
+"""Smallest length, in um, that is more than rounding: a picometre."""
+
+
+def written(value: Value) -> str:
+    """Write a figure without its unit.
+
+    Examples
+    --------
+    >>> written(Value(0.0036, "max_contour_error_mm", "um", 3)), written(Value(0.97, "utilisation", "%", 2))
+    ('3.600', '97.00')
+    >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("hops", "nodes")))
+    ('-', 'yes', '16', 'hops, nodes')
+    """
+    match value.value:
+        case None:
+            return MISSING
+        case bool():
+            return "yes" if value.value else "no"
+        case int() | float():
+            return _number(value)
+        case list() | tuple():
+            return ", ".join(map(str, value.value)) or MISSING
+    return str(value.value)
+
+
+def with_unit(value: Value) -> str:
+    """Write a figure with its unit, as a sentence has it.
+
+    Examples
+    --------
+    >>> with_unit(Value(3.9691, "margin_us", "us", 3)), with_unit(Value(0.5, "utilisation", "%", 1))
+    ('3.969 us', '50.0%')
+    """
+    text = written(value)
+    if value.unit in _SILENT or text == MISSING:
+        return text
+    return f"{text}%" if value.unit == "%" else f"{text} {value.unit}"
+
+
+def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
+    """Write a number with so many decimals, unless it is too small for them.
+
+    Examples
+    --------
+    >>> decimals_of(205.91747, 3), decimals_of(0.0, 3), decimals_of(0.00012, 3), decimals_of(2.5, 1, signed=True)
+    ('205.917', '0.000', '0.00012', '+2.5')
+    """
+    sign = "+" if signed and number > 0 else ""
+    if number == 0 or abs(number) >= 10.0**-decimals:
+        return f"{sign}{number:.{decimals}f}"
+    return f"{sign}{number:.3g}"
+
+
+def period_value(period_us: float, *, at: str = "", command: str = "") -> Value:
+    """A communication period in the unit that people say it in.
+
+    Examples
+    --------
+    >>> [with_unit(period_value(one)) for one in (4000.0, 250.0, 1234.5, 2e6)]
+    ['4 ms', '250 us', '1.2345 ms', '2 s']
+    """
+    unit = "s" if period_us >= _SECOND_US else "ms" if period_us >= _MILLISECOND_US else "us"
+    return Value(period_us, "period_us", unit, at=at, command=command)
+
+
+def period(period_us: float) -> str:
+    """Write a communication period as people say it."""
+    return with_unit(period_value(period_us))
+
+
+def plural(number: int, noun: str) -> str:
+    """Write a number of things with their noun.
+
+    Examples
+    --------
+    >>> plural(1, "node"), plural(2, "node"), plural(8, "axis")
+    ('1 node', '2 nodes', '8 axes')
+    """
+    return f"{number} {nouns(number, noun)}"
+
+
+def nouns(number: int, noun: str) -> str:
+    """The noun of so many things.
+
+    Examples
+    --------
+    >>> nouns(1, "axis"), nouns(2, "axis")
+    ('axis', 'axes')
+    """
+    if number == 1:
+        return noun
+    return f"{noun.removesuffix('is')}es" if noun.endswith("is") else f"{noun}s"
+
+
+def _number(value: Value) -> str:
+    factor = _FACTORS.get((unit_of(value.key), value.unit), 1.0)
+    number = value.value if factor == 1.0 else value.value * factor
+    if isnan(number):
+        return MISSING
+    if value.unit == "um" and abs(number) < _ROUNDING_UM:
+        number = 0.0
+    if value.decimals is not None:
+        return decimals_of(number, value.decimals, signed=value.signed)
+    return f"{number:+.12g}" if value.signed and number else f"{number:.12g}"

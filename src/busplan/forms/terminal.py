@@ -1,0 +1,116 @@
+"""An answer in lines of text: for a terminal, with its colours and width, or plain, for a pipe and a file."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from busplan.forms.blocks import (
+    Block,
+    Chart,
+    Command,
+    Facts,
+    Part,
+    Question,
+    Report,
+    Section,
+    Sentence,
+    Snippet,
+    Step,
+    Steps,
+    Table,
+    Value,
+)
+from busplan.forms.columns import cell_text, table_lines
+from busplan.forms.lines import BLANK, Line, plain_text, styled_text
+from busplan.forms.numbers import with_unit
+
+WIDTH: Final = 80
+"""Columns of a drawing where there is no terminal."""
+
+
+def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
+    """Write an answer in lines.
+
+    Parameters
+    ----------
+    report
+        The answer.
+    width
+        Columns that a drawing fills.
+    styled
+        Whether to write for a terminal, with its colours.
+    """
+    lines = block_lines(report.blocks(), width=width)
+    return styled_text(lines) if styled else plain_text(lines)
+
+
+def sentence_text(sentence: Sentence) -> str:
+    """Write a sentence in plain characters."""
+    return "".join(map(_part, sentence.parts))
+
+
+def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line]:
+    """Write blocks as lines: sentences below one another, a blank line around everything else.
+
+    Parameters
+    ----------
+    blocks
+        What to write.
+    width
+        Columns that a drawing fills.
+    """
+    before: Block | None = None
+    for block in blocks:
+        lines = _lines(block, width)
+        if not lines:
+            continue
+        if before is not None and not (_is_words(before) and _is_words(block)):
+            yield BLANK
+        yield from lines
+        before = block
+
+
+def _is_words(block: Block) -> bool:
+    return isinstance(block, Sentence | Facts)
+
+
+def _lines(block: Block, width: int) -> Sequence[Line]:
+    match block:
+        case Sentence():
+            return [Line(sentence_text(block), block.state)]
+        case Facts():
+            return [Line(f"{', '.join(f'{name} {_part(value)}' for name, value in block.items)}.")]
+        case Table():
+            return [*_caption(block.caption), *table_lines(block)]
+        case Chart():
+            drawn = block.drawing.characters(width)
+            return [*_caption(block.caption), *drawn] if drawn else []
+        case Command():
+            return [Line(f"$ {block.line}", "drawn")]
+        case Snippet():
+            return [Line(line, "drawn") for line in block.lines]
+        case Steps():
+            return [line for number, step in enumerate(block.steps, start=1) for line in _step(number, step)]
+        case Question():
+            head = Line(f"{block.question} {block.answer.text}", block.answer.state)
+            return [head, *block_lines((*block.sentences, block.facts), width=width)]
+        case Section():
+            return [Line(sentence_text(block.title), "heading"), *block_lines(block.blocks, width=width)]
+
+
+def _caption(caption: Sentence | None) -> list[Line]:
+    return [Line(sentence_text(caption), "heading")] if caption else []
+
+
+def _part(part: Part) -> str:
+    return with_unit(part) if isinstance(part, Value) else cell_text(part)
+
+
+def _step(number: int, step: Step) -> Iterator[Line]:
+    """A line in symbols, one in numbers and the result, each where it says more than the one before."""
+    head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
+    result = with_unit(step.result) if isinstance(step.result, Value) else step.result.text
+    distinct = (text for text in (step.formula, step.numbers, result) if text)
+    if number > 1:
+        yield BLANK
+    for at, line in enumerate(distinct):
+        yield Line(f"{head if at == 0 else ' ' * len(head)}= {line}", "drawn")
