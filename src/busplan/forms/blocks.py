@@ -37,6 +37,10 @@ class Value(NamedTuple):
     state: State = "neutral"
     command: str = ""
     """Id of the `Command` whose document that is, where the answer holds several."""
+    digits: int | None = None
+    """Significant digits of a number without `decimals`; None for as many as it has."""
+    fixed: bool = False
+    """Whether what is too small for `decimals` is rounding, and written as zero."""
 
 
 class Words(NamedTuple):
