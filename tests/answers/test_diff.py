@@ -4,6 +4,7 @@ from html.parser import HTMLParser
 from typing import Any
 
 import pytest
+from busplan.forms.json_and_csv import to_json
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
@@ -15,7 +16,6 @@ from busplan.answers.changes import shown_value
 from busplan.answers.diff import diff_document, diff_lines, diff_markdown, regression_words
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.errors import BusplanError
-from busplan.forms.json_and_csv import to_json
 from busplan.forms.lines import plain_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override

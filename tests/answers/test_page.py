@@ -9,6 +9,7 @@ from functools import cache
 from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -19,18 +20,19 @@ from markdown_it import MarkdownIt
 from busplan.analysis.all_answers import AllAnswers, all_answers
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.circle.contour_profile import ContourProfile
-from busplan.answers.page.chapters import ReportedProfile, page
-from busplan.answers.page.commands import shell_word
-from busplan.answers.page.content import Page, ShownFigure
-from busplan.answers.page.markdown import page_markdown
+from busplan.answers.page.commands import shell_word, sources
+from busplan.answers.page.report import ReportedProfile, page_report
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.drawings.axes import axes_chart, drawn_range
-from busplan.forms.signed_bar import signed_bar
+from busplan.drawings.axes import AxesDrawing, drawn_range
 from busplan.drawings.circle import circle_chart, magnified
-from busplan.drawings.terms import LEFT, terms_chart
-from busplan.drawings.timeline.kinds import INKS
-from busplan.forms.html import page_html
+from busplan.drawings.terms import LEFT, TermsDrawing
+from busplan.forms import render
+from busplan.forms.blocks import Report, Section, Table, Value, values_in
+from busplan.forms.columns import cell_text
+from busplan.forms.inks import INKS
+from busplan.forms.signed_bar import signed_bar
+from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -56,10 +58,10 @@ def changed(**changes: object) -> Profile:
     return override(BASE, {key.replace("__", "."): value for key, value in changes.items()})
 
 
-def made(*profiles: Profile, title: str | None = None) -> Page:
+def made(*profiles: Profile, title: str | None = None) -> Report:
     subjects = [ReportedProfile(f"{number}.toml", all_answers(one, with_circle=False), other_period=False)
                 for number, one in enumerate(profiles)]  # fmt: skip
-    return page(subjects, title=title)
+    return page_report(subjects, title=title)
 
 
 @cache
@@ -93,7 +95,7 @@ class Tags(HTMLParser):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_hostile_name_makes_no_element_and_no_attribute(name: str) -> None:
     plain, hostile = (
-        Tags(page_html(made(changed(name=text, description=f"Why: {text}"), BASE, title=text)))
+        Tags(render(made(changed(name=text, description=f"Why: {text}"), BASE, title=text), "html"))
         for text in ("plain", name)
     )
     assert hostile.tags == plain.tags
@@ -105,7 +107,7 @@ def test_a_hostile_name_makes_no_element_and_no_attribute(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_hostile_name_is_text_in_markdown(name: str) -> None:
-    markdown = page_markdown(made(changed(name=name, description=name), BASE, title=name))
+    markdown = render(made(changed(name=name, description=name), BASE, title=name), "markdown")
     reader = Tags(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown))
     assert {tag for tag, _ in reader.tags} <= {
         *("h1", "h2", "h3", "p", "a", "code", "pre", "strong", "ul", "li"),
@@ -129,8 +131,8 @@ def test_a_shell_gives_back_any_path(raw: bytes) -> None:
 
 def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
     one = ReportedProfile("paper-4ms", simulated(), other_period=False)
-    html = page_html(page([one, one], title=None))
-    assert html == page_html(page([one, one], title=None))
+    html = render(page_report([one, one], title=None), "html")
+    assert html == render(page_report([one, one], title=None), "html")
     assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)", html) == []
     assert not re.search(r"url\(|@import|<script|<link|\ssrc=", html)
     assert "None" not in html
@@ -142,7 +144,7 @@ def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
 
 def test_headings_go_down_one_by_one_and_tables_have_scopes() -> None:
     for one in (made(BASE), made(BASE, changed(name="other"))):
-        tags = Tags(page_html(one)).tags
+        tags = Tags(render(one, "html")).tags
         levels = [int(tag[1]) for tag, _ in tags if re.fullmatch("h[1-6]", tag)]
         assert levels.count(1) == 1
         assert all(lower <= upper + 1 for upper, lower in pairwise(levels))
@@ -151,23 +153,52 @@ def test_headings_go_down_one_by_one_and_tables_have_scopes() -> None:
                    for tag, names in tags if tag == "svg")  # fmt: skip
 
 
+def whole() -> tuple[ReportedProfile, Report]:
+    subject = ReportedProfile("paper-4ms", simulated(), other_period=False)
+    return subject, page_report([subject])
+
+
+def parts(report: Report) -> dict[str, Section]:
+    return {block.kind: block for block in report.blocks() if isinstance(block, Section)}
+
+
+def documents(subject: ReportedProfile) -> dict[str, Any]:
+    found = sources(subject.answer, argument=subject.argument, key="p1", other_period=subject.other_period)
+    return {source.command.key: source.document for source in found.values()}
+
+
+def at(document: Any, pointer: str) -> Any:
+    for step in pointer.split("/")[1:]:
+        document = document[int(step) if isinstance(document, list) else step]
+    return document
+
+
 def test_only_the_parts_in_their_order() -> None:
-    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
-    assert [part.key for part in chapter.parts] == [
+    assert list(parts(whole()[1])) == [
         *("verdict", "models", "timeline", "terms", "axes", "circle", "sources", "assumptions", "commands"),
     ]
 
 
+def test_every_figure_names_its_command_and_stands_in_its_document() -> None:
+    subject, report = whole()
+    found, seen = documents(subject), 0
+    for value in values_in(tuple(report.blocks())):
+        assert bool(value.command) == bool(value.at)
+        if value.at:
+            assert at(found[value.command], value.at) == value.value, value
+            seen += 1
+    assert seen > 200
+
+
 def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> None:
-    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
-    documents = {one.anchor: one for one in chapter.sources}
-    seen = 0
-    for table in (table for part in chapter.parts for table in part.tables):
+    subject, report = whole()
+    found, seen = documents(subject), 0
+    for table in (block for part in parts(report).values() for block in part.blocks if isinstance(block, Table)):
         for row in table.rows:
             for column, cell in zip(table.columns, row.cells, strict=True):
                 model = next((one for one in (column.heading, column.group) if one in ("paper", "standard")), None)
-                if isinstance(cell, ShownFigure) and model is not None:
-                    owner = documents[cell.source].value("/".join(cell.pointer.split("/")[:3]))
+                if isinstance(cell, Value) and model is not None:
+                    owner = at(found[cell.command], "/".join(cell.at.split("/")[:3]))
                     assert owner["timing_model"] == model
                     assert owner.get("transaction", "") in column.group
                     seen += 1
@@ -175,27 +206,30 @@ def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> Non
 
 
 def test_a_row_of_periods_holds_the_figures_of_its_period() -> None:
-    chapter = page([ReportedProfile("x", simulated(), other_period=False)], title=None).chapters[0]
-    (part,) = (part for part in chapter.parts if part.key == "axes")
-    (source,) = (one for one in chapter.sources if one.anchor == part.commands[0])
-    for row in part.tables[0].rows:
-        figures = [cell for cell in row.cells if isinstance(cell, ShownFigure)]
-        periods = {source.value("/".join(cell.pointer.split("/")[:3]))["period_us"] for cell in figures}
+    subject, report = whole()
+    source = documents(subject)["p1-axes"]
+    (table,) = (block for block in parts(report)["axes"].blocks if isinstance(block, Table))
+    for row in table.rows:
+        figures = [cell for cell in row.cells if isinstance(cell, Value)]
+        periods = {at(source, "/".join(cell.at.split("/")[:3]))["period_us"] for cell in figures}
         assert periods == {figures[0].value}
-    assert [row.cells[0].text for row in part.tables[0].rows if row.level] == ["4000"]  # type: ignore[union-attr]
+    assert [cell_text(row.cells[0]) for row in table.rows if row.sought] == ["4000"]
 
 
-def test_markdown_says_the_same_as_html() -> None:
-    content = page([ReportedProfile("paper-4ms", simulated(), other_period=False)], title=None)
-    markdown = page_markdown(content)
+def test_all_forms_say_the_same() -> None:
+    _, report = whole()
+    markdown = render(report, "markdown")
+    lines = render(report, "table")
     rendered = Tags(MarkdownIt("commonmark").enable("table").render(markdown)).text
-    for part in content.chapters[0].parts:
-        assert part.title in rendered
-        for table in part.tables:
+    for part in parts(report).values():
+        assert sentence_text(part.title) in rendered
+        assert sentence_text(part.title) in lines
+        for table in (block for block in part.blocks if isinstance(block, Table)):
             for row in table.rows:
                 for cell in row.cells:
-                    text = getattr(cell, "text", cell if isinstance(cell, str) else "")
+                    text = getattr(cell, "text", cell_text(cell))
                     assert " ".join(text.split()) in rendered
+                    assert " ".join(text.split()) in lines
     assert "```mermaid\ngantt\n" in markdown
     assert "<svg" not in markdown
 
@@ -219,10 +253,10 @@ def test_markdown_says_the_same_as_html() -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
-    content = page([ReportedProfile("x", all_answers(profile), other_period=False)], title=None)
-    assert words in Tags(page_html(content)).text
-    assert "nan" not in page_html(content).lower().replace("nano", "")
-    assert words.partition(":")[0] in page_markdown(content).replace("\\", "")
+    content = page_report([ReportedProfile("x", all_answers(profile), other_period=False)], title=None)
+    assert words in Tags(render(content, "html")).text
+    assert "nan" not in render(content, "html").lower().replace("nano", "")
+    assert words.partition(":")[0] in render(content, "markdown").replace("\\", "")
 
 
 @pytest.mark.parametrize(
@@ -233,7 +267,7 @@ def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int
     profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)
     # A long circle is drawn no larger for more nodes: once is enough.
     results = all_answers(profile, with_circle=nodes == 16)
-    html = page_html(page([ReportedProfile("x", results, other_period=False)], title=None))
+    html = render(page_report([ReportedProfile("x", results, other_period=False)], title=None), "html")
     assert len(html.encode()) < 300_000
     assert said in Tags(html).text
     lanes = re.findall(r"by node</text>.*?</svg>", html, re.DOTALL)
@@ -242,7 +276,7 @@ def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int
 
 
 def test_a_circle_that_was_left_out_is_said() -> None:
-    assert "The circle test was left out (--no-circle)." in Tags(page_html(made(BASE))).text
+    assert "The circle test was left out (--no-circle)." in Tags(render(made(BASE), "html")).text
 
 
 # --- charts -----------------------------------------------------------------------------------------------
@@ -261,7 +295,7 @@ def stairs(path: str) -> Iterator[tuple[float, float]]:
 @pytest.mark.parametrize("profile", [BASE, changed(bus__max_hops=3), changed(cycle__period_us=100.0)])
 def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) -> None:
     steps = [node_steps(profile, model=model) for model in ("paper", "standard")]
-    root = ET.fromstring(axes_chart(profile, steps))
+    root = ET.fromstring(AxesDrawing(profile, steps).svg())
     from_us, to_us = drawn_range(profile, steps)
     for one in steps:
         (path,) = (
@@ -286,7 +320,7 @@ def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) ->
 
 def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
     steps = [node_steps(BASE, model=model) for model in ("paper", "standard")]
-    root = ET.fromstring(axes_chart(BASE, steps))
+    root = ET.fromstring(AxesDrawing(BASE, steps).svg())
     lines = [line for line in root.iter(f"{SVG}line") if line.get("class") == "rule" and line.get("x2") == "100%"]
     figures = [text for text in root.iter(f"{SVG}text") if text.get("x") == "0" and text.get("class") == "small halo"]
     heights = {
@@ -309,7 +343,7 @@ def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
 
 def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page() -> None:
     results = all_answers(BASE, with_circle=False).capacity.results
-    root = ET.fromstring(terms_chart(results))
+    root = ET.fromstring(TermsDrawing(results).svg())
     widths = [float((rect.get("width") or "").rstrip("%")) for rect in root.iter(f"{SVG}rect")]
     bars = len([1 for one in results for term in TERMS if getattr(one, term.key) > 0])
     alone = widths[-bars:]
@@ -321,7 +355,7 @@ def test_a_cycle_that_is_small_in_its_slice_is_drawn_again_as_wide_as_the_page()
 
 def test_bars_are_the_terms_and_fill_the_slice() -> None:
     results = simulated().capacity.results
-    root = ET.fromstring(terms_chart(results))
+    root = ET.fromstring(TermsDrawing(results).svg())
     widths = [(rect.findtext(f"{SVG}title") or "", float((rect.get("width") or "").rstrip("%")))
               for rect in root.iter(f"{SVG}rect")]  # fmt: skip
     first = [term.key for term in TERMS if getattr(results[0], term.key) > 0]
@@ -334,7 +368,7 @@ def test_bars_are_the_terms_and_fill_the_slice() -> None:
 
 def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:
     results = all_answers(changed(cycle__period_us=300.0), with_circle=False).capacity.results
-    root = ET.fromstring(terms_chart(results))
+    root = ET.fromstring(TermsDrawing(results).svg())
     (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("class") == "edge")
     assert float((edge.get("x1") or "").rstrip("%")) == pytest.approx(150 / results[1].required_us * 100, rel=1e-3)
 
@@ -390,7 +424,7 @@ def test_signed_bars_share_one_zero() -> None:
 
 # --- colours ----------------------------------------------------------------------------------------------
 
-STYLE = (files("busplan.answers.page") / "templates" / "style.css").read_text(encoding="utf-8")
+STYLE = (files("busplan.forms") / "templates" / "style.css").read_text(encoding="utf-8")
 SCHEMES = [
     dict(re.findall(r"--([\w-]+): (#\w{6})", block)) for block in re.findall(r":root \{(.*?)\}", STYLE, re.DOTALL)
 ]

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from busplan.forms.json_and_csv import to_csv, to_json
 
 from busplan.analysis.planning.options import plan
 from busplan.answers.plan import plan_csv_rows, plan_document, plan_lines
-from busplan.forms.json_and_csv import to_csv, to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

@@ -11,12 +11,12 @@ from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
 from busplan.answers.timeline import timeline_document, timeline_rows
 from busplan.buses import kind_named
 from busplan.buses.bus import IDLE
-from busplan.forms.scale import ticks
 from busplan.drawings.timeline.characters import timeline_lines
 from busplan.drawings.timeline.lanes import node_lanes, stretches
 from busplan.drawings.timeline.mermaid import timeline_mermaid
 from busplan.drawings.timeline.png import timeline_png
 from busplan.drawings.timeline.svg import timeline_svg
+from busplan.forms.scale import ticks
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-
 from busplan.forms.json_and_csv import csv_cell
 
 if TYPE_CHECKING:

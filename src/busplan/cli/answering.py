@@ -1,23 +1,32 @@
 """How a command gives its answer: in the form that is asked for, on standard output or in a file."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
 
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file
 from busplan.cli.output import document_bytes, emit_document, emit_text, is_styled, new_file, say
+from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form, render
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
+NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
+
 
 @contextmanager
 def answer(
-    form: Form | None, output: Path | None, *, inputs: Iterable[Path] = ()
+    form: Form | None,
+    output: Path | None,
+    *,
+    inputs: Iterable[Path] = (),
+    default: Form = "table",
+    refused: Mapping[Form, str] = NOTHING_REFUSED,
 ) -> "Iterator[Callable[[Report], None]]":
     """Open the destination of an answer before the work for it: a path that cannot be written is said at once.
 
@@ -29,13 +38,19 @@ def answer(
         What --output says.
     inputs
         Files that the command reads.
+    default
+        The form on standard output, where none is asked for.
+    refused
+        Forms that make no sense for the question, with the reason.
 
     Raises
     ------
     BusplanError
-        A file that cannot be written, or that is an input; or a name that says no form.
+        A file that cannot be written, or that is an input; a form that is refused; or a name that says no form.
     """
-    chosen = form_of_file(form, output, forms=ENDINGS, default="table")
+    chosen = form_of_file(form, output, forms=ENDINGS, default=default)
+    if chosen in refused:
+        raise BusplanError(f"--format {chosen}: {refused[chosen]}")
     if output is None:
         yield lambda report: give(report, chosen)
         return

@@ -1,27 +1,27 @@
 """`busplan report`."""
 
 from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import complete_profile, form_of_file, output_option, time_us
-from busplan.cli.output import document_bytes, emit_document, new_file, say
+from busplan.cli.answering import answer
+from busplan.cli.destinations import profile_files
+from busplan.cli.options import OutputOption, complete_profile, format_option, time_us
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
+from busplan.forms import Form
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.answers.page.content import Page
+    from busplan.forms.blocks import Report
     from busplan.sections.profile import Profile
 
-ReportFormat = Literal["html", "markdown"]
-
-_SUFFIXES: Final[dict[str, ReportFormat]] = {".html": "html", ".md": "markdown"}
+_REFUSED: Final[dict[Form, str]] = {
+    "csv": "a page holds many tables; each names its command, and that command's --format csv has its rows"
+}
 
 
 def report_command(
@@ -34,15 +34,8 @@ def report_command(
             show_default=False,
         ),
     ],
-    output: Annotated[Path | None, output_option("Write the page to FILE: .html or .md (Markdown)")] = None,
-    format_: Annotated[
-        ReportFormat | None,
-        typer.Option(
-            "--format",
-            help="Form of the page.  [default: what the name of --output says, else html]",
-            show_default=False,
-        ),
-    ] = None,
+    format_: Annotated[Form | None, format_option("html")] = None,
+    output: OutputOption = None,
     title: Annotated[
         str | None,
         typer.Option(
@@ -77,18 +70,11 @@ def report_command(
     """
     from busplan.printable import commands
 
-    chosen = form_of_file(format_, output, forms=_SUFFIXES, default="html")
     if title is not None and (commands(title) or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
-    require_apart({"--output": output}, inputs=profile_files(*profiles))
-    plans = load_each(profiles, partial(_plan, period=period))
-    if output is None:
-        emit_document(_written(_page(profiles, plans, title, period=period, circle=circle), chosen))
-        return
-    # Opened before the simulation: a path that cannot be written is said at once.
-    with new_file(output, overwrite=True) as file:
-        file.write(document_bytes(_written(_page(profiles, plans, title, period=period, circle=circle), chosen)))
-    say(f"wrote {output}")
+    with answer(format_, output, inputs=profile_files(*profiles), default="html", refused=_REFUSED) as give:
+        plans = load_each(profiles, partial(_plan, period=period))
+        give(_page(profiles, plans, title, period=period, circle=circle))
 
 
 def _plan(argument: str, *, period: str | None) -> "Profile":
@@ -104,24 +90,14 @@ def _plan(argument: str, *, period: str | None) -> "Profile":
 
 def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, period: str | None, circle: bool
-) -> "Page":
+) -> "Report":
     from busplan.analysis.all_answers import all_answers
-    from busplan.answers.page.chapters import ReportedProfile, page
+    from busplan.answers.page.report import ReportedProfile, page_report
 
     subjects = []
     with progress_bar("circle tests") as progress:
         for number, (argument, plan) in enumerate(zip(arguments, plans, strict=True)):
             own = part_of(progress, number=number, of=len(plans))
-            answer = all_answers(plan, with_circle=circle, progress=own)
-            subjects.append(ReportedProfile(argument, answer, other_period=period is not None))
-    return page(subjects, title=title)
-
-
-def _written(content: "Page", chosen: ReportFormat) -> str:
-    if chosen == "markdown":
-        from busplan.answers.page.markdown import page_markdown
-
-        return page_markdown(content)
-    from busplan.forms.html import page_html
-
-    return page_html(content)
+            found = all_answers(plan, with_circle=circle, progress=own)
+            subjects.append(ReportedProfile(argument, found, other_period=period is not None))
+    return page_report(subjects, title=title)

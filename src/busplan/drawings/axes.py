@@ -7,8 +7,8 @@ from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.capacity.node_steps import NodeSteps
-from busplan.answers.verdict_sentences import period
-from busplan.forms.lines import plural
+from busplan.forms.blocks import Drawing
+from busplan.forms.numbers import period, plural
 from busplan.forms.scale import round_steps
 from busplan.forms.svg import drawing, markup, text_at
 from busplan.sections.base import MAX_TIME_US
@@ -43,8 +43,8 @@ class _Plane:
         return _TOP + _HEIGHT * (1 - axes / self.top_axes)
 
 
-def axes_chart(profile: Profile, steps: Sequence[NodeSteps]) -> str:
-    """Draw the most axes over a range of periods about the profile's own.
+class AxesDrawing(Drawing):
+    """The most axes over a range of periods about the profile's own.
 
     Parameters
     ----------
@@ -53,22 +53,29 @@ def axes_chart(profile: Profile, steps: Sequence[NodeSteps]) -> str:
     steps
         The steps under each timing model.
     """
-    root = drawing("Most axes over the communication period, under each timing model", css="chart axes")
-    root.set("height", str(_TOP + _HEIGHT + _BELOW))
-    own_us, own_axes = profile.cycle.period_us, profile.bus.nodes * profile.node.axes
-    from_us, to_us = drawn_range(profile, steps)
-    plane = _Plane(from_us, to_us, max(own_axes, *(one.max_axes(to_us) for one in steps)))
-    _grid(root, plane)
-    stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
-    area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})
-    for css, one in zip(_CSS, steps, strict=False):
-        SubElement(area, "path", {"class": f"curve {css}", "d": _path(one, plane)})
-    _figures(root, plane)
-    _legend(root, steps)
-    _own(root, plane, own_us, own_axes)
-    for css, one in zip(_CSS, steps, strict=False):
-        _mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
-    return markup(root)
+
+    def __init__(self, profile: Profile, steps: Sequence[NodeSteps]) -> None:
+        self._profile, self._steps = profile, steps
+
+    def svg(self) -> str:
+        """Draw a staircase for each timing model, and the profile's own place."""
+        profile, steps = self._profile, self._steps
+        root = drawing("Most axes over the communication period, under each timing model", css="chart axes")
+        root.set("height", str(_TOP + _HEIGHT + _BELOW))
+        own_us, own_axes = profile.cycle.period_us, profile.bus.nodes * profile.node.axes
+        from_us, to_us = drawn_range(profile, steps)
+        plane = _Plane(from_us, to_us, max(own_axes, *(one.max_axes(to_us) for one in steps)))
+        _grid(root, plane)
+        stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
+        area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})
+        for css, one in zip(_CSS, steps, strict=False):
+            SubElement(area, "path", {"class": f"curve {css}", "d": _path(one, plane)})
+        _figures(root, plane)
+        _legend(root, steps)
+        _own(root, plane, own_us, own_axes)
+        for css, one in zip(_CSS, steps, strict=False):
+            _mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
+        return markup(root)
 
 
 def drawn_range(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:

@@ -7,7 +7,8 @@ from xml.etree.ElementTree import Element, SubElement
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.buses import kind_named
 from busplan.buses.figure import MARGIN, Figure
-from busplan.forms.lines import us
+from busplan.forms.blocks import Drawing
+from busplan.forms.numbers import decimals_of
 from busplan.forms.svg import LINE, Scale, drawing, markup, text_at
 
 _THIN: Final = 12
@@ -29,23 +30,30 @@ class _Segment(NamedTuple):
     end_us: float
 
 
-def terms_chart(results: Sequence[CapacityFigures]) -> str:
-    """Draw the terms to the scale of the slice and, where they are small in it, once more to their own.
+class TermsDrawing(Drawing):
+    """The terms to the scale of the slice and, where they are small in it, once more to their own.
 
     Parameters
     ----------
     results
         Figures of one period, a set for each timing model.
     """
-    root = drawing("Terms of the cycle under each timing model, and what is left of the slice", css="chart terms")
-    used_us, slice_us = max(one.required_us for one in results), results[0].available_us
-    small = used_us < _MAGNIFIED_BELOW * slice_us
-    head = "The slice, us" if used_us <= slice_us else "The cycle and where its slice ends, us"
-    y = _bars(root, results, head, y=0, end_us=max(used_us, slice_us), thin=small)
-    if small:
-        y = _bars(root, results, "The cycle alone, us", y=y + _GAP, end_us=used_us, thin=False)
-    root.set("height", str(y))
-    return markup(root)
+
+    def __init__(self, results: Sequence[CapacityFigures]) -> None:
+        self._results = results
+
+    def svg(self) -> str:
+        """Draw a bar for each timing model."""
+        results = self._results
+        root = drawing("Terms of the cycle under each timing model, and what is left of the slice", css="chart terms")
+        used_us, slice_us = max(one.required_us for one in results), results[0].available_us
+        small = used_us < _MAGNIFIED_BELOW * slice_us
+        head = "The slice, us" if used_us <= slice_us else "The cycle and where its slice ends, us"
+        y = _bars(root, results, head, y=0, end_us=max(used_us, slice_us), thin=small)
+        if small:
+            y = _bars(root, results, "The cycle alone, us", y=y + _GAP, end_us=used_us, thin=False)
+        root.set("height", str(y))
+        return markup(root)
 
 
 def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: int, end_us: float, thin: bool) -> int:
@@ -84,7 +92,7 @@ def _segments(one: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segmen
 
 def _segment(root: Element, part: _Segment, scale: Scale, *, y: int, height: int) -> None:
     """A bar, and its letter where there is room for it."""
-    title = f"{part.term.label}, {us(part.end_us - part.start_us)} us"
+    title = f"{part.term.label}, {decimals_of(part.end_us - part.start_us, 3)} us"
     scale.rect(root, part, y=y, height=height, css=f"bar {part.term.ink}", title=title)
     start, end = scale.percent(part.start_us), scale.percent(part.end_us)
     if end - start >= _LETTER_PERCENT and height == _THICK:

@@ -7,11 +7,12 @@ form writes every block in its own way.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from string import Formatter
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from busplan.buses.figure import Figure, Ink
 from busplan.forms.lines import Line
 
+Made = TypeVar("Made")
 State = Literal["passes", "fails", "warns", "neutral"]
 """What something says of the plan."""
 Document = dict[str, Any]
@@ -283,32 +284,28 @@ def state_of(passes: object) -> State:
     return "passes" if passes else "fails"
 
 
-def values_in(block: Block) -> Iterator[Value]:
-    """Every figure of a block, in reading order."""
-    match block:
-        case Sentence():
-            yield from (part for part in block.parts if isinstance(part, Value))
-        case Facts():
-            yield from (value for _, value in block.items if isinstance(value, Value))
-        case Table():
-            if block.caption:
-                yield from values_in(block.caption)
-            for row in block.rows:
-                yield from (
-                    cell.value if isinstance(cell, Bar) else cell for cell in row.cells if isinstance(cell, Value | Bar)
-                )
-        case Chart():
-            yield from values_in(block.caption)
-        case Steps():
-            yield from (step.result for step in block.steps if isinstance(step.result, Value))
-        case Question():
-            yield from _values_of((*block.sentences, block.facts))
-        case Section():
-            yield from _values_of((block.title, *block.blocks))
-        case _:
-            return
+def values_in(item: object) -> Iterator[Value]:
+    """Every figure of a block, or of several, in reading order."""
+    if isinstance(item, Value):
+        yield item
+    elif isinstance(item, tuple):
+        for one in item:
+            yield from values_in(one)
 
 
-def _values_of(blocks: "Sequence[Block]") -> Iterator[Value]:
-    for block in blocks:
-        yield from values_in(block)
+def with_values(item: Made, change: Callable[[Value], Value]) -> Made:
+    """Copy a block with every figure of it changed.
+
+    Parameters
+    ----------
+    item
+        The block, or what it is made of.
+    change
+        From a figure to the one in its place.
+    """
+    if isinstance(item, Value):
+        return change(item)  # type: ignore[return-value]
+    if not isinstance(item, tuple):
+        return item
+    parts = [with_values(one, change) for one in item]
+    return item._make(parts) if hasattr(item, "_make") else tuple(parts)  # type: ignore[return-value]

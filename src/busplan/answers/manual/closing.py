@@ -3,7 +3,10 @@
 from collections.abc import Sequence
 from typing import Final
 
+from busplan.analysis.register import figures_of
 from busplan.answers.manual.pages import Entry, ManualSection
+from busplan.buses import kind_named, kind_names
+from busplan.buses.figure import Figure, by_key
 from busplan.profile.shipped import shipped_names
 
 _EXIT_STATUS: Final = ManualSection(
@@ -39,7 +42,7 @@ _SEE_ALSO: Final = ManualSection("See also", (_PAPER, _STANDARDS), ())
 
 
 def closing_sections(variables: Sequence[Entry]) -> tuple[ManualSection, ...]:
-    """Exit status, environment, files, and what else to read.
+    """Exit status, figures, environment, files, and what else to read.
 
     Parameters
     ----------
@@ -47,7 +50,27 @@ def closing_sections(variables: Sequence[Entry]) -> tuple[ManualSection, ...]:
         Variables of the environment that stand for an option.
     """
     environment = ManualSection("Environment", (), (*variables, *_COLOURS, _COMPLETION))
-    return (_EXIT_STATUS, environment, _files(), _SEE_ALSO)
+    return (_EXIT_STATUS, _figures(), environment, _files(), _SEE_ALSO)
+
+
+def _figures() -> ManualSection:
+    """Every figure of the register, each once."""
+    registers = (figures_of(kind_named(kind)) for kind in kind_names())
+    figures = by_key(figure for one in registers for command in one.values() for figure in command.values())
+    return ManualSection(
+        "Figures",
+        (
+            "Keys of the JSON of `busplan capacity`, `busplan latency` and `busplan circle-test`, with what they are, "
+            "their unit and the equation that they come from. `busplan explain` derives each of them.",
+        ),
+        tuple(Entry((figure.key,), "", _about(figure)) for figure in figures.values()),
+    )
+
+
+def _about(figure: Figure) -> str:
+    unit = f" [{figure.unit}]" if figure.unit else ""
+    better = "" if figure.better == "neither" else f"; {figure.better} is better"
+    return f"{figure.meaning}{unit}; {figure.reference}{better}."
 
 
 def _files() -> ManualSection:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from busplan.answers.manual.pages import CommandPage, Entry, Manual, spans
-from busplan.forms.markdown import code, table
+from busplan.forms.markdown_words import code, table
 
 # Only what is markup where it stands: the text is the program's own, and people read this file as it is.
 _INLINE: Final = re.compile(

@@ -2,14 +2,33 @@
 
 import os
 import shlex
+from typing import Any, NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.capacity.verdict import verdicts
-from busplan.answers import documents
-from busplan.answers.explain import figure_document
-from busplan.answers.page.content import SourceCommand
+from busplan.answers.capacity import capacity_document
+from busplan.answers.circle import circle_document
+from busplan.answers.explain import assumptions_document
+from busplan.answers.latency import latency_document
 from busplan.answers.timeline import timeline_document
+from busplan.forms.blocks import Command, Document, Made, with_values
 from busplan.printable import commands
+
+
+class Source(NamedTuple):
+    """One command, and the document that it writes: what figures are taken from."""
+
+    command: Command
+    document: Document
+
+    def gives(self, block: Made) -> Made:
+        """Say of every figure of a block that it stands in this document."""
+        return with_values(block, lambda value: value._replace(command=self.command.key if value.at else ""))
+
+    @property
+    def line(self) -> Command:
+        """The command for a reader to type, where it is not explained."""
+        return Command(self.command.line)
 
 
 def shell_word(text: str) -> str:
@@ -45,7 +64,7 @@ def period_option(period_us: float) -> tuple[str, str]:
     return "--period", f"{repr(period_us).removesuffix('.0')}us"
 
 
-def sources(answer: AllAnswers, *, argument: str, anchor: str, other_period: bool) -> tuple[SourceCommand, ...]:
+def sources(answer: AllAnswers, *, argument: str, key: str, other_period: bool) -> dict[str, Source]:
     """List the commands behind one profile's figures, each with the document that it writes.
 
     Parameters
@@ -54,28 +73,27 @@ def sources(answer: AllAnswers, *, argument: str, anchor: str, other_period: boo
         Everything that is said of the profile.
     argument
         The PROFILE argument.
-    anchor
-        Prefix of the ids.
+    key
+        Beginning of the ids.
     other_period
         Whether its period is not that of its file.
     """
     own = period_option(answer.profile.cycle.period_us) if other_period else ()
     each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
+    found: dict[str, Source] = {}
 
-    def source(name: str, purpose: str, document: documents.Document, *options: str) -> SourceCommand:
+    def add(name: str, purpose: str, document: dict[str, Any], *options: str) -> None:
         words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
-        return SourceCommand(f"{anchor}-{name}", " ".join(words), purpose, document)
+        found[name] = Source(Command(" ".join(words), purpose, f"{key}-{name}"), document)
 
     bus, periods = answer.capacity, answer.periods
-    found = [
-        source("capacity", "verdict, timing models, terms", documents.capacity_document(bus, (answer.verdict,)), *own),
-        source("latency", "latencies, part by part", documents.latency_document(answer.latency)),
-    ]
+    add("capacity", "verdict, timing models, terms", capacity_document(bus, (answer.verdict,)), *own)
+    add("latency", "latencies, part by part", latency_document(answer.latency))
     if answer.schedule is not None:
-        found.append(source("timeline", "the cycle event by event", timeline_document(answer.schedule), *own))
-    found.append(source("axes", "axes against period", documents.capacity_document(periods, verdicts(periods)), *each))
+        add("timeline", "the cycle event by event", timeline_document(answer.schedule), *own)
+    add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each)
     if answer.circle is not None:
-        document = documents.circle_document(answer.circle, with_contributions=True)
-        found.append(source("circle", "the circle and its error sources", document, "--contributions", *own))
-    found.append(source("explain", "what the figures rest on", figure_document(answer.profile, answer.assumptions)))
-    return tuple(found)
+        document = circle_document(answer.circle, with_contributions=True)
+        add("circle", "the circle and its error sources", document, "--contributions", *own)
+    add("explain", "what the figures rest on", assumptions_document(answer.profile, answer.assumptions))
+    return found

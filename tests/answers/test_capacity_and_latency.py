@@ -1,21 +1,23 @@
-"""From results to text."""
+"""Capacity and latency: from results to answers."""
 
 import csv
 import io
 import json
-import math
+from collections.abc import Callable
 
 import pytest
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.latency import latency
-from busplan.answers.capacity import capacity_lines
-from busplan.answers.documents import capacity_document, capacity_rows, latency_document
-from busplan.answers.latency import latency_lines
-from busplan.answers.verdict_sentences import period, verdict_lines
-from busplan.forms.json_and_csv import to_csv, to_json
-from busplan.forms.lines import table, us
+from busplan.answers.capacity import capacity_document, capacity_records, capacity_report
+from busplan.answers.latency import latency_document, latency_report
+from busplan.answers.verdict import verdict_sentences
+from busplan.forms import render
+from busplan.forms.blocks import Report
+from busplan.forms.csv_rows import to_csv
+from busplan.forms.json_document import to_json
+from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -28,12 +30,7 @@ def profile() -> Profile:
 
 def words(profile: Profile) -> str:
     result = capacity(profile)
-    return "\n".join(line.text for line in verdict_lines(verdicts(result)[0], profile))
-
-
-def test_json_refuses_what_is_not_finite() -> None:
-    with pytest.raises(ValueError, match="Out of range"):
-        to_json({"value_us": math.nan})
+    return "\n".join(map(sentence_text, verdict_sentences(verdicts(result)[0], profile)))
 
 
 @pytest.mark.parametrize("name", shipped_names())
@@ -51,17 +48,13 @@ def test_documents_hold_the_results_own_numbers(name: str) -> None:
 
 
 def test_csv_holds_the_same_numbers_to_the_last_digit(profile: Profile) -> None:
-    rows = capacity_rows(capacity(profile, periods_us=[1000.0, 123.456]))
+    rows = capacity_records(capacity(profile, periods_us=[1000.0, 123.456]))
     read = list(csv.DictReader(io.StringIO(to_csv(rows))))
     assert len(read) == 4
     for written, row in zip(read, rows, strict=True):
         assert list(written) == list(row)
         assert float(written["required_us"]) == row["required_us"]
         assert written["fits"] == ("true" if row["fits"] else "false")
-
-
-def test_csv_of_nothing_is_empty() -> None:
-    assert to_csv([]) == ""
 
 
 def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> None:
@@ -80,13 +73,6 @@ def test_models_that_agree_on_the_fit_may_carry_different_numbers(profile: Profi
     text = words(override(profile, {"cycle.period_us": 4000}))
     assert "standard agrees" in text
     assert "The bus carries 16 nodes (64 axes) by the paper model, limited by hops; 11 nodes (44 axes) by the" in text
-
-
-@pytest.mark.parametrize(
-    ("value_us", "written"), [(999.99999, "999.99999 us"), (411.8349, "411.8349 us"), (1e9, "1000 s")]
-)
-def test_periods_keep_their_digits(value_us: float, written: str) -> None:
-    assert period(value_us) == written
 
 
 def test_an_unsafe_gap_count_and_a_long_cable_are_warned_of(profile: Profile) -> None:
@@ -114,35 +100,30 @@ def test_the_verdict_says_which_limit_is_broken(profile: Profile, changes: dict[
 
 def test_latency_warns_of_payloads_over_the_limit(profile: Profile) -> None:
     slow = override(profile, {"bus.speed": "S100"})
-    lines = latency_lines(latency(slow, payloads_bytes=[4, 1024]), slow)
-    assert lines[-1].text == "Warning: a payload of 1024 bytes is over the 512 bytes of S100."
+    text = render(latency_report(latency(slow, payloads_bytes=[4, 1024]), slow), "table")
+    assert text.endswith("\nWarning: a payload of 1024 bytes is over the 512 bytes of S100.\n")
 
 
 def test_latency_warns_of_hops_and_gap_count(profile: Profile) -> None:
     long = override(profile, {"bus.nodes": 17, "bus.gap_count": 5})
-    text = "\n".join(line.text for line in latency_lines(latency(long), long))
+    text = render(latency_report(latency(long), long), "table")
     assert "17 hops are over the 16 of one bus" in text
     assert "gap count 5 is unsafe for 17 hops (17 nodes); the smallest safe one is 46" in text
 
 
 def test_one_table_a_payload_and_one_block_a_period(profile: Profile) -> None:
-    heads = latency_lines(latency(profile, payloads_bytes=[4, 16, 32]), profile)
-    assert sum(line.text.startswith("phase, us") for line in heads) == 3
+    heads = render(latency_report(latency(profile, payloads_bytes=[4, 16, 32]), profile), "table")
+    assert heads.count("\nfigure ") == 3
     result = capacity(profile, periods_us=[1000.0, 500.0])
-    blocks = capacity_lines(result, verdicts(result))
-    assert sum(line.text.startswith("available alpha T_s") for line in blocks) == 2
+    text = render(capacity_report(result, verdicts(result)), "table")
+    assert text.count("\navailable alpha T_s") == 2
 
 
-def test_tables_keep_every_figure_whole_and_end_without_blanks() -> None:
-    lines = table(["a\nb", "value"], [["x", "1"], ["longer", "123456.789"]], left=1)
-    assert [line.text for line in lines] == [
-        "a",
-        "b            value",
-        "------------------",
-        "x                1",
-        "longer  123456.789",
-    ]
-
-
-def test_times_too_small_for_three_decimals_keep_their_digits() -> None:
-    assert (us(1234.5678), us(0.0), us(-0.0004)) == ("1234.568", "0.000", "-0.0004")
+@pytest.mark.parametrize("period_us", [1000.0, 600.0, 100.0])
+def test_every_figure_of_the_blocks_stands_in_the_document(
+    profile: Profile, period_us: float, values_in_their_places: Callable[[Report], int]
+) -> None:
+    result = capacity(profile, periods_us=[4000.0, period_us])
+    # Two tables of 24 figures under two models, and the figures of the sentences.
+    assert values_in_their_places(capacity_report(result, verdicts(result))) > 100
+    assert values_in_their_places(latency_report(latency(profile, payloads_bytes=[4, 16]), profile)) == 2 * 4 * 16

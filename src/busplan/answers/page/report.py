@@ -1,0 +1,225 @@
+"""Answer of `busplan report`: all that is said of one or several profiles on one page."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from busplan.analysis.all_answers import AllAnswers
+from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.network import bus_of
+from busplan.answers.documents import document
+from busplan.answers.explain import assumptions_table
+from busplan.answers.figure_tables import cell_state
+from busplan.answers.page.bus import axes_part, bus_question, models_part, terms_part, timeline_part
+from busplan.answers.page.circle import circle_part, circle_question, sources_part
+from busplan.answers.page.commands import Source, shell_word, sources
+from busplan.buses.figure import (
+    AVAILABLE,
+    AXES,
+    FITS,
+    MARGIN,
+    MAX_AXES,
+    NODES,
+    PERIOD,
+    TIMING_MODEL,
+    UTILISATION,
+    Figure,
+    by_key,
+)
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Code,
+    Column,
+    Document,
+    Facts,
+    Link,
+    Report,
+    Row,
+    Section,
+    Sentence,
+    Table,
+    Value,
+    figure_value,
+)
+from busplan.forms.numbers import MISSING, plural
+
+_CIRCLE: Final = by_key(CIRCLE_FIGURES)
+_MEASURES: Final = (("mean", "mean_contour_error_mm"), ("max", "max_contour_error_mm"), ("G", "circular_deviation_mm"))
+
+
+class ReportedProfile(NamedTuple):
+    """One profile of a page."""
+
+    argument: str
+    """The PROFILE argument."""
+    answer: AllAnswers
+    other_period: bool
+    """Whether its period is not that of its file."""
+
+
+class _Subject(NamedTuple):
+    """A profile with the commands behind its figures."""
+
+    key: str
+    origin: str
+    answer: AllAnswers
+    sources: Mapping[str, Source]
+
+    @property
+    def name(self) -> str:
+        return self.answer.profile.name
+
+
+def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None) -> Report:
+    """Put the page together: a chapter for each profile and, for several, a comparison in front.
+
+    Parameters
+    ----------
+    profiles
+        One or more.
+    title
+        Heading of the page; without it the profile's name, or how many there are.
+    """
+    subjects = [
+        _Subject(
+            f"p{number}",
+            shell_word(one.argument),
+            one.answer,
+            sources(one.answer, argument=one.argument, key=f"p{number}", other_period=one.other_period),
+        )
+        for number, one in enumerate(profiles, start=1)
+    ]
+    own = Code(subjects[0].name) if len(subjects) == 1 else plural(len(subjects), "profile")
+    return Report(
+        Sentence((own if title is None else title,)), lambda: tuple(_blocks(subjects)), lambda: _document(subjects)
+    )
+
+
+def _document(subjects: Sequence[_Subject]) -> Document:
+    """Document of `busplan report --format json`: for each profile, those of the commands behind its figures."""
+    return document(
+        "report",
+        profiles=[
+            {"profile": one.name, "answers": {name: source.document for name, source in one.sources.items()}}
+            for one in subjects
+        ],
+    )
+
+
+def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
+    if len(subjects) == 1:
+        yield from _chapter(subjects[0])
+        return
+    yield Section(Sentence(("Comparison",)), (_comparison(subjects),), "comparison")
+    for one in subjects:
+        yield Section(Sentence((Code(one.name),)), tuple(_chapter(one)), key=one.key)
+
+
+def _chapter(subject: _Subject) -> Iterator[Block]:
+    """All of one profile."""
+    answer, found = subject.answer, subject.sources
+    if answer.profile.description.strip():
+        yield Sentence((" ".join(answer.profile.description.split()),))
+    yield _facts(subject)
+    questions = (bus_question(answer, found), circle_question(answer, found))
+    lines = (found[name].line for name in ("capacity", "circle") if name in found)
+    yield Section(Sentence(("Verdict",)), (*questions, *lines), "verdict")
+    yield models_part(answer, found)
+    yield timeline_part(answer, found)
+    yield terms_part(answer, found)
+    yield axes_part(answer, found)
+    yield circle_part(answer, found)
+    ranked = sources_part(answer, found)
+    if ranked is not None:
+        yield ranked
+    assumptions = found["explain"].gives(assumptions_table(answer.assumptions))
+    yield Section(Sentence(("What it rests on",)), (assumptions, found["explain"].line), "assumptions")
+    yield _commands(found)
+
+
+def _facts(subject: _Subject) -> Facts:
+    """How the bus is set, and where the profile is from."""
+    bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
+    setup = (one for one in bus.setup_figures if one.key in bus.facts)
+
+    def item(name: str, figure: Figure) -> tuple[str, Value]:
+        unit = "us" if figure.unit == "us" else ""
+        return name, Value(getattr(figures, figure.key), figure.key, unit, at=f"/results/0/{figure.key}")
+
+    items = (
+        *(item("nodes", NODES), item("axes", AXES)),
+        *(item(one.label, one) for one in setup),
+        *(item("period", PERIOD), item("slice", AVAILABLE)),
+        (
+            "deciding model",
+            Value(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key, at="/verdicts/0/timing_model"),
+        ),
+    )
+    return Facts((*subject.sources["capacity"].gives(items), ("profile", Code(subject.origin))))
+
+
+def _commands(found: Mapping[str, Source]) -> Section:
+    columns = (Column("what", kind="words"), Column("command", kind="words"))
+    rows = tuple(Row((source.command.purpose, source.command)) for source in found.values())
+    line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
+    table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
+    return Section(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
+
+
+def _comparison(subjects: Sequence[_Subject]) -> Table:
+    models = tuple(dict.fromkeys(one.timing_model for each in subjects for one in each.answer.capacity.results))
+    columns = (
+        Column("profile", kind="words"),
+        Column("fits", kind="words"),
+        Column("models agree", kind="words"),
+        Column("period", "us"),
+        Column("nodes"),
+        Column("axes"),
+        Column("used", "%"),
+        *(Column(model, group="margin, us") for model in models),
+        Column("most axes"),
+        *(Column(word, group="contour error, um") for word, _ in _MEASURES),
+        Column("circle passed", kind="words"),
+    )
+    rows = tuple(Row(_compared(one, models)) for one in subjects)
+    return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
+
+
+def _compared(subject: _Subject, models: Sequence[str]) -> tuple[Cell, ...]:
+    verdict, results, found = subject.answer.verdict, subject.answer.capacity.results, subject.sources
+    numbers = {one.timing_model: number for number, one in enumerate(results)}
+    own, figures = f"/results/{numbers[verdict.deciding.timing_model]}", verdict.deciding
+
+    def cell(figure: Figure) -> Value:
+        return figure_value(figure, getattr(figures, figure.key), at=f"{own}/{figure.key}")
+
+    def truth(value: bool, key: str) -> Value:
+        return Value(value, key, at=f"/verdicts/0/{key}", state=cell_state(FITS, value))
+
+    margins = (
+        figure_value(MARGIN, results[numbers[one]].margin_us, at=f"/results/{numbers[one]}/{MARGIN.key}")
+        if one in numbers
+        else MISSING
+        for one in models
+    )
+    bus = (
+        truth(figures.fits, "fits"),
+        truth(verdict.models_agree, "models_agree"),
+        Value(figures.period_us, PERIOD.key, "us", at=f"{own}/{PERIOD.key}"),
+        *map(cell, (NODES, AXES, UTILISATION)),
+        *margins,
+        cell(MAX_AXES),
+    )
+    link = Link(subject.name, subject.key, subject.origin)
+    return link, *found["capacity"].gives(bus), *_compared_circle(subject)
+
+
+def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
+    result = subject.answer.circle_figures
+    if result is None:
+        return MISSING, MISSING, MISSING, "not run"
+    passed = figure_value(
+        _CIRCLE["passed"], result.passed, at="/results/0/passed", state="neutral" if result.passed else "fails"
+    )
+    measures = (figure_value(_CIRCLE[key], getattr(result, key), at=f"/results/0/{key}") for _, key in _MEASURES)
+    return subject.sources["circle"].gives((*measures, passed))

@@ -1,0 +1,257 @@
+"""Each form of an answer: what it keeps, what it escapes, and how it says a state."""
+
+import json
+import math
+from collections.abc import Sequence
+from html.parser import HTMLParser
+from typing import get_args
+
+import pytest
+from markdown_it import MarkdownIt
+
+from busplan.errors import BusplanError
+from busplan.forms import ENDINGS, Form, render
+from busplan.forms.blocks import (
+    Bar,
+    Block,
+    Chart,
+    Code,
+    Column,
+    Command,
+    Drawing,
+    Facts,
+    Link,
+    Question,
+    Report,
+    Row,
+    Section,
+    Sentence,
+    Snippet,
+    Step,
+    Steps,
+    Swatch,
+    Table,
+    Value,
+    Words,
+    sentence,
+    values_in,
+    with_values,
+)
+from busplan.forms.csv_rows import to_csv
+from busplan.forms.json_document import to_json
+from busplan.forms.lines import Line, Mark
+from busplan.forms.numbers import decimals_of, period
+from busplan.forms.terminal import block_lines
+
+MARGIN = Value(3.96912, "margin_us", "us", 3, at="/margin_us")
+FAILED = Value(False, "fits", state="fails")
+HOSTILE = "<b>*x*</b> | `y` [z](javascript:alert(1)) \x1b[2J"
+
+
+class Picture(Drawing):
+    stylesheet = ".busplan-picture{fill:red}"
+
+    def svg(self) -> str:
+        return '<svg class="busplan-picture"></svg>'
+
+    def characters(self, width: int) -> list[Line]:
+        return [Line("#" * width, "drawn")]
+
+    def mermaid(self) -> str:
+        return "gantt\n"
+
+
+def answer(*blocks: Block) -> Report:
+    return Report(
+        Sentence(("An answer for ", Code("p"))), lambda: blocks, lambda: {"margin_us": 3.96912}, lambda: [{"a": 1}]
+    )
+
+
+def one_of_each(text: str = "text") -> Sequence[Block]:
+    table = Table(
+        (
+            Column("name", kind="words"),
+            Column("margin", "us", group="paper"),
+            Column("fits", group="paper"),
+            Column("", kind="drawing"),
+        ),
+        (
+            Row((Code(text), MARGIN, Value(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
+            Row((Link(text, "s", "x.toml"), Value(None), FAILED, ""), level=1),
+            Row((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), sought=True),
+            Row((Command("busplan capacity p", "what", "c"), "-", "-", "")),
+        ),
+        sentence("A table of {}", Code(text)),
+    )
+    return (
+        sentence(f"{text.replace('{', '')}: {{}} to spare.", MARGIN, state="passes"),
+        Facts((("margin", MARGIN), ("profile", Code(text)))),
+        table,
+        Chart(Picture(), Sentence((text,))),
+        Snippet(("[bus]", 'speed = "S400"')),
+        Steps((Step("(1)", "T", "a + b", "1 + 2", MARGIN), Step("x", "W", "", "", Words("time")))),
+        Question(text, Words("FAILED", "fails"), (Sentence((text,)),), Facts((("margin", MARGIN),))),
+        Section(Sentence((Code(text),)), (Sentence((text,)), Command("busplan capacity p")), "kind", "s"),
+    )
+
+
+# --- all forms ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", get_args(Form))
+def test_every_form_writes_every_block_and_the_same_each_time(form: Form) -> None:
+    text = render(answer(*one_of_each()), form)
+    assert text == render(answer(*one_of_each()), form)
+    assert text.endswith("\n")
+    if form not in ("csv", "json"):
+        assert text.count(">3.969<" if form == "html" else "3.969") == 6  # a bar stands beside its figure
+        assert "None" not in text
+        assert "worse" in text
+
+
+def test_every_form_has_one_ending() -> None:
+    assert sorted(ENDINGS.values()) == sorted(get_args(Form))
+
+
+def test_figures_are_found_and_changed_wherever_they_stand() -> None:
+    blocks = tuple(one_of_each())
+    found = list(values_in(blocks))
+    assert found.count(MARGIN) == 7
+    moved = with_values(blocks, lambda value: value._replace(at=f"/x{value.at}"))
+    assert [one.at for one in values_in(moved)] == [f"/x{one.at}" for one in found]
+    assert with_values(moved, lambda value: value._replace(at=value.at.removeprefix("/x"))) == blocks
+
+
+# --- terminal ---------------------------------------------------------------------------------------------------
+
+
+def test_tables_keep_every_figure_whole_and_end_without_blanks() -> None:
+    table = Table(
+        (Column("a", kind="words"), Column("value", "us", group="paper"), Column("", kind="drawing")),
+        (Row(("x", "1", "")), Row(("longer", "123456.789", ""), level=1)),
+    )
+    assert [line.text for line in block_lines([table])] == [
+        "               paper",
+        "               value",
+        "a                 us",
+        "--------------------",
+        "x                  1",
+        "  longer  123456.789",
+    ]
+
+
+def test_a_state_is_marked_where_it_stands() -> None:
+    table = Table((Column("model", kind="words"), Column("fits")), (Row(("paper", FAILED)), Row(("standard", "yes"))))
+    *_, failed, passed = block_lines([table])
+    assert failed.text == "paper       no"
+    assert [failed.text[mark.start : mark.end] for mark in failed.marks] == ["no"]
+    assert failed.marks[0] == Mark(12, 14, "fails")
+    assert passed.marks == ()
+
+
+def test_sentences_stand_together_and_all_else_apart() -> None:
+    words = Sentence(("One.",)), Sentence(("Two.",), "warns")
+    lines = list(block_lines([*words, Snippet(("a",)), words[0]]))
+    assert [line.text for line in lines] == ["One.", "Two.", "", "a", "", "One."]
+    assert lines[1].tone == "warns"
+
+
+def test_nothing_in_lines_commands_a_terminal() -> None:
+    text = render(answer(*one_of_each(HOSTILE)), "table")
+    assert "\x1b" not in text
+    assert "\\x1b[2J" in text
+
+
+# --- Markdown and HTML --------------------------------------------------------------------------------------------
+
+
+class Tags(HTMLParser):
+    """Tags with the names of their attributes, and text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.tags: list[tuple[str, tuple[str, ...]]] = []
+        self.values: list[dict[str, str | None]] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, tuple(name for name, _ in attrs)))
+        if tag == "data":
+            self.values.append(dict(attrs))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_foreign_text_is_text_in_markdown() -> None:
+    plain, hostile = (
+        Tags(
+            MarkdownIt("commonmark", {"html": True})
+            .enable("table")
+            .render(render(answer(*one_of_each(text)), "markdown"))
+        )
+        for text in ("text", HOSTILE)
+    )
+    assert [tag for tag in hostile.tags if tag[0] != "code"] == [tag for tag in plain.tags if tag[0] != "code"]
+    assert "<b>*x*</b>" in hostile.text
+
+
+def test_foreign_text_is_text_in_html() -> None:
+    plain, hostile = (Tags(render(answer(*one_of_each(text)), "html")) for text in ("text", HOSTILE))
+    assert hostile.tags == plain.tags
+    assert "<b>*x*</b>" in hostile.text
+
+
+def test_html_keeps_the_exact_value_its_place_and_its_state() -> None:
+    found = Tags(render(answer(*one_of_each()), "html")).values
+    assert {json.loads(one["value"] or "") for one in found} == {3.96912, True, False, None}
+    assert all(one["data-at"] == "/margin_us" for one in found if one["value"] == "3.96912")
+    assert [one["class"] for one in found if one["value"] == "false"] == ["fails"]
+
+
+def test_html_has_the_style_of_its_drawings_once() -> None:
+    html = render(answer(Chart(Picture(), Sentence(("one",))), Chart(Picture(), Sentence(("two",)))), "html")
+    assert html.count(Picture.stylesheet) == 1
+    assert html.count('<svg class="busplan-picture">') == 2
+
+
+def test_markdown_has_mermaid_where_a_drawing_has_it() -> None:
+    text = render(answer(*one_of_each()), "markdown")
+    assert "```mermaid\ngantt\n```" in text
+    assert text.startswith("# An answer for `p`\n")
+    assert render(answer(Sentence(("Alone.",))), "markdown") == "### An answer for `p`\n\nAlone.\n"
+
+
+# --- JSON and CSV -------------------------------------------------------------------------------------------------
+
+
+def test_json_and_csv_are_the_record() -> None:
+    assert json.loads(render(answer(), "json")) == {"margin_us": 3.96912}
+    assert render(answer(), "csv") == "a\n1\n"
+    assert to_csv([]) == ""
+
+
+def test_what_is_no_one_table_has_no_csv() -> None:
+    with pytest.raises(BusplanError, match="CSV is one table, and this answer has several"):
+        render(answer()._replace(records=None), "csv")
+
+
+def test_json_refuses_what_is_not_finite() -> None:
+    with pytest.raises(ValueError, match="Out of range"):
+        to_json({"value_us": math.nan})
+
+
+# --- numbers --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("value_us", "written"), [(999.99999, "999.99999 us"), (411.8349, "411.8349 us"), (1e9, "1000 s")]
+)
+def test_periods_keep_their_digits(value_us: float, written: str) -> None:
+    assert period(value_us) == written
+
+
+def test_numbers_too_small_for_their_decimals_keep_their_digits() -> None:
+    assert (decimals_of(1234.5678, 3), decimals_of(0.0, 3), decimals_of(-0.0004, 3)) == ("1234.568", "0.000", "-0.0004")
