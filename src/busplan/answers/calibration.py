@@ -106,7 +106,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     yield sentence(
         f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
         Code(result.profile.name),
-        count_value(measurements, at="/measurements"),
+        count_value(measurements, "measurements", at="/measurements"),
         count_value(sizes),
         Code(source),
     )
@@ -162,7 +162,7 @@ def _residual(result: Calibration) -> Sentence:
         place = sentence(
             " at {} (line {})",
             Value(one.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
-            count_value(one.line, at=f"{at}/line"),
+            count_value(one.line, "line", at=f"{at}/line"),
         )
         said = joined(said, place, by="")
     repeated = [(fit.deviation_us, at) for at, fit in enumerate(result.payloads) if fit.deviation_us is not None]
@@ -224,7 +224,7 @@ def _warnings(result: Calibration) -> Iterator[Sentence]:
 def _outliers(result: Calibration) -> Sentence:
     number = len(result.outliers)
     shown = result.outliers[:_MOST_LINES]
-    lines = [sentence("{}", count_value(one.line, at=f"/outliers/{at}/line")) for at, one in enumerate(shown)]
+    lines = [sentence("{}", count_value(one.line, "line", at=f"/outliers/{at}/line")) for at, one in enumerate(shown)]
     said = joined(
         sentence(
             f"{{}} {nouns(number, 'outlier')}, more than {{}} robust standard deviations off: line ",

@@ -260,7 +260,9 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
 def _row(one: ComparedFigure, at: str) -> Row:
     figure = one.figure
     a, b, difference = (figure_value(figure, getattr(one, key), at=f"{at}/{key}") for key in ("a", "b", "difference"))
-    relative = Value(one.relative_difference, "", "%", 1, signed=True, at=f"{at}/relative_difference")
+    relative = Value(
+        one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
+    )
     judged = Words(one.judgement, _STATES[one.judgement])
     return Row((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
 

@@ -85,15 +85,15 @@ def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report
     return Report(
         caption,
         lambda: (
-            assumptions_table(assumptions, at="/assumptions")._replace(caption=caption),
+            assumptions_table(assumptions)._replace(caption=caption),
             _figure_table(bus_of(profile)),
         ),
-        partial(figure_document, profile, assumptions),
+        partial(assumptions_document, profile, assumptions),
         lambda: figure_rows(bus_of(profile)),
     )
 
 
-def assumptions_table(assumptions: Sequence[Input], *, at: str) -> Table:
+def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions") -> Table:
     """What figures rest on, one row each.
 
     Parameters
@@ -138,7 +138,7 @@ def constant_rows(bus: Bus) -> list[Record]:
     ]
 
 
-def figure_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
     """Document of `busplan explain PROFILE --format json`: what the figures rest on, and the whole registry."""
     return document(
         "explain",
@@ -231,7 +231,7 @@ def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
     """The result in a sentence: one figure, or what a change sets."""
     if isinstance(one.value, dict):
         settings = (
-            Sentence((Code(key), " = ", Value(new, at=f"{at}/value/changes/{key}")))
+            Sentence((Code(key), " = ", Value(new, key, at=f"{at}/value/changes/{key}")))
             for key, new in one.value["changes"].items()
         )
         return joined(*settings, by=", ").parts
@@ -270,7 +270,7 @@ def _inputs(one: Derivation, at: str) -> Table:
 
 
 def _known(one: Input, at: str) -> tuple[Cell, ...]:
-    value = Value(one.value, "", one.unit, digits=DIGITS, at=f"{at}/value")
+    value = Value(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
     return Code(one.name), value, one.unit, one.grade, one.source
 
 

@@ -79,7 +79,7 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
 
 def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> Row:
     at, first = next(iter(by_method.values()))
-    published = Value(first.published, "", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
+    published = Value(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
     compared = (cell for method in methods for cell in _compared(by_method.get(method)))
     return Row((first.quantity, first.unit, published, *compared))
 
@@ -92,15 +92,17 @@ def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:
     place = f"/figures/{at}"
     # What the decimals do not show is the rounding of the printed figure.
     return (
-        Value(one.computed, "", one.unit, decimals, at=f"{place}/computed", fixed=True),
+        Value(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
         Value(
             one.residual,
-            "",
+            "residual",
             one.unit,
             max(decimals, _RESIDUAL_DECIMALS),
             signed=True,
             at=f"{place}/residual",
             fixed=True,
         ),
-        Value(one.relative_residual, "", "%", 1, signed=True, at=f"{place}/relative_residual", fixed=True),
+        Value(
+            one.relative_residual, "relative_residual", "%", 1, signed=True, at=f"{place}/relative_residual", fixed=True
+        ),
     )
