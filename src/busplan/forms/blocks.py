@@ -165,7 +165,7 @@ class Chart(NamedTuple):
     drawing: Drawing
     caption: Sentence
     legend: Sentence | None = None
-    """How its SVG is read; where it is drawn in characters, they say it themselves."""
+    """How its SVG is read, behind the caption; where it is drawn in characters, they say it themselves."""
 
 
 class Snippet(NamedTuple):
