@@ -272,14 +272,19 @@ def _file_unless_dash(text: str) -> Path | None:
     return None if text == "-" else Path(text)
 
 
-FormatOption = Annotated[
-    Form | None,
-    typer.Option(
-        "--format",
-        help="Form of the answer; a table is text in lines.  [default: by the ending of --output, else table]",
-        show_default=False,
-    ),
-]
+def format_option(default: str) -> Any:
+    """Make the option that says the form of an answer.
+
+    Parameters
+    ----------
+    default
+        The form where neither it nor a file's name says one.
+    """
+    help_ = f"Form of the answer; a table is lines of text.  [default: by the ending of --output, else {default}]"
+    return typer.Option("--format", help=help_, show_default=False)
+
+
+FormatOption = Annotated[Form | None, format_option("table")]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
 
 

@@ -7,7 +7,7 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files
-from busplan.cli.options import FormatOption, OutputOption, complete_profile, time_us
+from busplan.cli.options import OutputOption, complete_profile, format_option, time_us
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
@@ -34,7 +34,7 @@ def report_command(
             show_default=False,
         ),
     ],
-    format_: FormatOption = None,
+    format_: Annotated[Form | None, format_option("html")] = None,
     output: OutputOption = None,
     title: Annotated[
         str | None,
