@@ -95,7 +95,6 @@ class Command(NamedTuple):
 
 Part = str | Value | Code
 """A piece of a sentence."""
-Cell = str | Value | Words | Code | Link | Swatch | Bar | Command
 
 
 class Sentence(NamedTuple):
@@ -103,6 +102,9 @@ class Sentence(NamedTuple):
 
     parts: tuple[Part, ...]
     state: State = "neutral"
+
+
+Cell = str | Value | Words | Code | Link | Swatch | Bar | Command | Sentence
 
 
 class Column(NamedTuple):
@@ -166,6 +168,8 @@ class Chart(NamedTuple):
 
     drawing: Drawing
     caption: Sentence
+    legend: Sentence | None = None
+    """How its SVG is read, behind the caption; where it is drawn in characters, they say it themselves."""
 
 
 class Snippet(NamedTuple):
