@@ -38,6 +38,8 @@ class Value(NamedTuple):
     state: State = "neutral"
     command: str = ""
     """Id of the `Command` whose document that is, where the answer holds several."""
+    grouped: bool = False
+    """Whether commas part its thousands."""
 
 
 class Words(NamedTuple):
@@ -270,9 +272,9 @@ def figure_value(figure: Figure, value: Any, *, at: str = "", state: State = "ne
     return Value(value, figure.key, figure.column or figure.unit, decimals, at=at, state=state)
 
 
-def count_value(value: float, key: str = "", *, at: str = "") -> Value:
+def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> Value:
     """A number of things."""
-    return Value(value, key, at=at)
+    return Value(value, key, at=at, grouped=grouped)
 
 
 def state_of(passes: object) -> State:

@@ -26,6 +26,8 @@ def written(value: Value) -> str:
     ('3.600', '97.00')
     >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("hops", "nodes")))
     ('-', 'yes', '16', 'hops, nodes')
+    >>> written(Value(1234567)), written(Value(1234567, grouped=True))
+    ('1234567', '1,234,567')
     """
     match value.value:
         case None:
@@ -117,4 +119,5 @@ def _number(value: Value) -> str:
         number = 0.0
     if value.decimals is not None:
         return decimals_of(number, value.decimals, signed=value.signed)
-    return f"{number:+.12g}" if value.signed and number else f"{number:.12g}"
+    sign, comma = "+" if value.signed and number else "", "," if value.grouped else ""
+    return f"{number:{sign}{comma}.12g}"
