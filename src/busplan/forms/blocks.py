@@ -42,6 +42,8 @@ class Value(NamedTuple):
     """Significant digits of a number without `decimals`; None for as many as it has."""
     fixed: bool = False
     """Whether what is too small for `decimals` is rounding, and written as zero."""
+    grouped: bool = False
+    """Whether commas part its thousands."""
 
 
 class Words(NamedTuple):
@@ -95,7 +97,6 @@ class Command(NamedTuple):
 
 Part = str | Value | Code
 """A piece of a sentence."""
-Cell = str | Value | Words | Code | Link | Swatch | Bar | Command
 
 
 class Sentence(NamedTuple):
@@ -103,6 +104,9 @@ class Sentence(NamedTuple):
 
     parts: tuple[Part, ...]
     state: State = "neutral"
+
+
+Cell = str | Value | Words | Code | Link | Swatch | Bar | Command | Sentence
 
 
 class Column(NamedTuple):
@@ -166,6 +170,8 @@ class Chart(NamedTuple):
 
     drawing: Drawing
     caption: Sentence
+    legend: Sentence | None = None
+    """How its SVG is read, behind the caption; where it is drawn in characters, they say it themselves."""
 
 
 class Snippet(NamedTuple):
@@ -274,9 +280,9 @@ def figure_value(figure: Figure, value: Any, *, at: str = "", state: State = "ne
     return Value(value, figure.key, figure.column or figure.unit, decimals, at=at, state=state)
 
 
-def count_value(value: float, key: str = "", *, at: str = "") -> Value:
+def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> Value:
     """A number of things."""
-    return Value(value, key, at=at)
+    return Value(value, key, at=at, grouped=grouped)
 
 
 def state_of(passes: object) -> State:

@@ -30,6 +30,8 @@ def written(value: Value) -> str:
     ('-', 'yes', '16', 'hops, nodes')
     >>> written(Value([2.38808777, 4000.0], digits=4)), written(Value(-4e-16, decimals=3, fixed=True))
     ('2.388, 4000', '0.000')
+    >>> written(Value(1234567)), written(Value(1234567, grouped=True))
+    ('1234567', '1,234,567')
     """
     match value.value:
         case None:
@@ -123,5 +125,5 @@ def _number(value: Value) -> str:
         # Plus zero: a negative one is no number to show.
         number = round(number, value.decimals) + 0.0 if value.fixed else number
         return decimals_of(number, value.decimals, signed=value.signed)
-    sign = "+" if value.signed and number > 0 else ""
-    return f"{sign}{number:.{value.digits or _DIGITS}g}"
+    sign, comma = "+" if value.signed and number > 0 else "", "," if value.grouped else ""
+    return f"{number:{sign}{comma}.{value.digits or _DIGITS}g}"
