@@ -1,0 +1,92 @@
+"""What `busplan explain` says: figures in their places, steps as they were computed, how well inputs are known."""
+
+from collections.abc import Callable
+
+import pytest
+
+from busplan.analysis.derivation.explain import assumptions, explain
+from busplan.analysis.register import figures_of
+from busplan.answers.explain import assumptions_report, assumptions_table, explain_report
+from busplan.buses import kind_named
+from busplan.forms import render
+from busplan.forms.blocks import Code, Report, Section, Steps, Table, Value, Words, values_in
+from busplan.forms.terminal import sentence_text
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+
+FIGURES = [f"{command}.{key}" for command, keys in figures_of(kind_named("ieee1394")).items() for key in keys]
+
+
+def sections(figure: str, **changes: object) -> list[Section]:
+    """The derivations of a figure of paper-1ms."""
+    profile = override(load("paper-1ms").profile, {key.replace("__", "."): value for key, value in changes.items()})
+    found = explain_report(explain(profile, figure)).blocks()
+    return [block for block in found if isinstance(block, Section)]
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_every_figure_stands_at_its_place(figure: str, values_in_their_places: Callable[[Report], int]) -> None:
+    found = explain(load("paper-1ms").profile, figure)
+    report = explain_report(found)
+    steps = sum(len(one.steps) for one in found.derivations)
+    inputs = sum(len(one.inputs) for one in found.derivations)
+    # All inputs and periods; of results and steps, what has no figure has words.
+    assert (
+        inputs + len(found.derivations) <= values_in_their_places(report) <= inputs + steps + 2 * len(found.derivations)
+    )
+
+
+def test_the_title_has_the_result_the_caption_the_least_known_grade() -> None:
+    (section,) = sections("required_us", node__execution__grade="assumed")
+    assert sentence_text(section.title) == "required_us of paper-1ms at 1 ms, paper model: 205.9175 us"
+    (period, result) = values_in(section.title)
+    assert (period.value, period.at) == (1000.0, "/derivations/0/period_us")
+    assert (result.value, result.at) == (205.9174700520833, "/derivations/0/value")
+    about, steps, inputs = section.blocks
+    assert isinstance(steps, Steps)
+    assert isinstance(inputs, Table)
+    assert inputs.caption is not None
+    assert sentence_text(inputs.caption) == "It starts from these; the least well known is assumed."
+    assert inputs.stacks
+    assert "What the whole cycle needs" in str(about)
+
+
+def test_a_step_says_nothing_twice() -> None:
+    for figure in ("failures", "hops", "required_us", "exceeded", "centre_offset_mm"):
+        for section in sections(figure):
+            (steps,) = (block for block in section.blocks if isinstance(block, Steps))
+            for step in steps.steps:
+                result = step.result.text if isinstance(step.result, Words) else None
+                said = [one for one in (step.formula, step.numbers, result) if one]
+                assert len(set(said)) == len(said), step
+                assert step.symbol != step.formula
+
+
+def test_what_a_figure_is_made_of_is_named_and_nothing_is_none() -> None:
+    def result(figure: str) -> str:
+        (section,) = sections(figure)
+        return sentence_text(section.title).partition(": ")[2]
+
+    assert result("failures") == "none"
+    assert result("cheapest_change") == "bus.gap_count = 13"
+    assert result("contributions").startswith("reversal, drive_lag, drive_offset")
+    assert result("centre_offset_mm") == "0.003879726, 0.003915455 mm"
+    assert result("fits") == "yes"
+
+
+def test_the_assumptions_are_a_table_of_their_own(values_in_their_places: Callable[[Report], int]) -> None:
+    profile = load("paper-4ms").profile
+    found = assumptions(profile)
+    report = assumptions_report(profile, found)
+    assert values_in_their_places(report) == len(found)
+    table = assumptions_table(found)
+    assert [column.heading for column in table.columns] == ["name", "value", "unit", "grade", "source", "meaning"]
+    assert table.stacks
+    for row, one in zip(table.rows, found, strict=True):
+        name, value, *others = row.cells
+        assert (name, others) == (Code(one.name), [one.unit, one.grade, one.source, one.meaning])
+        assert isinstance(value, Value)
+        assert (value.value, value.unit) == (one.value, one.unit)
+    text = render(report, "table")
+    assert text.startswith("What the figures of paper-4ms rest on, the least well known first\n")
+    assert "\nFigures to explain\n" in text

@@ -1,0 +1,72 @@
+"""What `busplan paper`, `profiles` and `rule` say."""
+
+from collections.abc import Callable
+
+import pytest
+
+from busplan.analysis.circle.roundness import circle_test
+from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
+from busplan.answers.paper import paper_document, paper_report
+from busplan.answers.profiles import profiles_report
+from busplan.answers.rules import rule_report, rules_report
+from busplan.forms import render
+from busplan.forms.blocks import Report, Section, Snippet, Table, Value, values_in
+from busplan.profile.shipped import load, shipped_names
+from busplan.rules.registry import NEVER_SUPPRESSED, all_rules
+
+
+def test_paper_has_every_comparison_once(values_in_their_places: Callable[[Report], int]) -> None:
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
+    report = paper_report(sections)
+    figures = paper_document(sections)["figures"]
+    places = [value.at for value in values_in(tuple(report.blocks()))]
+    assert len(places) == len(set(places)) == values_in_their_places(report)
+    for key in ("computed", "residual", "relative_residual"):
+        assert [f"/figures/{number}/{key}" in places for number in range(len(figures))] == [True] * len(figures)
+    blocks = [block for block in report.blocks() if isinstance(block, Section)]
+    assert [str(block.title.parts[0]) for block in blocks] == [section.title for section in sections]
+    assert [block.blocks[0].parts[0] for block in blocks] == [section.note for section in sections]  # type: ignore[union-attr]
+
+
+def test_no_residual_of_the_paper_is_rounding_dust() -> None:
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    text = render(paper_report(paper_sections(load(BENCH_PROFILE).profile, circles=circles)), "table")
+    assert "e-" not in text.replace("time-", "")
+    assert "-0.0 " not in text
+    assert "-0.0\n" not in text
+    assert "no payload  us         3.11        3.104   -0.0064  -0.2                3.110    0.0000  0.0\n" in text
+
+
+def test_each_profile_is_a_section(values_in_their_places: Callable[[Report], int]) -> None:
+    report = profiles_report([load(name).profile for name in shipped_names()])
+    assert values_in_their_places(report) == 2 * len(shipped_names())
+    text = render(report, "table")
+    assert "paper-two-node: 1 node at 4 ms, paper model decides\n" in text
+    assert "\n\n\n" not in text
+    assert "# Shipped profiles\n\n## `paper-1ms`" in render(report, "markdown")
+
+
+def test_the_rules_are_one_table() -> None:
+    rules = list(all_rules().values())
+    (table,) = rules_report(rules).blocks()
+    assert isinstance(table, Table)
+    assert [row.cells[0][0] for row in table.rows] == [rule.code for rule in rules]
+    # An answer is read as often as somebody asks.
+    report = rules_report(rules)
+    assert render(report, "table") == render(report, "table")
+
+
+@pytest.mark.parametrize("code", all_rules())
+def test_a_rule_is_explained_with_what_suppresses_it(code: str) -> None:
+    rule = all_rules()[code]
+    report = rule_report(rule)
+    text = render(report, "table")
+    assert text.startswith(f"{code} {rule.name} ({rule.severity}): {rule.summary}\n{rule.explanation}\n")
+    snippets = [block for block in report.blocks() if isinstance(block, Snippet)]
+    if code in NEVER_SUPPRESSED:
+        assert text.endswith("\nIt cannot be suppressed.\n")
+        assert snippets == []
+    else:
+        assert snippets == [Snippet((f"# busplan: ignore[{code}] reason",))]
+    assert not any(isinstance(value, Value) for value in values_in(tuple(report.blocks())))
