@@ -83,7 +83,7 @@ def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report
     """
     caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
     return Report(
-        caption,
+        Sentence(("The figures of ", Code(profile.name))),
         lambda: (
             assumptions_table(assumptions)._replace(caption=caption),
             _figure_table(bus_of(profile)),
