@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 from busplan.analysis.capacity.figures import Capacity, capacity
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
 from busplan.analysis.capacity.verdict import Verdict, verdicts
-from busplan.analysis.circle.contour_profile import ContourProfile, contour_profile
+from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
 from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.trace import Input
@@ -17,8 +17,6 @@ from busplan.progress import Progress
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 
-CONTOUR_SECTORS: Final = 720
-"""Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""
 _PERIOD_FACTORS: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
@@ -101,6 +99,5 @@ def _circle(
     except BusplanError as error:
         return None, None, error.problems
     (run,) = test.runs
-    contour = None if run is None or run.diverged else contour_profile(run, sectors=CONTOUR_SECTORS)
     # Half a million positions a profile are not kept: a page may have many.
-    return test._replace(runs=(None,)), contour, ()
+    return test._replace(runs=(None,)), drawn_profile(run), ()

@@ -1,164 +1,209 @@
-"""`busplan circle-test` for people."""
+"""Answer of `busplan circle-test`."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Final
 
-from busplan.analysis.circle.contour_profile import ContourProfile
-from busplan.analysis.circle.roundness import CircleFigures, CircleTest, failed_measure, to_attack
-from busplan.answers.verdict_sentences import period
-from busplan.forms.lines import BLANK, Line, table, us
-
-PLOT_SECTORS: Final = 72
-"""Columns of the plot in the terminal: one for every 5 degrees."""
-_PLOT_ROWS: Final = 9
-_SHOWN: Final = 1e-9
-"""Largest error, in mm, that still counts as none in a plot."""
-_SHOWN_UM: Final = 1e-6
-"""Smallest error, in um, that is shown as one: a picometre is rounding."""
-_ONE_DIGIT_UM: Final = 0.05
-"""From here on one digit after the point shows something."""
-
-
-_MEASURES: Final = {
-    "mean_contour_error_mm": "mean contour error",
-    "max_contour_error_mm": "largest contour error",
-    "circular_deviation_mm": "circular deviation G",
-}
-
-
-def circle_lines(
-    test: CircleTest, profiles: Sequence[ContourProfile | None], *, with_contributions: bool
-) -> list[Line]:
-    """Verdict of each period, one row of figures a period, the ranked sources and a plot of the error."""
-    lines: list[Line] = []
-    for result in test.results:
-        lines.extend(circle_verdict_lines(test.profile.name, result))
-    if any(result.stable is not None for result in test.results):
-        # Said wherever a contour figure is shown: what it rests on.
-        lines.append(Line(f"The servo values behind these figures are {test.results[0].servo_grade}."))
-    lines.extend((BLANK, *_figures(test.results)))
-    for result, profile in zip(test.results, profiles, strict=True):
-        title = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min"
-        if with_contributions and result.contributions:
-            lines.extend((BLANK, *_contributions(title, result)))
-        if profile is not None:
-            lines.extend((BLANK, *_plot(title, profile)))
-    return lines
-
-
-def circle_verdict_lines(name: str, result: CircleFigures) -> Iterator[Line]:
-    """Say whether the circle holds, what it does not hold, and what to attack first."""
-    subject = f"{name} at {period(result.period_us)} and {result.feed_mm_per_min:g} mm/min"
-    if result.passed:
-        yield Line(f"{subject}: the circle holds every tolerance.", "good")
-        return
-    reasons = ", and ".join(failure.text for failure in result.failures)
-    yield Line(f"{subject}: FAILED, {reasons}.", "bad")
-    measure, attack = failed_measure(result), to_attack(result)
-    if measure is not None and attack is not None:
-        source, removed_mm = attack
-        yield Line(
-            f"Attack {source.source} first: without it the {_MEASURES[measure]} is "
-            f"{um(getattr(source, measure))} um, {um(removed_mm)} um less."
-        )
-    elif measure is not None and result.contributions is not None:
-        yield Line(f"No single error source of the profile explains the {_MEASURES[measure]}.")
-
-
-def um(value_mm: float | None) -> str:
-    """Write a length in micrometres; a dash for what does not exist."""
-    return "-" if value_mm is None else us(_rounded_um(value_mm))
-
-
-def _rounded_um(value_mm: float) -> float:
-    """Micrometres, and 0 without a sign for what is less than arithmetic can tell."""
-    value_um = value_mm * 1e3
-    return value_um if abs(value_um) >= _SHOWN_UM else 0.0
-
-
-def signed_um(value_mm: float) -> str:
-    """Write a length in micrometres with its sign."""
-    text = f"{value_mm * 1e3:+.3f}"
-    return "0.000" if float(text) == 0.0 else text
-
-
-def two_decimals(value: float | None) -> str:
-    """Write a margin; a dash for what does not exist."""
-    return "-" if value is None else f"{value:.2f}"
-
-
-_COLUMNS: Final[tuple[tuple[str, Callable[[CircleFigures], str]], ...]] = (
-    ("period", lambda one: period(one.period_us)),
-    ("feed\nmm/min", lambda one: f"{one.feed_mm_per_min:g}"),
-    ("duration\ns", lambda one: f"{one.duration_s:.3f}"),
-    ("set-\npoints", lambda one: str(one.setpoints)),
-    ("mean\num", lambda one: um(one.mean_contour_error_mm)),
-    ("max\num", lambda one: um(one.max_contour_error_mm)),
-    ("F_min\num", lambda one: um(one.radial_deviation_min_mm)),
-    ("F_max\num", lambda one: um(one.radial_deviation_max_mm)),
-    ("G\num", lambda one: um(one.circular_deviation_mm)),
-    ("phase\ndeg", lambda one: two_decimals(one.phase_margin_deg)),
-    ("gain\ndB", lambda one: two_decimals(one.gain_margin_db)),
-    ("passed", lambda one: "yes" if one.passed else "no"),
+from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
+from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.roundness import CircleFigures, CircleTest
+from busplan.answers.circle_verdict import circle_sentences, servo_sentence, setup_values, source_words
+from busplan.answers.documents import document, with_profile
+from busplan.answers.figure_tables import Owner, figure_table
+from busplan.buses.figure import by_key
+from busplan.drawings.circle import CircleDrawing
+from busplan.forms.blocks import (
+    Bar,
+    Block,
+    Chart,
+    Code,
+    Column,
+    Document,
+    Record,
+    Report,
+    Row,
+    Sentence,
+    Table,
+    Value,
+    figure_value,
+    joined,
+    sentence,
 )
+from busplan.forms.numbers import period
+from busplan.sections.profile import Profile
+
+_FIGURES: Final = by_key(CIRCLE_FIGURES)
+_SHOWN: Final = (
+    *("mean_contour_error_mm", "max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"),
+    *("circular_deviation_mm", "radius_deviation_mm", "phase_margin_deg", "gain_margin_db", "crossover_hz"),
+    *("radius_mm", "feed_mm_per_min", "period_us", "step_us", "duration_s", "setpoints", "loop", "stable", "passed"),
+)
+"""Figures of the table, in its order."""
+ACT_TOGETHER: Final = Sentence(
+    ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
+)
+NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
 
 
-def _figures(results: Sequence[CircleFigures]) -> list[Line]:
-    return table(
-        [heading for heading, _ in _COLUMNS],
-        ([write(result) for _, write in _COLUMNS] for result in results),
-        left=1,
+def circle_report(test: CircleTest, *, with_contributions: bool) -> Report:
+    """Answer the question of `circle-test`.
+
+    Parameters
+    ----------
+    test
+        The circle test.
+    with_contributions
+        Whether the document ranks the error sources, too.
+    """
+    return Report(
+        Sentence(("Circle test of ", Code(test.profile.name))),
+        lambda: tuple(_blocks(test, with_contributions=with_contributions)),
+        partial(circle_document, test, with_contributions=with_contributions),
+        lambda: with_profile(test.profile.name, circle_records(test, with_contributions=with_contributions)),
     )
 
 
-def _contributions(title: str, result: CircleFigures) -> list[Line]:
-    return [
-        Line(f"Error sources at {title}, each removed in turn", "heading"),
-        *table(
-            ["source", "max without it, um", "takes, um"],
-            (
-                [one.source, um(one.max_contour_error_mm), signed_um(one.removed_mm)]
-                for one in result.contributions or ()
-            ),
-            left=1,
-        ),
+def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
+    """Verdict of each period, their figures side by side, and what makes each circle less round."""
+    places = [f"/results/{number}" for number in range(len(test.results))]
+    for result, at in zip(test.results, places, strict=True):
+        yield from circle_sentences(test.profile.name, result, at=at, with_contributions=with_contributions)
+    simulated = (result for result in test.results if result.stable is not None)
+    yield from servo_sentence(next(simulated, test.results[0]))
+    yield circle_table(test.results)
+    ranked = [
+        result.contributions for result in test.results if with_contributions and result.contributions is not None
     ]
+    if any(ranked):
+        yield ACT_TOGETHER
+    elif ranked:
+        yield NO_SOURCES
+    for result, run, at in zip(test.results, test.runs, places, strict=True):
+        if with_contributions and result.contributions:
+            yield contributions_table(result, at=at)
+        contour = drawn_profile(run)
+        if contour is not None:
+            chart = circle_chart(contour, result, test.profile, at=at)
+            yield chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result, at=at))
 
 
-def _plot(title: str, profile: ContourProfile) -> list[Line]:
-    """Contour error over the angle, in characters that every terminal has."""
-    lows = [value for value in profile.low_mm if value is not None]
-    highs = [value for value in profile.high_mm if value is not None]
-    bottom, top = min((*lows, 0.0)), max((*highs, 0.0))
-    if top - bottom < _SHOWN:
-        return [Line(f"Contour error at {title}: none.", "heading")]
-    height = (top - bottom) / _PLOT_ROWS
-    lines = [Line(f"Contour error over the angle at {title}, um", "heading")]
-    for number in range(_PLOT_ROWS):
-        upper = top - number * height
-        lower = upper - height
-        label = {0: top, _PLOT_ROWS - 1: bottom}.get(number)
-        zero = lower <= 0.0 < upper or (upper == 0.0 == top and number == 0)
-        cells = "".join(
-            _cell(low, high, lower=lower, upper=upper, zero=zero)
-            for low, high in zip(profile.low_mm, profile.high_mm, strict=True)
+def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
+    """Figures of the circle test, the periods side by side.
+
+    Parameters
+    ----------
+    results
+        The circle test at each period.
+    start
+        Number of the first among the results of the document.
+    """
+    owners = [
+        Owner(Column(period(result.period_us)), result, f"/results/{start + number}")
+        for number, result in enumerate(results)
+    ]
+    rows = ((_FIGURES[key], 0) for key in _SHOWN)
+    return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
+
+
+def contributions_table(result: CircleFigures, *, at: str) -> Table:
+    """The error sources, ranked, each with a bar on a scale that all share.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period, with contributions.
+    at
+        Place of its figures in the JSON document.
+    """
+    ranked = result.contributions or ()
+    removed = [one.removed_mm for one in ranked]
+    least, most = min((0.0, *removed)), max((0.0, *removed))
+    rows = []
+    for number, one in enumerate(ranked):
+        place = f"{at}/contributions/{number}"
+        takes = Value(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
+        left = (
+            figure_value(_FIGURES[key], getattr(one, key), at=f"{place}/{key}")
+            for key in ("max_contour_error_mm", "circular_deviation_mm")
         )
-        text = _label(label) if label is not None else "0" if zero else ""
-        lines.append(Line(f"{text:>9} |{cells}".rstrip(), "table"))
-    axis = "".join(f"{angle:<{PLOT_SECTORS // 4}}" for angle in (0, 90, 180, 270)).rstrip()
-    lines.append(Line(f"{'deg':>9}  {axis}", "table"))
-    return lines
+        rows.append(Row((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
+    columns = (
+        Column("source", kind="words"),
+        Column("", kind="drawing"),
+        Column("takes", "um"),
+        Column("max", "um", group="without it"),
+        Column("G", "um", group="without it"),
+    )
+    caption = sentence(
+        "Each error source removed in turn at {} and {}; what it takes from the largest contour error",
+        *setup_values(result, at=at),
+    )
+    return Table(columns, tuple(rows), caption)
 
 
-def _label(value_mm: float) -> str:
-    """An end of the scale, with as many digits as tell it from 0."""
-    value_um = _rounded_um(value_mm)
-    if value_um == 0.0:
-        return "0"
-    return f"{value_um:+.1f}" if abs(value_um) >= _ONE_DIGIT_UM else f"{value_um:+.1g}"
+def circle_chart(
+    contour: ContourProfile, result: CircleFigures, profile: Profile, *, at: str = "/results/0"
+) -> Chart | None:
+    """The circle with its error magnified; None where there is no error to show.
+
+    Parameters
+    ----------
+    contour
+        Contour error around the circle.
+    result
+        The circle test at one period.
+    profile
+        The network and its tolerances.
+    at
+        Place of its figures in the JSON document.
+    """
+    tolerance_mm = profile.tolerance.max_contour_error_mm
+    drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm)
+    scale = drawing.scale
+    if scale is None:
+        return None
+    caption = sentence("Contour error at constant speed, at {} and {}", *setup_values(result, at=at))
+    tolerance = Value(tolerance_mm, "max_contour_error_mm", "um")
+    limit = (
+        sentence("the profile has no tolerance of the largest contour error.")
+        if tolerance_mm is None
+        else sentence("the tolerance of {} lies outside the drawing.", tolerance)
+        if scale.tolerance_mm is None
+        else sentence("the tolerance of {} dashed.", tolerance)
+    )
+    magnified = sentence(
+        "magnified {} times; {} from ring to ring, the nominal circle drawn strong; ",
+        Value(scale.times(result.radius_mm), decimals=0),
+        Value(scale.ring_um, unit="um"),
+    )
+    return Chart(drawing, caption, joined(magnified, limit, by=""))
 
 
-def _cell(low: float | None, high: float | None, *, lower: float, upper: float, zero: bool) -> str:
-    if low is not None and high is not None and low <= upper and high >= lower:
-        return "#"
-    return "-" if zero else " "
+def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record]:
+    """One flat row a period: the centre in two columns, failures by name, what each source takes by its name."""
+    sources = sorted({one.source for result in test.results for one in result.contributions or ()})
+    records = []
+    for result in test.results:
+        record = result._asdict()
+        offset = record.pop("centre_offset_mm") or (None, None)
+        record |= {"centre_offset_x_mm": offset[0], "centre_offset_y_mm": offset[1]}
+        record["failures"] = [failure.name for failure in result.failures]
+        removed = {one.source: one.removed_mm for one in record.pop("contributions") or ()}
+        if with_contributions:
+            record |= {f"removed_{source}_mm": removed.get(source) for source in sources}
+        records.append(record)
+    return records
+
+
+def circle_document(test: CircleTest, *, with_contributions: bool) -> Document:
+    """Document of `busplan circle-test --format json`."""
+    results = []
+    for result in test.results:
+        record = result._asdict()
+        record["failures"] = [failure.document() for failure in result.failures]
+        record["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
+        ranked = record.pop("contributions")
+        if with_contributions:
+            record["contributions"] = None if ranked is None else [one._asdict() for one in ranked]
+        results.append(record)
+    return document("circle-test", profile=test.profile.name, results=results)

@@ -1,32 +1,71 @@
-"""`busplan plan`: for people, and as plain data."""
+"""Answer of `busplan plan`."""
 
+from collections.abc import Iterator
+from functools import partial
 from typing import Any, Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
-from busplan.answers.documents import Document, Row, document
-from busplan.answers.verdict_sentences import period, warnings
-from busplan.buses.bus import Value
-from busplan.forms.lines import BLANK, Line, plural, table, us
+from busplan.answers.documents import document, with_profile
+from busplan.answers.plan_options import Changes, option_margins, options_table, quoted_value
+from busplan.answers.verdict import warning_sentences
+from busplan.buses.figure import AXES, NODES, UTILISATION
+from busplan.forms.blocks import (
+    Block,
+    Code,
+    Document,
+    Part,
+    Record,
+    Report,
+    Sentence,
+    Value,
+    figure_value,
+    joined,
+    sentence,
+)
+from busplan.forms.numbers import nouns, period_value
+from busplan.forms.terminal import sentence_text
 from busplan.sections.profile import Profile
 
 
-def plan_lines(plan: Plan, *, with_circle: bool) -> list[Line]:
+def plan_report(plan: Plan, *, with_circle: bool) -> Report:
+    """Answer the question of `plan`.
+
+    Parameters
+    ----------
+    plan
+        The plan.
+    with_circle
+        Whether the circle test was run.
+    """
+    return Report(
+        Sentence(("Plan of ", Code(plan.profile.name))),
+        lambda: tuple(_blocks(plan, with_circle=with_circle)),
+        partial(plan_document, plan),
+        lambda: with_profile(plan.profile.name, plan_records(plan)),
+    )
+
+
+def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
     """The recommendation, a row for each option, and what does not exist."""
-    lines = [_headline(plan, with_circle=with_circle)]
-    lines.extend(Line(warning, "warning") for warning in _warnings(plan))
-    lines.extend((BLANK, *_table(plan.options)))
-    lines.append(Line("* recommended. Margins in us; 'held by' is what keeps the value from being better."))
+    yield _headline(plan, with_circle=with_circle)
+    yield from _warnings(plan)
+    yield options_table(plan)
+    mark = "" if plan.recommended is None else "* recommended. "
+    yield Sentence((f"{mark}'Held by' is what keeps the value from being better.",))
     if not all(option.proven for option in plan.options):
-        lines.append(Line("? not proven: the search for a smaller period was cut short (--max-circles)."))
-    for one in plan.impossible:
+        yield Sentence(("? not proven: the search for a smaller period was cut short (--max-circles).",))
+    for number, one in enumerate(plan.impossible):
         proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        lines.append(Line(f"{one.title.capitalize()}: none, {one.reason}{proven}."))
-    return lines
+        reason = Value(one.reason, "reason", at=f"/impossible/{number}/reason")
+        yield sentence(f"{one.title.capitalize()}: none, {{}}{proven}.", reason)
 
 
-def settings(profile: Profile, changes: dict[str, Value]) -> str:
+# --- sentences ------------------------------------------------------------------------------------------------
+
+
+def settings(profile: Profile, changes: Changes) -> str:
     """Write changes as a profile has them.
 
     Examples
@@ -35,16 +74,19 @@ def settings(profile: Profile, changes: dict[str, Value]) -> str:
     >>> settings(load("paper-4ms").profile, {"bus.nodes": 20, "bus.speed": "S400"})
     'bus.nodes = 20, bus.speed = "S400" (if all nodes can)'
     """
+    return sentence_text(_settings(profile, changes))
+
+
+def _settings(profile: Profile, changes: Changes, *, at: str = "") -> Sentence:
     # A number of nodes is what was asked for, never what a second bus would leave.
-    meanings = bus_of(profile).change_meanings
-    meaning = {key: f" ({meanings[key]})" for key in changes if key in meanings and key != "bus.nodes"}
-    return ", ".join(f"{key} = {_value(value)}{meaning.get(key, '')}" for key, value in changes.items())
-
-
-def goal_words(profile: Profile) -> str:
-    """Say what is planned for."""
-    nodes = profile.bus.nodes
-    return f"{profile.name} with {plural(nodes, 'node')} ({plural(nodes * profile.node.axes, 'axis')})"
+    meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
+    return joined(
+        *(
+            Sentence((f"{key} = ", *quoted_value(key, value, at=at), f" ({meanings[key]})" if key in meanings else ""))
+            for key, value in changes.items()
+        ),
+        by=", ",
+    )
 
 
 _OF_MODELS: Final = (
@@ -55,24 +97,39 @@ _OF_MODELS: Final = (
 """What fits, and in which there is least to spare: of one timing model, of two and of more."""
 
 
-def _headline(plan: Plan, *, with_circle: bool) -> Line:
+def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
     option, circle = plan.recommended, " and passes the circle" if with_circle else ""
-    subject = f"{goal_words(plan.goal)} at {period(plan.goal.cycle.period_us)}"
+    subject = _goal(plan)
     models, tighter = _OF_MODELS[min(len(bus_of(plan.goal).timing_models), len(_OF_MODELS)) - 1]
     if option is None:
-        why = _why_none(plan)
-        bus = bus_of(plan.goal)
-        safe = "" if bus.safety_figure is None else f" with a safe {bus.safety}"
-        return Line(
-            f"{subject}: NO PLAN. Of {listed(changeable(plan.goal), 'and')}, no change of what is left open "
-            f"fits{models}{safe}{circle}{why}.",
-            "bad",
+        kind = bus_of(plan.goal)
+        safe = "" if kind.safety_figure is None else f" with a safe {kind.safety}"
+        none = (
+            f": NO PLAN. Of {listed(changeable(plan.goal), 'and')}, no change of what is left open "
+            f"fits{models}{safe}{circle}{_why_none(plan)}."
         )
-    spare = min(one.margin_us for one in (option.deciding, *option.others))
-    result = f"fits{models} with {us(spare)} us to spare{tighter}{circle}"
+        return Sentence((*subject, none), "fails")
+    number = plan.options.index(option)
+    margins = option_margins(option, at=f"/options/{number}")
+    least = min(margins, key=lambda one: float(one.value))
+    result = (f"fits{models} with ", least._replace(state="neutral"), f" to spare{tighter}{circle}.")
     if not option.changes:
-        return Line(f"{subject}: nothing to change; it {result}.", "good")
-    return Line(f"{subject}: set {settings(plan.goal, option.changes)}; then it {result}.", "good")
+        return Sentence((*subject, ": nothing to change; it ", *result), "passes")
+    changes = _settings(plan.goal, option.changes, at="/recommended_changes")
+    return Sentence((*subject, ": set ", *changes.parts, "; then it ", *result), "passes")
+
+
+def _goal(plan: Plan) -> tuple[Part, ...]:
+    """What is planned for."""
+    goal = plan.goal
+    nodes, axes = goal.bus.nodes, goal.bus.nodes * goal.node.axes
+    return (
+        f"{goal.name} with ",
+        *(figure_value(NODES, nodes, at="/goal/nodes"), f" {nouns(nodes, 'node')} ("),
+        *(figure_value(AXES, axes, at="/goal/axes"), f" {nouns(axes, 'axis')}) at "),
+        # The first option is the goal as it is.
+        period_value(goal.cycle.period_us, at="/options/0/period_us"),
+    )
 
 
 def _why_none(plan: Plan) -> str:
@@ -80,84 +137,27 @@ def _why_none(plan: Plan) -> str:
     return f"; as it is, {failures[0]}" if failures else ""
 
 
-def _warnings(plan: Plan) -> list[str]:
+def _warnings(plan: Plan) -> Iterator[Sentence]:
     option = plan.recommended
     profile = plan.goal if option is None else option.profile
-    found = warnings(profile, nodes=profile.bus.nodes, most=profile.bus.nodes)
+    yield from warning_sentences(profile, nodes=profile.bus.nodes, most=profile.bus.nodes)
     limit = profile.limits.max_utilisation
     if option is not None and limit is not None and option.deciding.utilisation > limit:
-        found.append(
-            f"Warning: {option.deciding.utilisation:.1%} of the slice is used, and limits.max_utilisation allows "
-            f"{limit:.1%}: `busplan check` will say so."
+        yield sentence(
+            "Warning: {} of the slice is used, and limits.max_utilisation allows {}: `busplan check` will say so.",
+            *(figure_value(UTILISATION, share)._replace(decimals=1) for share in (option.deciding.utilisation, limit)),
+            state="warns",
         )
-    return found
 
 
-_SHORT: Final = {
-    "bus.nodes": "{} nodes",
-    "cycle.slice_ratio": "ratio {}",
-    "payload.read_bytes": "read {} bytes",
-    "payload.write_bytes": "write {} bytes",
-}
+# --- plain data -----------------------------------------------------------------------------------------------
 
 
-def _short(profile: Profile, changes: dict[str, Value]) -> str:
-    words = {**_SHORT, **bus_of(profile).change_words}
-    payloads = {value for key, value in changes.items() if key.startswith("payload.")}
-    if len(changes) == 2 and len(payloads) == 1 and all(key.startswith("payload.") for key in changes):  # noqa: PLR2004
-        return f"payload {payloads.pop()} bytes"
-    parts = (
-        period(float(value)) if key == "cycle.period_us" else words.get(key, f"{key} = {{}}").format(_value(value))
-        for key, value in changes.items()
-    )
-    return ", ".join(parts) or "-"
+def _options(plan: Plan) -> list[Record]:
+    return [_record(plan, option) for option in plan.options]
 
 
-def _value(value: Value) -> str:
-    return f"{value:.12g}" if isinstance(value, float) else f'"{value}"' if isinstance(value, str) else str(value)
-
-
-def _table(options: tuple[Option, ...]) -> list[Line]:
-    first = options[0]
-    models = [one.timing_model for one in (first.deciding, *first.others)]
-    return table(
-        [
-            "",
-            "option",
-            "set",
-            "largest\nterm",
-            "held\nby",
-            "circle",
-            *(f"margin\n{model}" for model in models),
-            "most\nnodes",
-            "most\naxes",
-        ],
-        (_cells(option) for option in options),
-        left=6,
-    )
-
-
-def _cells(option: Option) -> list[str]:
-    circle = {None: "-", True: "passes", False: "FAILS"}[option.circle_passed]
-    return [
-        "*" * option.recommended + "?" * (not option.proven),
-        option.title,
-        _short(option.profile, option.changes),
-        option.deciding.binding_term,
-        option.bounded_by or "-",
-        circle,
-        *(us(one.margin_us) for one in (option.deciding, *option.others)),
-        str(option.deciding.max_nodes),
-        str(option.deciding.max_axes),
-    ]
-
-
-def plan_rows(plan: Plan) -> list[Row]:
-    """One row an option."""
-    return [_row(plan, option) for option in plan.options]
-
-
-def _row(plan: Plan, option: Option) -> Row:
+def _record(plan: Plan, option: Option) -> Record:
     one, profile = option.deciding, option.profile
     others = option.others
     return {
@@ -187,26 +187,26 @@ def _row(plan: Plan, option: Option) -> Row:
     }
 
 
-def plan_csv_rows(plan: Plan) -> list[Row]:
-    """The same, the changes and failures as words."""
+def plan_records(plan: Plan) -> list[Record]:
+    """One row an option, its changes and failures as words."""
     return [
         {
-            **row,
-            "changes": [f"{key}={value}" for key, value in row["changes"].items()],
-            "circle_failures": "; ".join(row["circle_failures"]),
+            **record,
+            "changes": [f"{key}={value}" for key, value in record["changes"].items()],
+            "circle_failures": "; ".join(record["circle_failures"]),
         }
-        for row in plan_rows(plan)
+        for record in _options(plan)
     ]
 
 
 def plan_document(plan: Plan) -> Document:
-    """Answer of `busplan plan`."""
+    """Document of `busplan plan --format json`."""
     recommended: dict[str, Any] | None = None if plan.recommended is None else plan.all_changes(plan.recommended)
     return document(
         "plan",
         profile=plan.profile.name,
         goal={"nodes": plan.goal.bus.nodes, "axes": plan.goal.bus.nodes * plan.goal.node.axes},
         recommended_changes=recommended,
-        options=plan_rows(plan),
+        options=_options(plan),
         impossible=[one._asdict() for one in plan.impossible],
     )

@@ -4,14 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.analysis.circle import roundness as analysis
-from busplan.analysis.circle.contour_profile import contour_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
-from busplan.answers import documents
-from busplan.answers.circle import PLOT_SECTORS, circle_lines
+from busplan.answers.circle import circle_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, items, load_profile
-from busplan.forms.json_and_csv import to_json
-from busplan.forms.lines import Line
+from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun
@@ -43,13 +40,8 @@ class CircleTestAnswer(Answer):
         """Whether every period holds every tolerance."""
         return self._found.passed
 
-    def to_json(self) -> str:
-        """Write the document of `busplan circle-test --format json`."""
-        return to_json(documents.circle_document(self._found, with_contributions=self.with_contributions))
-
-    def _report(self) -> list[Line]:
-        profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in self.runs]
-        return circle_lines(self._found, profiles, with_contributions=self.with_contributions)
+    def _report(self) -> Report:
+        return circle_report(self._found, with_contributions=self.with_contributions)
 
     @property
     def _found(self) -> CircleTest:

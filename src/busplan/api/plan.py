@@ -6,13 +6,12 @@ from typing import Literal
 from busplan.analysis.planning import options as analysis
 from busplan.analysis.planning.best_values import MAX_CIRCLES
 from busplan.analysis.planning.options import Impossible, Option, Plan
-from busplan.answers.plan import plan_document, plan_lines
+from busplan.answers.plan import plan_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
-from busplan.forms.json_and_csv import to_json
-from busplan.forms.lines import Line
+from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 
 
@@ -54,12 +53,8 @@ class PlanAnswer(Answer):
         option = self.recommended
         return None if option is None else self._found.all_changes(option)
 
-    def to_json(self) -> str:
-        """Write the document of `busplan plan --format json`."""
-        return to_json(plan_document(self._found))
-
-    def _report(self) -> list[Line]:
-        return plan_lines(self._found, with_circle=self.with_circle)
+    def _report(self) -> Report:
+        return plan_report(self._found, with_circle=self.with_circle)
 
     @property
     def _found(self) -> Plan:

@@ -62,7 +62,7 @@ class Figure(NamedTuple):
     sort
         What its values are.
     decimals
-        Decimals of a plain number in tables.
+        Decimals of a plain number in tables; None for as many as it has.
     better
         Which direction is better.
     scale
@@ -80,7 +80,7 @@ class Figure(NamedTuple):
     label: str = ""
     column: str = ""
     sort: Sort = "number"
-    decimals: int = 3
+    decimals: int | None = 3
     better: Better = "neither"
     scale: str | None = None
     relative: bool = True

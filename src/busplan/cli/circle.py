@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import typer
 
+from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import FormatOption, PeriodsOption, ProfileArgument, periods_us, plot_format
-from busplan.cli.output import NewFile, PlanFailsError, emit, emit_document, new_file, say
+from busplan.cli.options import FormatOption, OutputOption, PeriodsOption, ProfileArgument, periods_us, plot_format
+from busplan.cli.output import NewFile, PlanFailsError, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 
@@ -69,7 +70,8 @@ def circle_test_command(
             "file is replaced. Needs the extra plot (matplotlib).  [default: no figure]",
         ),
     ] = None,
-    format_: FormatOption = "table",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 
@@ -84,32 +86,34 @@ def circle_test_command(
         raise BusplanError("--every: goes with --trace FILE.csv")
     if every is not None and every < 1:
         raise BusplanError(f"--every {every}: must be 1 or more")
-    require_apart({"--trace": trace, "--plot": plot}, inputs=profile_files(profile))
+    require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
-    from busplan.analysis.circle.roundness import circle_test
-    from busplan.profile.shipped import load
-    from busplan.profile.toml import override
+    with answer(format_, output, inputs=profile_files(profile)) as give:
+        from busplan.analysis.circle.roundness import circle_test
+        from busplan.answers.circle import circle_report
+        from busplan.profile.shipped import load
+        from busplan.profile.toml import override
 
-    asked = {"circle.feed_mm_per_min": feed, "circle.radius_mm": radius, "delivery.seed": seed}
-    changes: dict[str, object] = {key: value for key, value in asked.items() if value is not None}
-    plan = override(load(profile).profile, changes, origin=_OPTIONS)
-    with ExitStack() as files:
-        # Opened before the simulation: a path that cannot be written is said at once.
-        trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
-        plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
-        with progress_bar("circle test") as progress:
-            test = circle_test(
-                plan,
-                periods_us=periods_us(period, plan),
-                with_contributions=contributions,
-                progress=progress,
-            )
-        if trace_file is not None:
-            _write_trace(test, trace_file, every=every or 10)
-        if plot_file is not None and file_format is not None:
-            _draw(test, plot_file, file_format=file_format)
-    _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
-    _emit(test, format_=format_, contributions=contributions)
+        asked = {"circle.feed_mm_per_min": feed, "circle.radius_mm": radius, "delivery.seed": seed}
+        changes: dict[str, object] = {key: value for key, value in asked.items() if value is not None}
+        plan = override(load(profile).profile, changes, origin=_OPTIONS)
+        with ExitStack() as files:
+            # Opened before the simulation: a path that cannot be written is said at once.
+            trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
+            plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
+            with progress_bar("circle test") as progress:
+                test = circle_test(
+                    plan,
+                    periods_us=periods_us(period, plan),
+                    with_contributions=contributions,
+                    progress=progress,
+                )
+            if trace_file is not None:
+                _write_trace(test, trace_file, every=every or 10)
+            if plot_file is not None and file_format is not None:
+                _draw(test, plot_file, file_format=file_format)
+        _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
+        give(circle_report(test, with_contributions=contributions))
     if not test.passed:
         raise PlanFailsError
 
@@ -132,27 +136,7 @@ def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
 
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
-    from busplan.answers.documents import TRACE_COLUMNS, trace_rows
-    from busplan.forms.json_and_csv import csv_blocks
+    from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
+    from busplan.forms.csv_rows import csv_blocks
 
-    file.writelines(block.encode() for block in csv_blocks(trace_rows(test, every=every), columns=TRACE_COLUMNS))
-
-
-def _emit(test: "CircleTest", *, format_: str, contributions: bool) -> None:
-    if format_ == "table":
-        from busplan.analysis.circle.contour_profile import contour_profile
-        from busplan.answers.circle import PLOT_SECTORS, circle_lines
-
-        profiles = [None if run is None else contour_profile(run, sectors=PLOT_SECTORS) for run in test.runs]
-        emit(circle_lines(test, profiles, with_contributions=contributions))
-        return
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
-
-    emit_document(
-        json_and_csv.to_json(documents.circle_document(test, with_contributions=contributions))
-        if format_ == "json"
-        else json_and_csv.to_csv(
-            documents.with_profile(test.profile.name, documents.circle_rows(test, with_contributions=contributions))
-        )
-    )
+    file.writelines(block.encode() for block in csv_blocks(trace_records(test, every=every), columns=TRACE_COLUMNS))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from busplan.cli.answering import answer
 from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
@@ -17,13 +18,15 @@ from busplan.cli.options import (
     bus_changes,
     periods_us,
 )
-from busplan.cli.output import PlanFailsError, emit, emit_document, new_file, say
+from busplan.cli.output import NewFile, PlanFailsError, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
+from busplan.forms import ENDINGS, Form
 
 if TYPE_CHECKING:
     from busplan.analysis.planning.options import Plan
     from busplan.buses.bus import Value
+    from busplan.forms.blocks import Report
     from busplan.profile.toml import LoadedProfile
     from busplan.sections.profile import Profile
 
@@ -91,13 +94,16 @@ def plan_command(
         typer.Option(
             "--output",
             "-o",
-            metavar="NEW.toml",
-            help="Write the recommended profile as a new file, without comments; - is standard output, and the report "
-            "goes to standard error.  [default: no file]",
+            metavar="FILE",
+            help=f"A name ending in {', '.join(ENDINGS)}: write the report there; an old file is replaced. Any other "
+            "name, as NEW.toml: write the recommended profile as a new file, without comments; - is standard output, "
+            "and the report goes to standard error.  [default: no file, and the report to standard output]",
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Let -o overwrite a file that is already there.")] = False,
-    format_: FormatOption = "table",
+    force: Annotated[
+        bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
+    ] = False,
+    format_: FormatOption = None,
 ) -> None:
     """Tell what to set: gap count, period, slice ratio, payload, and how many nodes would do.
 
@@ -112,55 +118,57 @@ def plan_command(
 
     Example: busplan plan paper-1ms --axes 16
     """
-    _check_options(nodes=nodes, axes=axes, apply=apply, output=output, force=force, format_=format_)
-    from busplan.analysis.planning.options import plan
-    from busplan.profile.shipped import load
+    report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
+    new = None if report_file is not None else output
+    _check_options(nodes=nodes, axes=axes, apply=apply, new=new, force=force, format_=format_)
+    piped = new == STANDARD_OUTPUT
+    require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
+    with answer(format_, report_file, inputs=profile_files(profile)) as give:
+        from busplan.analysis.planning.options import plan
+        from busplan.answers.plan import plan_report
+        from busplan.profile.shipped import load
 
-    if apply:
-        require_own_file(profile)
-    loaded = load(profile)
-    wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
-    piped = output == STANDARD_OUTPUT
-    require_apart({"--output": None if piped else output}, inputs=profile_files(profile), of_profiles=True)
-    with_circle = circle and loaded.profile.asks_for_circle
-    with ExitStack() as files:
-        # Opened before the search: a path that cannot be written is said at once.
-        new = files.enter_context(new_file(output, overwrite=force)) if output and not piped else None
-        with progress_bar("circle tests") as progress:
-            check = None
-            if with_circle:
-                from busplan.analysis.circle.check import CircleCheck
+        if apply:
+            require_own_file(profile)
+        loaded = load(profile)
+        wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
+        with_circle = circle and loaded.profile.asks_for_circle
+        with ExitStack() as files:
+            # Opened before the search: a path that cannot be written is said at once.
+            file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
+            with progress_bar("circle tests") as progress:
+                check = None
+                if with_circle:
+                    from busplan.analysis.circle.check import CircleCheck
 
-                check = CircleCheck(progress=progress, expected=max_circles)
-            result = plan(loaded.profile, wanted=wanted, circle=check, max_circles=max_circles)
+                    check = CircleCheck(progress=progress, expected=max_circles)
+                result = plan(loaded.profile, wanted=wanted, circle=check, max_circles=max_circles)
+            if new is not None:
+                _write_profile(result, file)
         if result.recommended is None:
-            _emit(result, format_=format_, with_circle=with_circle, piped=piped)
-            if apply or output:
-                say(f"{profile if apply else output}: not written, for there is no plan")
-            raise PlanFailsError
-        if output is not None:
-            from busplan.profile.write import profile_text
-
-            write = emit_document if new is None else new.write
-            write(profile_text(result.recommended.profile).encode())
-    if apply:
-        _apply(loaded, result)
-    elif new is not None:
-        say(f"wrote {output}")
-    _emit(result, format_=format_, with_circle=with_circle, piped=piped)
+            if apply or new:
+                say(f"{profile if apply else new}: not written, for there is no plan")
+        elif apply:
+            _apply(loaded, result)
+        elif file is not None:
+            say(f"wrote {new}")
+        report = plan_report(result, with_circle=with_circle)
+        (_say_report if piped else give)(report)
+    if result.recommended is None:
+        raise PlanFailsError
 
 
 def _check_options(
-    *, nodes: int | None, axes: int | None, apply: bool, output: Path | None, force: bool, format_: str
+    *, nodes: int | None, axes: int | None, apply: bool, new: Path | None, force: bool, format_: Form | None
 ) -> None:
     problems = []
     if nodes is not None and axes is not None:
         problems.append(f"--nodes {nodes} and --axes {axes}: give one of them")
-    if apply and output is not None:
-        problems.append(f"--apply and -o {output}: give one of them; -o leaves PROFILE as it is")
-    if output == STANDARD_OUTPUT and format_ != "table":
+    if apply and new is not None:
+        problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")
+    if new == STANDARD_OUTPUT and format_ not in (None, "table"):
         problems.append(f"--format {format_} and -o -: standard output takes one document; give -o a file")
-    if force and output is None:
+    if force and new is None:
         problems.append("--force: goes with -o NEW.toml")
     if problems:
         raise BusplanError(*problems)
@@ -203,21 +211,19 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     say(f"changed {loaded.document.name}: {settings(loaded.profile, changes)}")
 
 
-def _emit(result: "Plan", *, format_: str, with_circle: bool, piped: bool) -> None:
-    """Write the report; where standard output takes the profile, as a summary."""
-    from busplan.answers import plan as report
+def _write_profile(result: "Plan", file: NewFile | None) -> None:
+    """Write the recommended profile to its file or to standard output; without a plan the old file stays as it is."""
+    if result.recommended is not None:
+        from busplan.profile.write import profile_text
 
-    if piped:
-        say(*(line.text for line in report.plan_lines(result, with_circle=with_circle)))
-        return
-    if format_ == "table":
-        emit(report.plan_lines(result, with_circle=with_circle))
-        return
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
+        write = emit_document if file is None else file.write
+        write(profile_text(result.recommended.profile).encode())
+    elif file is not None:
+        file.abandon()
 
-    emit_document(
-        json_and_csv.to_json(report.plan_document(result))
-        if format_ == "json"
-        else json_and_csv.to_csv(documents.with_profile(result.profile.name, report.plan_csv_rows(result)))
-    )
+
+def _say_report(report: "Report") -> None:
+    """Write the report past standard output, which has the profile."""
+    from busplan.forms.terminal import block_lines
+
+    say(*(line.text for line in block_lines(report.blocks())))

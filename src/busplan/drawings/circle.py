@@ -6,7 +6,10 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.circle.contour_profile import ContourProfile
+from busplan.drawings.circle_characters import contour_lines
 from busplan.drawings.circle_plot import ERROR_SHARE, nice_step
+from busplan.forms.blocks import Drawing
+from busplan.forms.lines import Line
 from busplan.forms.svg import drawing, markup, text_at
 
 _WIDTH: Final = 470
@@ -56,28 +59,44 @@ def magnified(profile: ContourProfile, *, tolerance_mm: float | None) -> Magnifi
     return Magnified(edge_mm, nice_step(edge_mm * 1e3), drawn)
 
 
-def circle_chart(profile: ContourProfile, scale: Magnified) -> str:
-    """Draw nominal circle, rings, tolerance and the path with its error magnified.
+class CircleDrawing(Drawing):
+    """Nominal circle, rings, tolerance and the path with its error magnified; in characters, the error over the angle.
 
     Parameters
     ----------
     profile
         Contour error around the circle.
-    scale
-        How it is drawn.
+    tolerance_mm
+        Largest contour error that is allowed, where there is a limit [mm].
     """
-    root = drawing("Circle with its contour error magnified", css="chart circle")
-    root.set("viewBox", f"{-_WIDTH // 2} {-_HEIGHT // 2} {_WIDTH} {_HEIGHT}")
-    _cross(root)
-    rings = ceil(scale.largest_mm * 1e3 / scale.ring_um)
-    for ring in range(-rings, rings + 1):
-        _ring(root, scale.radius(ring * scale.ring_um / 1e3), css="nominal" if ring == 0 else "ring")
-    for error_mm in () if scale.tolerance_mm is None else (-scale.tolerance_mm, scale.tolerance_mm):
-        _ring(root, scale.radius(error_mm), css="tolerance")
-    SubElement(root, "path", {"class": "path", "d": "".join(_outlines(profile, scale))})
-    text_at(root, f"{scale.ring_um:g} um", x="0", y=-6, css="centre", anchor="middle")
-    text_at(root, "a ring", x="0", y=16, css="centre", anchor="middle")
-    return markup(root)
+
+    shape = "round"
+
+    def __init__(self, profile: ContourProfile, *, tolerance_mm: float | None) -> None:
+        self._profile = profile
+        self.scale = magnified(profile, tolerance_mm=tolerance_mm)
+
+    def svg(self) -> str | None:
+        """Draw the magnified circle; None where there is no error to show."""
+        scale = self.scale
+        if scale is None:
+            return None
+        root = drawing("Circle with its contour error magnified", css="chart circle")
+        root.set("viewBox", f"{-_WIDTH // 2} {-_HEIGHT // 2} {_WIDTH} {_HEIGHT}")
+        _cross(root)
+        rings = ceil(scale.largest_mm * 1e3 / scale.ring_um)
+        for ring in range(-rings, rings + 1):
+            _ring(root, scale.radius(ring * scale.ring_um / 1e3), css="nominal" if ring == 0 else "ring")
+        for error_mm in () if scale.tolerance_mm is None else (-scale.tolerance_mm, scale.tolerance_mm):
+            _ring(root, scale.radius(error_mm), css="tolerance")
+        SubElement(root, "path", {"class": "path", "d": "".join(_outlines(self._profile, scale))})
+        text_at(root, f"{scale.ring_um:g} um", x="0", y=-6, css="centre", anchor="middle")
+        text_at(root, "a ring", x="0", y=16, css="centre", anchor="middle")
+        return markup(root)
+
+    def characters(self, width: int) -> list[Line] | None:
+        """Draw the error over the angle; None where there is none to show."""
+        return None if self.scale is None else contour_lines(self._profile, width=width)
 
 
 def _cross(root: Element) -> None:

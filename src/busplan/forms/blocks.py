@@ -38,6 +38,10 @@ class Value(NamedTuple):
     state: State = "neutral"
     command: str = ""
     """Id of the `Command` whose document that is, where the answer holds several."""
+    digits: int | None = None
+    """Significant digits of a number without `decimals`; None for as many as it has."""
+    fixed: bool = False
+    """Whether what is too small for `decimals` is rounding, and written as zero."""
     grouped: bool = False
     """Whether commas part its thousands."""
 
@@ -93,7 +97,6 @@ class Command(NamedTuple):
 
 Part = str | Value | Code
 """A piece of a sentence."""
-Cell = str | Value | Words | Code | Link | Swatch | Bar | Command
 
 
 class Sentence(NamedTuple):
@@ -101,6 +104,9 @@ class Sentence(NamedTuple):
 
     parts: tuple[Part, ...]
     state: State = "neutral"
+
+
+Cell = str | Value | Words | Code | Link | Swatch | Bar | Command | Sentence
 
 
 class Column(NamedTuple):
@@ -164,6 +170,8 @@ class Chart(NamedTuple):
 
     drawing: Drawing
     caption: Sentence
+    legend: Sentence | None = None
+    """How its SVG is read, behind the caption; where it is drawn in characters, they say it themselves."""
 
 
 class Snippet(NamedTuple):

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from busplan.forms.blocks import Bar, Cell, Column, Row, Swatch, Table, Value, Words
+from busplan.forms.blocks import Bar, Cell, Column, Row, Sentence, Swatch, Table, Value, Words
 from busplan.forms.lines import Line, Mark, Tone
-from busplan.forms.numbers import written
+from busplan.forms.numbers import with_unit, written
 from busplan.printable import printable
 
 
@@ -20,6 +20,8 @@ def cell_text(cell: Cell) -> str:
             return f"{cell.letter} {cell.text}"
         case Bar():
             return ""
+        case Sentence():
+            return "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in cell.parts)
         case _:
             return cell[0]
 
@@ -83,4 +85,4 @@ def _marks(
 
 
 def _tone(cell: Cell) -> Tone:
-    return cell.state if isinstance(cell, Value | Words) else "neutral"
+    return cell.state if isinstance(cell, Value | Words | Sentence) else "neutral"

@@ -137,8 +137,8 @@ def _in_row(words: str, *, sought: bool) -> str:
 
 def _cell(cell: Cell) -> str:
     match cell:
-        case Value() | Words():
-            words = escaped(cell_text(cell))
+        case Value() | Words() | Sentence():
+            words = _sentence(cell) if isinstance(cell, Sentence) else escaped(cell_text(cell))
             return f"**{words}**" if cell.state == "fails" and words else words
         case Link():
             origin = "" if cell.origin == cell.text else f" {code(cell.origin)}"

@@ -45,7 +45,7 @@ def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
 
 def sentence_text(sentence: Sentence) -> str:
     """Write a sentence in plain characters."""
-    return "".join(map(_part, sentence.parts))
+    return cell_text(sentence)
 
 
 def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line]:

@@ -1,11 +1,15 @@
 """Contour error around the circle, condensed for drawing."""
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from busplan.servo.circle import CircleRun
 from busplan.servo.contour import blocks, contour_error
+
+CONTOUR_SECTORS: Final = 720
+"""Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""
 
 
 class ContourProfile(NamedTuple):
@@ -14,8 +18,25 @@ class ContourProfile(NamedTuple):
     low_mm: tuple[float | None, ...]
     high_mm: tuple[float | None, ...]
 
+    def condensed(self, *, sectors: int) -> "ContourProfile":
+        """The same in fewer sectors.
 
-def contour_profile(run: CircleRun, *, sectors: int) -> ContourProfile:
+        Parameters
+        ----------
+        sectors
+            Number of equal sectors, which divides that of this profile [1].
+        """
+        width = len(self.low_mm) // sectors
+
+        def each(ends: tuple[float | None, ...], choose: Callable[[list[float]], float]) -> Iterator[float | None]:
+            for start in range(0, len(ends), width):
+                there = [end for end in ends[start : start + width] if end is not None]
+                yield choose(there) if there else None
+
+        return ContourProfile(tuple(each(self.low_mm, min)), tuple(each(self.high_mm, max)))
+
+
+def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> ContourProfile:
     """Condense the part at constant speed of a circle test.
 
     Parameters
@@ -42,3 +63,14 @@ def contour_profile(run: CircleRun, *, sectors: int) -> ContourProfile:
         tuple(float(value) if np.isfinite(value) else None for value in low),
         tuple(float(value) if np.isfinite(value) else None for value in high),
     )
+
+
+def drawn_profile(run: CircleRun | None) -> ContourProfile | None:
+    """Condense a circle test for its drawing; None where the table did not follow the circle, or was not simulated.
+
+    Parameters
+    ----------
+    run
+        The simulation.
+    """
+    return None if run is None or run.diverged else contour_profile(run)

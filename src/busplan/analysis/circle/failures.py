@@ -1,6 +1,8 @@
 """What a circle test does not hold: the bus, stability, the turn, margins and tolerances, each in words."""
 
+from collections.abc import Iterator
 from math import inf
+from string import Formatter
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import TIME
@@ -13,18 +15,78 @@ CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "cir
 """Measures of roundness that have a tolerance, in the order in which they are looked at."""
 LEAST_ARC_DEG: Final = 270.0
 """Arc that the circular deviation G needs: the least-squares centre of a shorter one follows its errors."""
-_FAILURES: Final[dict[str, str]] = {
-    "required_us": "the cycle does not fit the bus: {value:.3f} us needed of {limit:.3f} us",
-    "stability": "the position loop is unstable",
-    "circle_not_followed": "the table did not follow the circle (not the whole turn, or an error above the radius): "
-    "it went {value:.0f} deg of {limit:.0f} deg round the centre",
-    "min_phase_margin_deg": "the phase margin of {value:.2f} deg is {under:.2f} deg under its {limit:g} deg",
-    "min_gain_margin_db": "the gain margin of {value:.2f} dB is {under:.2f} dB under its {limit:g} dB",
-    "mean_contour_error_mm": "the mean contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
-    "max_contour_error_mm": "the largest contour error of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
-    "constant_speed_deg": "the circular deviation G cannot be told: its least-squares centre needs {limit:.0f} deg of "
-    "the circle at constant speed, not {value:.0f} deg; shorten circle.ramp_periods or lower circle.feed_mm_per_min",
-    "circular_deviation_mm": "the circular deviation G of {um:.3f} um is {over_um:.3f} um over its {limit_um:g} um",
+
+
+class Stated(NamedTuple):
+    """A number in the words of a failure."""
+
+    value: float
+    """In the unit of its key."""
+    key: str
+    """The figure of the circle test, or the tolerance."""
+    unit: str
+    """Unit that it is written in."""
+    decimals: int | None
+    """None for as many as it has."""
+
+    def __str__(self) -> str:
+        number = self.value * 1e3 if self.unit == "um" else self.value
+        return f"{number:g} {self.unit}" if self.decimals is None else f"{number:.{self.decimals}f} {self.unit}"
+
+
+class _Saying(NamedTuple):
+    """How a failure is put into words, with {value}, {limit}, and {beyond} for their distance."""
+
+    words: str
+    key: str = ""
+    """The figure that fails."""
+    unit: str = ""
+    decimals: int = 3
+    limit_key: str = ""
+    """Key of the limit where it is no tolerance's own."""
+    limit_decimals: int | None = None
+
+
+_FAILURES: Final[dict[str, _Saying]] = {
+    "required_us": _Saying(
+        "the cycle does not fit the bus: {value} needed of {limit}",
+        "required_us",
+        "us",
+        limit_key="available_us",
+        limit_decimals=3,
+    ),
+    "stability": _Saying("the position loop is unstable"),
+    "circle_not_followed": _Saying(
+        "the table did not follow the circle (not the whole turn, or an error above the radius): "
+        "it went {value} of {limit} round the centre",
+        "covered_deg",
+        "deg",
+        0,
+        limit_decimals=0,
+    ),
+    "min_phase_margin_deg": _Saying(
+        "the phase margin of {value} is {beyond} under its {limit}", "phase_margin_deg", "deg", 2
+    ),
+    "min_gain_margin_db": _Saying(
+        "the gain margin of {value} is {beyond} under its {limit}", "gain_margin_db", "dB", 2
+    ),
+    "mean_contour_error_mm": _Saying(
+        "the mean contour error of {value} is {beyond} over its {limit}", "mean_contour_error_mm", "um"
+    ),
+    "max_contour_error_mm": _Saying(
+        "the largest contour error of {value} is {beyond} over its {limit}", "max_contour_error_mm", "um"
+    ),
+    "constant_speed_deg": _Saying(
+        "the circular deviation G cannot be told: its least-squares centre needs {limit} of the circle at constant "
+        "speed, not {value}; shorten circle.ramp_periods or lower circle.feed_mm_per_min",
+        "constant_speed_deg",
+        "deg",
+        0,
+        limit_decimals=0,
+    ),
+    "circular_deviation_mm": _Saying(
+        "the circular deviation G of {value} is {beyond} over its {limit}", "circular_deviation_mm", "um"
+    ),
 }
 
 
@@ -44,17 +106,24 @@ class Failure(NamedTuple):
     @property
     def text(self) -> str:
         """What does not hold, and by how much."""
+        return "".join(map(str, self.parts()))
+
+    def parts(self) -> Iterator[str | Stated]:
+        """What does not hold, and by how much: words, and the numbers between them."""
         if self.said:
-            return self.said
-        value, limit = self.value or 0.0, self.limit or 0.0
-        return _FAILURES[self.name].format(
-            value=value,
-            limit=limit,
-            under=limit - value,
-            um=value * 1e3,
-            limit_um=limit * 1e3,
-            over_um=(value - limit) * 1e3,
-        )
+            yield self.said
+            return
+        saying, value, limit = _FAILURES[self.name], self.value or 0.0, self.limit or 0.0
+        limit_key = saying.limit_key or self.name
+        numbers = {
+            "value": Stated(value, saying.key, saying.unit, saying.decimals),
+            "limit": Stated(limit, limit_key, saying.unit, saying.limit_decimals),
+            "beyond": Stated(abs(value - limit), limit_key, saying.unit, saying.decimals),
+        }
+        for words, field, _, _ in Formatter().parse(saying.words):
+            yield words
+            if field is not None:
+                yield numbers[field]
 
 
 def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float | None]:

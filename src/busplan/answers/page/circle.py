@@ -6,13 +6,8 @@ from typing import Final
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures
-from busplan.answers.circle import (
-    circle_chart,
-    circle_sentences,
-    circle_table,
-    contributions_table,
-    servo_sentence,
-)
+from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_chart, circle_table, contributions_table
+from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence
 from busplan.answers.page.commands import Source
 from busplan.buses.figure import by_key
 from busplan.forms.blocks import Block, Facts, Question, Section, Sentence, Words, figure_value
@@ -68,7 +63,7 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
         yield from (Sentence((why,)) for why in _why_not(answer))
         return
     chart = None if answer.contour is None else circle_chart(answer.contour, result, answer.profile)
-    yield _not_drawn(answer, result) if chart is None else chart
+    yield sources["circle"].gives(_not_drawn(answer, result) if chart is None else chart)
     yield sources["circle"].gives(circle_table((result,)))
     yield sources["circle"].line
 
@@ -76,8 +71,7 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 def _not_drawn(answer: AllAnswers, result: CircleFigures) -> Sentence:
     if answer.contour is not None:
         return Sentence(("Not drawn: there is no contour error to show.",))
-    reason = ", and ".join(failure.text for failure in result.failures)
-    return Sentence((f"Not drawn: {reason}.",))
+    return Sentence(("Not drawn: ", *failure_words(result, at="/results/0").parts, "."))
 
 
 def sources_part(answer: AllAnswers, sources: Sources) -> Section | None:
@@ -87,7 +81,6 @@ def sources_part(answer: AllAnswers, sources: Sources) -> Section | None:
         return None
     title, source = Sentence(("What to attack",)), sources["circle"]
     if not result.contributions:
-        return Section(title, (Sentence(("The profile has no error source that could be removed.",)),), "sources")
-    line = "Sources act together: what they take one by one need not add up. A negative one hides another."
+        return Section(title, (NO_SOURCES,), "sources")
     table = contributions_table(result, at="/results/0")
-    return Section(title, (Sentence((line,)), source.gives(table), source.line), "sources")
+    return Section(title, (ACT_TOGETHER, source.gives(table), source.line), "sources")

@@ -1,0 +1,105 @@
+"""What a circle test says of the circle, in sentences that a person can act on."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from busplan.analysis.circle.failures import Stated
+from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
+from busplan.buses.figure import by_key
+from busplan.forms.blocks import Part, Sentence, Value, figure_value, joined, sentence
+from busplan.forms.numbers import period_value
+
+_FIGURES: Final = by_key(CIRCLE_FIGURES)
+
+
+def circle_sentences(
+    name: str, result: CircleFigures, *, at: str, with_contributions: bool = True
+) -> Iterator[Sentence]:
+    """Say whether the circle holds, what it does not hold, and what to attack first.
+
+    Parameters
+    ----------
+    name
+        Name of the profile.
+    result
+        The circle test at one period.
+    at
+        Place of its figures in the JSON document.
+    with_contributions
+        Whether the document ranks the error sources, too.
+    """
+    period, feed = setup_values(result, at=at)
+    subject = (f"{name} at ", period, " and ", feed)
+    if result.passed:
+        yield Sentence((*subject, ": the circle holds every tolerance."), "passes")
+        return
+    yield Sentence((*subject, ": FAILED, ", *failure_words(result, at=at).parts, "."), "fails")
+    measure, attack = failed_measure(result), to_attack(result)
+    if measure is None:
+        return
+    label = _FIGURES[measure].label
+    if attack is not None:
+        source, removed_mm = attack
+        place = (result.contributions or ()).index(source)
+        left = f"{at}/contributions/{place}/{measure}" if with_contributions else ""
+        yield sentence(
+            f"Attack {source_words(source.source)} first: without it the {label} is {{}}, {{}} less.",
+            figure_value(_FIGURES[measure], getattr(source, measure), at=left),
+            Value(removed_mm, "removed_mm", "um", 3),
+        )
+    elif result.contributions is not None:
+        yield Sentence((f"No single error source of the profile explains the {label}.",))
+
+
+def setup_values(result: CircleFigures, *, at: str) -> tuple[Value, Value]:
+    """The period and the feed of a test.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period.
+    at
+        Place of its figures in the JSON document.
+    """
+    feed = figure_value(_FIGURES["feed_mm_per_min"], result.feed_mm_per_min, at=f"{at}/feed_mm_per_min")
+    return period_value(result.period_us, at=f"{at}/period_us"), feed
+
+
+def failure_words(result: CircleFigures, *, at: str) -> Sentence:
+    """What the circle does not hold, without a full stop.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period, which fails.
+    at
+        Place of its figures in the JSON document.
+    """
+    each = (Sentence(tuple(_part(part, result, at=at) for part in one.parts())) for one in result.failures)
+    return joined(*each, by=", and ")
+
+
+def _part(part: str | Stated, result: CircleFigures, *, at: str) -> Part:
+    if isinstance(part, str):
+        return part
+    known = getattr(result, part.key, None) == part.value
+    return Value(part.value, part.key, part.unit, part.decimals, at=f"{at}/{part.key}" if known else "")
+
+
+def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
+    """Say how the servo values are known, wherever a figure is shown that rests on them; nothing without a simulation.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period.
+    """
+    if result.stable is not None:
+        text = f"The servo values behind these figures are {result.servo_grade}."
+        yield sentence(text, state="warns" if result.servo_grade == "assumed" else "neutral")
+
+
+def source_words(source: str) -> str:
+    """Name of an error source, as people write it."""
+    return source.replace("_", " ")

@@ -1,0 +1,118 @@
+"""The options of a plan, side by side in one table."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from busplan.analysis.network import bus_of
+from busplan.analysis.planning.options import Option, Plan
+from busplan.buses import bus
+from busplan.buses.figure import BINDING_TERM, MARGIN, MAX_AXES, MAX_NODES
+from busplan.forms.blocks import Cell, Column, Part, Row, Sentence, Table, Value, Words, figure_value, joined, sentence
+from busplan.forms.numbers import MISSING, period_value
+from busplan.sections.profile import Profile
+
+Changes = Mapping[str, bus.Value]
+"""New values of a profile by dotted key."""
+
+
+def options_table(plan: Plan) -> Table:
+    """What each option sets and what it brings; the recommended one has a mark."""
+    first = plan.options[0]
+    columns = (
+        Column("option", kind="words"),
+        Column("", kind="words"),
+        *(Column(heading, kind="words") for heading in ("set", "largest term", "held by", "circle")),
+        *(Column(one.timing_model, "us", group="margin") for one in (first.deciding, *first.others)),
+        *(Column(heading, group="most") for heading in ("nodes", "axes")),
+    )
+    return Table(columns, tuple(_row(option, at=f"/options/{number}") for number, option in enumerate(plan.options)))
+
+
+def _row(option: Option, *, at: str) -> Row:
+    passed = option.circle_passed
+    circle = MISSING if passed is None else Words("passes", "passes") if passed else Words("FAILS", "fails")
+    cells: tuple[Cell, ...] = (
+        option.title,
+        "*" * option.recommended + "?" * (not option.proven),
+        _short(option.profile, option.changes, at=f"{at}/changes"),
+        figure_value(BINDING_TERM, option.deciding.binding_term, at=f"{at}/{BINDING_TERM.key}"),
+        Value(option.bounded_by, "bounded_by", at=f"{at}/bounded_by"),
+        circle,
+        *option_margins(option, at=at),
+        *(figure_value(one, getattr(option.deciding, one.key), at=f"{at}/{one.key}") for one in (MAX_NODES, MAX_AXES)),
+    )
+    return Row(cells, sought=option.recommended)
+
+
+def option_margins(option: Option, *, at: str) -> list[Value]:
+    """What is left under the timing model that decides, and under each other one.
+
+    Parameters
+    ----------
+    option
+        The option.
+    at
+        Its place in the JSON document, which has the least of the others.
+    """
+    least_us = min((one.margin_us for one in option.others), default=None)
+    found = []
+    for one in (option.deciding, *option.others):
+        key = MARGIN.key if one is option.deciding else "margin_other_model_us"
+        known = one is option.deciding or one.margin_us == least_us
+        value = figure_value(MARGIN, one.margin_us, state="neutral" if one.fits else "fails")
+        found.append(value._replace(key=key, at=f"{at}/{key}" if known else ""))
+    return found
+
+
+_SHORT: Final = {
+    "bus.nodes": "{} nodes",
+    "cycle.period_us": "{}",
+    "cycle.slice_ratio": "ratio {}",
+    "payload.read_bytes": "read {} bytes",
+    "payload.write_bytes": "write {} bytes",
+}
+
+
+def _short(profile: Profile, changes: Changes, *, at: str) -> Cell:
+    """What an option sets, in a few words."""
+    if not changes:
+        return MISSING
+    payloads = {value for key, value in changes.items() if key.startswith("payload.")}
+    if len(changes) == 2 and len(payloads) == 1 and all(key.startswith("payload.") for key in changes):  # noqa: PLR2004
+        key, value = next(iter(changes.items()))
+        return sentence("payload {} bytes", _set_value(key, value, at=at))
+    words = {**_SHORT, **bus_of(profile).change_words}
+    return joined(
+        *(
+            sentence(words[key], _short_value(key, value, at=at))
+            if key in words
+            else Sentence((f"{key} = ", *quoted_value(key, value, at=at)))
+            for key, value in changes.items()
+        ),
+        by=", ",
+    )
+
+
+def _short_value(key: str, value: bus.Value, *, at: str) -> Value:
+    found = _set_value(key, value, at=at)
+    return found._replace(unit=period_value(float(value)).unit) if key == "cycle.period_us" else found
+
+
+def quoted_value(key: str, value: bus.Value, *, at: str) -> tuple[Part, ...]:
+    """A value as TOML has it, a text between quotes.
+
+    Parameters
+    ----------
+    key
+        Its dotted key.
+    value
+        The value.
+    at
+        Place of the changes in the JSON document; empty where they have none.
+    """
+    found = _set_value(key, value, at=at)
+    return ('"', found, '"') if isinstance(value, str) else (found,)
+
+
+def _set_value(key: str, value: bus.Value, *, at: str) -> Value:
+    return Value(value, key, at=f"{at}/{key}" if at else "")
