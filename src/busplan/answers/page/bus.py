@@ -107,7 +107,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     if limit is not None and limit.is_broken(network):
         yield Sentence((f"Not drawn: {limit.words(network)}.",))
     else:
-        yield timeline_chart(answer.schedule)
+        yield source.gives(timeline_chart(answer.schedule))
     yield source.gives(totals_table(answer.schedule))
     yield source.line
 
