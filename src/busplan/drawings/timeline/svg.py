@@ -5,7 +5,7 @@ from textwrap import wrap
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.timeline.schedule import SHARE, TOTAL, Event, Schedule, totals
+from busplan.analysis.timeline.schedule import SHARE, Event, Schedule, totals
 from busplan.drawings.timeline.kinds import event_title, kind_of
 from busplan.drawings.timeline.lanes import (
     Stretch,
@@ -214,6 +214,6 @@ def _legend(body: Element, plan: Schedule, *, y: int) -> int:
         kind = kind_of(plan.profile, one.kind)
         SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
         text_at(body, kind.label, x="20", y=y + 15)
-        text_at(body, written(figure_value(TOTAL, one.total_us)), x="240", y=y + 15, anchor="end")
+        text_at(body, time_text(one.total_us), x="240", y=y + 15, anchor="end")
         text_at(body, written(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
     return y + LINE
