@@ -243,13 +243,13 @@ def test_every_question_is_answered_in_every_form(run: Run, ring: Path, command:
         assert len(list(csv.DictReader(StringIO(done.stdout)))) >= 1
 
 
-@pytest.mark.parametrize("form", ["text", "json", "markdown"])
+@pytest.mark.parametrize("form", ["table", "markdown", "html", "csv", "json"])
 @pytest.mark.parametrize("figure", ["required_us", "rounds", "max_nodes", "text", "latency.cycle_token_us", None])
 def test_every_figure_is_explained(run: Run, ring: Path, figure: str | None, form: str) -> None:
     asked = () if figure is None else (figure,)
     done = run("explain", ring.name, *asked, "--format", form, cwd=ring.parent)
     assert done.returncode == 0, done
-    if figure == "required_us" and form == "text":
+    if figure == "required_us" and form == "table":
         assert "n_r = ceil(N / 3)" in done.stdout
         assert "token = n_r (token_us + guard_us + late_us)" in done.stdout
         assert "T_need = data + token + T_npd" in done.stdout
