@@ -21,7 +21,8 @@ from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.derivation.verdict import VERDICT_KEYS
 from busplan.analysis.latency import latency
 from busplan.analysis.register import figures_of
-from busplan.answers.documents import capacity_document, capacity_rows, latency_rows
+from busplan.answers.capacity import capacity_document, capacity_records
+from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
@@ -70,7 +71,7 @@ def test_every_figure_of_latency_is_derived_as_it_is_computed(
 ) -> None:
     profile = data.draw(any_profile)
     derived = latency_figures(profile, model=model, kind=kind)
-    rows = latency_rows(latency(profile, timing_models=[model]))
+    rows = latency_records(latency(profile, timing_models=[model]))
     row = next(row for row in rows if row["transaction"] == kind)
     for key, value in row.items():
         assert value_of(derived[key]) == value, key
@@ -100,11 +101,11 @@ def test_every_input_has_a_grade_a_source_and_a_meaning(name: str) -> None:
 
 
 def test_the_registry_holds_every_key_of_the_results() -> None:
-    (row,) = capacity_rows(capacity(load("paper-4ms").profile, timing_models=["paper"]))
+    (row,) = capacity_records(capacity(load("paper-4ms").profile, timing_models=["paper"]))
     assert tuple(row) == CAPACITY_KEYS
     assert set(FIGURES["capacity"]) == {*CAPACITY_KEYS, "models_agree", "cheapest_change", "warnings", "text"}
     assert set(FIGURES["circle-test"]) == set(CircleFigures._fields)
-    assert list(FIGURES["latency"]) == list(latency_rows(latency(load("paper-4ms").profile))[0])
+    assert list(FIGURES["latency"]) == list(latency_records(latency(load("paper-4ms").profile))[0])
 
 
 CIRCLES = {

@@ -1,7 +1,19 @@
 """What `busplan calibrate` says."""
 
+from collections.abc import Callable
+
+import pytest
+
 from busplan.analysis.calibration.calibrate import Calibration, calibrate
-from busplan.answers.calibration import calibration_lines, calibration_warnings, execution_changes, provenance
+from busplan.answers.calibration import (
+    calibration_document,
+    calibration_report,
+    calibration_warnings,
+    execution_changes,
+    provenance,
+)
+from busplan.forms import render
+from busplan.forms.blocks import Report, Sentence, Snippet
 from busplan.profile.measurements import Measurement, parse_measurements
 from busplan.profile.shipped import load, locate_measurements
 
@@ -18,15 +30,25 @@ def rows(*values: tuple[int, float], kind: str = "write") -> list[Measurement]:
     ]
 
 
+def report(result: Calibration) -> Report:
+    return calibration_report(result, source="m.csv", applied_to=None)
+
+
 def said(result: Calibration) -> str:
-    return "\n".join(line.text for line in calibration_lines(result, source="m.csv"))
+    return render(report(result), "table")
+
+
+def example() -> list[Measurement]:
+    return list(parse_measurements(locate_measurements("table-1.csv").path.read_bytes(), name="table-1.csv"))
 
 
 def test_table_1_shows_what_the_model_leaves_unexplained() -> None:
-    example = parse_measurements(locate_measurements("table-1.csv").path.read_bytes(), name="table-1.csv")
-    text = said(run(list(example)))
+    text = said(run(example()))
     assert "Left unexplained by the paper timing model: 3.131 us of T1+T2 on average, 3.463 us at most (13% of" in text
-    assert text.count("un-\n") == 1
+    (groups,) = (line.split() for line in text.splitlines() if line.startswith(" ") and "T1+T2" in line)
+    assert groups == ["T1+T2"] * 3
+    (headings,) = (line.split() for line in text.splitlines() if line.startswith("payload "))
+    assert headings[-3:] == ["measured", "model", "unexplained"]
 
 
 def test_only_repetitions_have_a_spread_and_only_reads_beside_writes_a_difference() -> None:
@@ -72,3 +94,34 @@ def test_no_figure_of_the_table_is_rounding_dust() -> None:
     text = said(run(rows((4, 50.0), (4, 50.0004), (4, 51.0))))
     assert "e-" not in text
     assert "-0.000" not in text
+
+
+@pytest.mark.parametrize("form", ["table", "linear"])
+def test_every_figure_stands_at_its_place(form: str, values_in_their_places: Callable[[Report], int]) -> None:
+    assert values_in_their_places(report(run(example(), form=form))) > 8 * 8
+    repeated = run([*rows((4, 50.0), (4, 52.0), (64, 80.0)), Measurement(9, "read", 4, 54.0, None)], form=form)
+    assert values_in_their_places(report(repeated)) > 2 * 6
+
+
+def test_warnings_are_said_and_stand_in_the_document(values_in_their_places: Callable[[Report], int]) -> None:
+    many = rows(*((4, 50.0 if index % 4 else 90.0 + index) for index in range(60)))
+    result = run(many)
+    warned = [block for block in report(result).blocks() if isinstance(block, Sentence) and block.state == "warns"]
+    assert len(warned) == 1
+    # Ten lines are named.
+    assert len([part for part in warned[0].parts if getattr(part, "key", "") == "line"]) == 10
+    assert values_in_their_places(report(result)) > 10
+    (warning,) = calibration_document(result, source="m.csv", applied_to=None)["warnings"]
+    assert f"Warning: {warning}\n" in said(result)
+
+
+def test_the_section_of_the_profile_is_toml_to_copy() -> None:
+    (section,) = (block for block in report(run(example())).blocks() if isinstance(block, Snippet))
+    assert section.language == "toml"
+    assert section.lines == (
+        "[node.execution]",
+        'grade = "measured"',
+        'kind = "table"',
+        "payload_bytes = [4, 16, 32, 64, 128, 256, 512, 1024]",
+        "time_us = [36.7, 36.3, 44.7, 53.1, 81.7, 135.5, 212.2, 405.2]",
+    )

@@ -1,10 +1,10 @@
 """What `busplan diff` says: the verdict first, differences that are seen, Markdown that is nothing but its text."""
 
+from collections.abc import Callable
 from html.parser import HTMLParser
 from typing import Any
 
 import pytest
-from busplan.forms.json_and_csv import to_json
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
@@ -13,10 +13,13 @@ from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.comparison.difference import Difference, cycle_figures, difference, plan_figures
 from busplan.analysis.network import bus_of
 from busplan.answers.changes import shown_value
-from busplan.answers.diff import diff_document, diff_lines, diff_markdown, regression_words
+from busplan.answers.diff import diff_document, diff_records, diff_report, regression_words
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.errors import BusplanError
-from busplan.forms.lines import plain_text
+from busplan.forms import render
+from busplan.forms.blocks import Report, Row, Table
+from busplan.forms.json_document import to_json
+from busplan.forms.terminal import block_lines
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -37,7 +40,17 @@ def run_circle(profile: Profile) -> CircleFigures:
 
 
 def text(found: Difference) -> list[str]:
-    return [line.text for line in diff_lines(found, arguments=AB)]
+    return render(diff_report(found, arguments=AB), "table").splitlines()
+
+
+def comment(found: Difference, *, arguments: tuple[str, str] = AB) -> str:
+    return render(diff_report(found, arguments=arguments), "markdown")
+
+
+def figures(found: Difference) -> list[Row]:
+    """Rows of the table of figures; none where there is no such table."""
+    tables = (block for block in diff_report(found, arguments=AB).blocks() if isinstance(block, Table))
+    return [row for table in tables if table.columns[0].heading == "figure" for row in table.rows]
 
 
 def verdict(a: Profile, changes: dict[str, object], **options: Any) -> str:
@@ -132,32 +145,56 @@ def test_the_verdict_of_circles(paper: Profile) -> None:
     )
 
 
-def test_the_tone_is_that_of_the_verdict(paper: Profile) -> None:
+def test_the_state_is_that_of_the_verdict(paper: Profile) -> None:
     def tone(changes: Any) -> str:
-        return diff_lines(difference(paper, override(paper, changes)), arguments=AB)[0].tone
+        found = difference(paper, override(paper, changes))
+        return next(block_lines(diff_report(found, arguments=AB).blocks())).tone
 
     assert [tone(one) for one in ({"cycle.period_us": 200}, {"bus.gap_count": 7}, {"name": "x"}, {})] == [
-        "bad",
-        "good",
-        "plain",
-        "plain",
+        "fails",
+        "passes",
+        "neutral",
+        "neutral",
     ]
 
 
-def test_every_figure_has_a_row_and_the_same_profile_has_none(paper: Profile) -> None:
-    lines = text(difference(paper, override(paper, {"bus.gap_count": 7})))
+def test_every_figure_that_differs_has_a_row_and_every_figure_a_record(paper: Profile) -> None:
+    found = difference(paper, override(paper, {"bus.gap_count": 7}))
     bus = bus_of(paper)
-    rows = len(plan_figures(bus)) + 2 * len(cycle_figures(bus))
-    assert sum(line.endswith((" better", " worse", " same", " neutral")) for line in lines) == rows
+    records = diff_records(found)
+    assert len(records) == len(plan_figures(bus)) + 2 * len(cycle_figures(bus))
+    differ = [one for one in records if one["judgement"] != "same"]
+    assert 0 < len(differ) < len(records)
+    lines = text(found)
+    assert sum(line.endswith((" better", " worse", " neutral")) for line in lines) == len(differ)
+    assert not [line for line in lines if line.endswith(" same")]
+    assert lines[-1] == "18 figures are the same: JSON and CSV list all figures."
     (margin,) = (line.split() for line in lines if line.startswith("margin ") and " paper " in line)
-    assert margin == ["margin", "paper", "us", "294.083", "325.984", "+31.901", "+10.8%", "better"]
-    assert len(text(difference(paper, paper))) == 3
+    assert margin == ["margin", "paper", "us", "294.083", "325.984", "+31.901", "+10.8", "better"]
+    assert figures(difference(paper, paper)) == []
+
+
+def test_what_is_worse_fails(paper: Profile) -> None:
+    def judged(changes: Any) -> set[Any]:
+        return {row.cells[-1][:2] for row in figures(difference(paper, override(paper, changes)))}
+
+    assert judged({"cycle.period_us": 500}) == {("worse", "fails"), ("neutral", "neutral")}
+    assert judged({"bus.gap_count": 7}) == {("better", "passes"), ("neutral", "neutral")}
+
+
+@pytest.mark.parametrize("name", ["paper-1ms", "paper-optimal-gap", "paper-dma", "paper-two-node"])
+def test_every_figure_stands_at_its_place(name: str, values_in_their_places: Callable[[Report], int]) -> None:
+    found = difference(load("paper-4ms").profile, load(name).profile, circle=run_circle)
+    # Four of each row, and the two periods.
+    assert values_in_their_places(diff_report(found, arguments=AB)) == 4 * len(figures(found)) + 2
 
 
 def test_a_terminal_is_commanded_by_no_argument(paper: Profile) -> None:
-    lines = diff_lines(difference(paper, paper), arguments=("\x1b[31m.toml", "b\n.toml"))
-    assert plain_text(lines).splitlines()[1].startswith("A: \\x1b[31m.toml")
-    assert all(line.isprintable() for line in plain_text(lines).splitlines())
+    report = diff_report(difference(paper, paper), arguments=("\x1b[31m.toml", "b\n.toml"))
+    lines = render(report, "table").splitlines()
+    assert any(line.startswith("A  \\x1b[31m.toml") for line in lines)
+    assert any(line.startswith("B  b .toml") for line in lines)
+    assert all(line.isprintable() for line in lines)
 
 
 def test_why_a_circle_has_no_figures_is_said() -> None:
@@ -228,7 +265,7 @@ def test_two_texts_that_differ_look_different(one: str, other: str) -> None:
 
 # --- Markdown ---------------------------------------------------------------------------------------------
 
-ALLOWED = {"p", "strong", "code", "table", "/table", "thead", "tbody", "tr", "th", "td"}
+ALLOWED = {"h3", "p", "strong", "code", "table", "/table", "thead", "tbody", "tr", "th", "td"}
 HOSTILE = (
     "<script>alert(1)</script>", "a|b", "`x`", "```", "\\", "a\\|b", "[x](http://y)", "*a* _b_", "@team #1", "&lt;",
     "![i](j)", "| a | b |", "https://example.org", "<!-- x", "</details>",
@@ -237,21 +274,26 @@ HOSTILE = (
 
 def test_a_comment_has_the_verdict_first_and_what_differs() -> None:
     a, b = load("paper-1ms").profile, load("paper-optimal-gap").profile
-    page = Page(diff_markdown(difference(a, b), arguments=("main:line.toml", "paper-optimal-gap")))
-    assert page.text.startswith("busplan diff: B is better in 10 figures: margin, utilisation, required N T_cs, most ")
-    assert page.rows[1:3] == [["A", "main:line.toml", "paper-1ms"], ["B", "paper-optimal-gap", "paper-optimal-gap"]]
+    page = Page(comment(difference(a, b), arguments=("main:line.toml", "paper-optimal-gap")))
+    title, verdict = page.text.strip().splitlines()[:2]
+    assert title == "Changes from main:line.toml to paper-optimal-gap"
+    assert verdict.startswith("B is better in 10 figures: margin, utilisation, required N T_cs, most ")
+    assert page.rows[1:3] == [
+        ["A", "main:line.toml", "paper-1ms", "1000.000", "paper"],
+        ["B", "paper-optimal-gap", "paper-optimal-gap", "1000.000", "standard"],
+    ]
     assert ["bus.gap_count", "63", '"optimal"'] in page.rows
-    assert ["margin", "paper", "us", "294.083", "325.984", "+31.901", "+10.8%", "better"] in page.rows
+    assert ["margin", "paper", "us", "294.083", "325.984", "+31.901", "+10.8", "better"] in page.rows
     assert not [row for row in page.rows if row[-1] == "same"]
     # Of the terms, five are the same, and those that the gap count is in are neither better nor worse.
     assert {row[0] for row in page.rows if row[-1] == "neutral"} >= {"arbitration", "gaps"}
-    assert "17 figures are the same." in page.text
+    assert "17 figures are the same: JSON and CSV list all figures." in page.text
     assert set(page.tags) <= ALLOWED
 
 
 def test_every_cell_is_shown_as_the_table_on_a_terminal_has_it(paper: Profile) -> None:
     found = difference(paper, override(paper, {"cycle.period_us": 200, "bus.nodes": 3}))
-    page = Page(diff_markdown(found, arguments=AB))
+    page = Page(comment(found))
     shown = {"  ".join(one for one in row if one) for row in page.rows}
     lines = {"  ".join(line.replace(" - ", "  -  ").split()) for line in text(found)}
     words = {" ".join(row.split()) for row in shown}
@@ -261,20 +303,20 @@ def test_every_cell_is_shown_as_the_table_on_a_terminal_has_it(paper: Profile) -
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_names_are_shown_and_do_nothing_else(paper: Profile, name: str) -> None:
     b = override(paper, {"name": name, "description": f"{name}\n{name}", "bus.nodes": 3})
-    page = Page(diff_markdown(difference(paper, b), arguments=("a.toml", f"main:{name}.toml")))
+    page = Page(comment(difference(paper, b), arguments=("a.toml", f"main:{name}.toml")))
     assert set(page.tags) <= ALLOWED
     assert page.tags.count("table") == 3
-    assert {len(row) for row in page.rows} == {3, 8}
+    assert {len(row) for row in page.rows} == {3, 5, 8}
     shown = next(row for row in page.rows if row[0] == "name")
     assert shown == ["name", '"paper-1ms"', shown_value(name)]
-    assert page.rows[2] == ["B", f"main:{name}.toml", name]
+    assert page.rows[2][:3] == ["B", f"main:{name}.toml", name]
 
 
 def test_a_long_comment_is_cut_and_says_so() -> None:
     one = load("paper-4ms").profile
     servo: dict[str, object] = {f"servo.{axis}.{key}": 1.0 for axis in "xy" for key in LONG}
     found = difference(one, override(one, servo))
-    page = Page(diff_markdown(found, arguments=AB))
+    page = Page(comment(found))
     assert len(found.keys) == 22
     assert sum(row[0].startswith("servo.") for row in page.rows) == 20
     assert "And 2 more keys." in page.text
@@ -288,7 +330,7 @@ LONG = (
 
 
 def test_the_same_profile_needs_no_table(paper: Profile) -> None:
-    page = Page(diff_markdown(difference(paper, paper), arguments=AB))
+    page = Page(comment(difference(paper, paper)))
     assert page.tags.count("table") == 1
     assert len(page.rows) == 3
     assert "A and B are the same profile" in page.text
@@ -297,7 +339,7 @@ def test_the_same_profile_needs_no_table(paper: Profile) -> None:
 def test_rows_of_a_circle_that_is_not_there_are_left_to_the_note() -> None:
     one = load("paper-1ms").profile
     found = difference(one, override(one, {"cycle.period_us": 200}), circle=run_circle)
-    page = Page(diff_markdown(found, arguments=AB))
+    page = Page(comment(found))
     assert [row[0] for row in page.rows if row[1] == "circle"] == ["passed"]
     assert "The circle of B is not simulated: the cycle does not fit the bus: 205.917 us needed" in page.text
 
@@ -307,7 +349,7 @@ def test_why_a_circle_cannot_be_run_is_no_markup(paper: Profile) -> None:
         raise BusplanError("<b> *bold* [x](y)")
 
     asks = override(paper, {"servo.grade": "measured"})
-    page = Page(diff_markdown(difference(asks, override(asks, {"bus.nodes": 3}), circle=circle), arguments=AB))
+    page = Page(comment(difference(asks, override(asks, {"bus.nodes": 3}), circle=circle)))
     assert set(page.tags) <= ALLOWED
     assert "The circle of A is not simulated: <b> *bold* [x](y).\n" in page.text
 

@@ -1,9 +1,13 @@
 """The gate's formats: each is what the programs that read it expect, whatever a file or key is called."""
 
+import csv
+import io
 import json
 import os
 import re
-from collections.abc import Iterator
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -15,7 +19,10 @@ import pytest
 from pydantic import ValidationError
 from pydantic_sarif.model import StaticAnalysisResultsFormatSarifVersion210JsonSchema as SarifLog
 
-from busplan.answers.gate import GateFormat, render
+from busplan.answers.check import check_report
+from busplan.answers.gate import FORMATS, GateFormat, gate_format
+from busplan.forms import csv_rows, html, markdown, terminal
+from busplan.forms.blocks import Report, Sentence
 from busplan.profile.document import Document
 from busplan.profile.schema import profile_schema
 from busplan.profile.shipped import load, shipped_names
@@ -29,7 +36,6 @@ EXAMPLES = ROOT / "tests" / "rules" / "examples"
 CLEAN = (EXAMPLES / "BP001" / "valid.toml").read_text(encoding="utf-8")
 WARNS = CLEAN.replace('"optimal"', "63")
 FAILS = WARNS.replace("period_us = 4000", "period_us = 300")
-FORMATS: tuple[GateFormat, ...] = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
 
 HOSTILE = (
     "plain.toml",
@@ -53,6 +59,10 @@ def report(*files: FileResult) -> CheckReport:
     return CheckReport(files)
 
 
+def render(found: CheckReport, *, file_format: str) -> str:
+    return gate_format(file_format).write(found)
+
+
 def hostile() -> Iterator[FileResult]:
     for number, name in enumerate(HOSTILE):
         finding = Finding("BP002", "unknown-key", "error" if number % 2 else "warning", name, name, 1, 1)
@@ -68,6 +78,59 @@ def mixed() -> CheckReport:
         checked("a =", path="p/broken.toml"),
         FileResult("gone.toml", None, (), {}, failure="gone.toml: no such file"),
     )
+
+
+# The register
+
+
+def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
+    made = [gate_format(name) for name in FORMATS]
+    assert len({type(one) for one in made}) == len(made) == 7
+    assert all(isinstance(one, GateFormat) for one in made)
+    assert [name for name, one in zip(FORMATS, made, strict=True) if one.is_for_people] == ["text", "full"]
+    code = (
+        "import sys; from busplan.answers.gate import gate_format; gate_format(sys.argv[1])\n"
+        "print(*sorted(name for name in sys.modules if name.startswith('busplan.answers.gate.')))"
+    )
+    for name, one in FORMATS.items():
+        run = subprocess.run([sys.executable, "-c", code, name], capture_output=True, text=True, check=True)
+        # GitHub's log has the plain lines, JUnit their words, and our own document those of the answer.
+        assert set(run.stdout.split()) <= {f"busplan.answers.gate.{module}" for module in (one.module, "plain")}
+
+
+# The answer in blocks
+
+
+def test_the_answer_says_findings_failures_and_what_they_add_up_to(
+    mixed: CheckReport, values_in_their_places: Callable[[Report], int]
+) -> None:
+    answer = check_report(mixed)
+    assert terminal.text(answer).splitlines() == [
+        *render(mixed, file_format="text").splitlines(),
+        "gone.toml: no such file",
+        "checked 3 profiles: 2 errors, 1 warning; 1 could not be checked",
+    ]
+    states = [block.state for block in answer.blocks() if isinstance(block, Sentence)]
+    assert states == ["warns", "fails", "fails", "fails", "fails"]
+    # That one of the files could not be checked is said, and not where the document has it.
+    assert values_in_their_places(answer) == 2
+    clean = check_report(report(checked(CLEAN)))
+    assert [block.state for block in clean.blocks() if isinstance(block, Sentence)] == ["passes"]
+    assert values_in_their_places(clean) == 3
+    *_, warned = check_report(report(checked(WARNS))).blocks()
+    assert isinstance(warned, Sentence)
+    assert warned.state == "warns"
+
+
+def test_the_answer_takes_every_name_in_every_form() -> None:
+    found = report(*hostile())
+    answer = check_report(found)
+    assert len(terminal.text(answer).splitlines()) == 2 * len(HOSTILE) + 2
+    rows = list(csv.DictReader(io.StringIO(csv_rows.text(answer), newline="")))
+    assert len(rows) == 2 * len(HOSTILE)
+    assert {row["code"] for row in rows} == {"BP002"}
+    assert "<b>&" not in html.page(answer)
+    assert "::error::a.toml:1:1:" in markdown.text(answer)
 
 
 # JSON
@@ -97,7 +160,7 @@ def test_json_holds_the_contract(mixed: CheckReport) -> None:
 
 
 @pytest.mark.parametrize("format_", FORMATS)
-def test_no_name_breaks_a_format(format_: GateFormat) -> None:
+def test_no_name_breaks_a_format(format_: str) -> None:
     text = render(report(*hostile()), file_format=format_)
     # As the command writes it: what is no UTF-8 as an escape.
     written = text.encode("utf-8", "backslashreplace").decode("utf-8")
@@ -114,7 +177,7 @@ def test_no_name_breaks_a_format(format_: GateFormat) -> None:
 
 
 @pytest.mark.parametrize("format_", FORMATS)
-def test_nothing_at_all_is_still_a_document(format_: GateFormat) -> None:
+def test_nothing_at_all_is_still_a_document(format_: str) -> None:
     text = render(report(), file_format=format_)
     assert (text == "") == (format_ in ("text", "full", "github"))
 

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,12 +11,16 @@ import pytest
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.sweep.blocks import Block, Column, figure_names, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
-from busplan.answers import documents
+from busplan.answers.capacity import capacity_records
 from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
-from busplan.answers.sweep.top import Tally, TopRows
+from busplan.answers.sweep.top import Tally, TopRows, sweep_report
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.forms import json_and_csv
+from busplan.forms import html, markdown, terminal
+from busplan.forms.blocks import Report, Table, Value, values_in
+from busplan.forms.csv_rows import to_csv
+from busplan.forms.json_document import to_json
+from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -48,9 +53,7 @@ def test_csv_is_what_capacity_writes_for_each_point(chunk_points: int) -> None:
     found = csv_header(columns) + "".join(block_text(block, columns, style="csv") for block in blocks(chunk_points))
     expected = []
     for changes, profile in points():
-        rows = csv.reader(
-            io.StringIO(json_and_csv.to_csv(documents.capacity_rows(capacity(profile, timing_models=BOTH))))
-        )
+        rows = csv.reader(io.StringIO(to_csv(capacity_records(capacity(profile, timing_models=BOTH)))))
         assert next(rows) == list(FIGURES)
         expected += [[str(value) for value in changes.values()] + row for row in rows]
     assert list(csv.reader(io.StringIO(found))) == [list(columns), *expected]
@@ -60,9 +63,9 @@ def test_jsonl_is_what_capacity_writes_for_each_point() -> None:
     columns = (*AXES, *FIGURES)
     lines = "".join(block_text(block, columns, style="jsonl") for block in blocks()).splitlines()
     expected = [
-        {**changes, **json.loads(json_and_csv.to_json(row))}
+        {**changes, **json.loads(to_json(row))}
         for changes, profile in points()
-        for row in documents.capacity_rows(capacity(profile, timing_models=BOTH))
+        for row in capacity_records(capacity(profile, timing_models=BOTH))
     ]
     assert [json.loads(line) for line in lines] == expected
     # Not only equal: 4.0 stays 4.0.
@@ -107,7 +110,7 @@ def test_what_does_not_exist_is_null_and_empty() -> None:
     assert block_text(holed, ("fits", "phase_margin_deg"), style="csv").splitlines()[0] == "true,"
     top = TopRows(("bus.nodes", "phase_margin_deg"), sort_by="phase_margin_deg", ascending=True, top=3)
     top.add(holed)
-    assert top.rows == []
+    assert top.kept == []
 
 
 @pytest.mark.parametrize("ascending", [True, False])
@@ -119,14 +122,14 @@ def test_top_rows_are_those_of_a_whole_sort(ascending: bool, top: int) -> None:
         kept.add(block)
         rows += [block.row(index, ("bus.nodes", "margin_us", "max_axes")) for index in range(2 * block.chunk.points)]
     rows.sort(key=lambda row: row["max_axes"] * (1 if ascending else -1))
-    assert kept.rows == rows[:top]
+    assert [one.record for one in kept.kept] == rows[:top]
 
 
 def test_without_a_sort_the_top_rows_are_the_first() -> None:
     kept = TopRows(("bus.nodes", "timing_model"), sort_by=None, ascending=False, top=3)
     for block in blocks(1):
         kept.add(block)
-    assert [row["timing_model"] for row in kept.rows] == ["paper", "standard", "paper"]
+    assert [row.record["timing_model"] for row in kept.kept] == ["paper", "standard", "paper"]
 
 
 def test_the_summary_counts_points_under_each_model() -> None:
@@ -136,10 +139,13 @@ def test_the_summary_counts_points_under_each_model() -> None:
     fits = [[figures.fits for figures in capacity(profile, timing_models=BOTH).results] for _, profile in points()]
     by_hand = [sum(column) for column in zip(*fits, strict=True)]
     unsafe = sum(not capacity(profile).results[0].gap_count_safe for _, profile in points())
-    lines = [line.text for line in tally.lines("p", expected=18)]
+    lines = [sentence_text(one) for one in tally.sentences("p", expected=18)]
     assert lines[0] == f"p: 18 points; {by_hand[0]} by the paper model and {by_hand[1]} by the standard model fit."
     assert (len(lines) == 2) == (unsafe > 0)
-    assert "18 points of 20 (interrupted)" in tally.lines("p", expected=20)[0].text
+    stopped = next(tally.sentences("p", expected=2000))
+    assert "18 points of 2,000 (interrupted)" in sentence_text(stopped)
+    # Only the whole grid's number is in the document.
+    assert [(value.value, value.at) for value in values_in(stopped)][:2] == [(18, ""), (2000, "/points")]
 
 
 def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
@@ -149,4 +155,58 @@ def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     for block in sweep(profile, grid, timing_models=BOTH):
         tally.add(block)
     # Two hops need 7: 0 to 6 are unsafe.
-    assert tally.lines("p", expected=64)[1].text.startswith("At 7 points the gap count is unsafe (gap_count_safe).")
+    *_, last = tally.sentences("p", expected=64)
+    assert (sentence_text(last), last.state) == ("At 7 points the gap count is unsafe (gap_count_safe).", "warns")
+
+
+COLUMNS = ("bus.gap_count", "timing_model", "margin_us", "utilisation", "exceeded", "fits", "phase_margin_deg")
+
+
+def reported(*, sort_by: str | None = None, top: int = 7) -> Report:
+    """The answer with a circle's figure that does not exist."""
+    profile = load("paper-4ms").profile
+    grid = checked_grid(profile, AXES, with_circle=False)
+    tally, rows = Tally(kind_named("ieee1394"), BOTH), TopRows(COLUMNS, sort_by=sort_by, ascending=True, top=top)
+    parts = []
+    for block in blocks():
+        missing = Column(np.full(block.chunk.shape, np.nan))
+        parts.append(block._replace(models=tuple({**one, "phase_margin_deg": missing} for one in block.models)))
+        tally.add(parts[-1])
+        rows.add(parts[-1])
+    text = "".join(json_rows(part, COLUMNS) for part in parts)
+    text = json_header(profile.name, grid, BOTH) + text + json_footer(complete=True)
+    return sweep_report(rows, tally, name="<b>p|q", expected=18, document=lambda: json.loads(text))
+
+
+@pytest.mark.parametrize("sort_by", [None, "margin_us"])
+def test_each_figure_of_a_row_stands_in_the_document(
+    sort_by: str | None, values_in_their_places: Callable[[Report], int]
+) -> None:
+    assert values_in_their_places(reported(sort_by=sort_by)) == 1 + 7 * len(COLUMNS)
+
+
+def test_a_row_that_does_not_fit_says_so_and_columns_are_the_registers() -> None:
+    *_, table = reported(sort_by="margin_us", top=36).blocks()
+    assert isinstance(table, Table)
+    assert [(column.heading, column.unit) for column in table.columns] == [
+        *((name, "") for name in COLUMNS[:3]),
+        ("utilisation", "%"),
+        *((name, "") for name in COLUMNS[4:]),
+    ]
+    fits = [row.cells[5] for row in table.rows]
+    assert {(one.value, one.state) for one in fits if isinstance(one, Value)} == {(False, "fails"), (True, "neutral")}
+
+
+def test_the_rows_of_the_answer_are_a_table_in_every_form_for_people() -> None:
+    report = reported(sort_by="margin_us", top=2)
+    lines = terminal.text(report).splitlines()
+    assert lines[0].startswith("<b>p|q: 18 points; ")
+    assert "2 of 36 rows, smallest margin_us first." in lines
+    assert lines[-1].split()[-3:] == ["time", "no", "-"]
+    text = markdown.text(report)
+    assert text.startswith("### Sweep of `<b>p|q`\n")
+    assert [line.count(" | ") for line in text.splitlines() if line.startswith("| ")] == [6] * 4
+    assert "**no**" in text
+    page = html.page(report)
+    assert '<data value="false" data-at="/rows/' in page
+    assert "<b>p" not in page

@@ -1,6 +1,7 @@
 """The drawings of a timeline: to scale, whole, and safe with any name."""
 
 import re
+from collections.abc import Callable
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -8,15 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
-from busplan.answers.timeline import timeline_document, timeline_rows
+from busplan.answers.timeline import (
+    headline,
+    timeline_chart,
+    timeline_document,
+    timeline_records,
+    timeline_report,
+    totals_table,
+)
 from busplan.buses import kind_named
 from busplan.buses.bus import IDLE
-from busplan.drawings.timeline.characters import timeline_lines
+from busplan.drawings.timeline import mermaid, png, svg
 from busplan.drawings.timeline.lanes import node_lanes, stretches
-from busplan.drawings.timeline.mermaid import timeline_mermaid
-from busplan.drawings.timeline.png import timeline_png
-from busplan.drawings.timeline.svg import timeline_svg
+from busplan.forms import html, markdown, terminal
+from busplan.forms.blocks import Report, values_in
 from busplan.forms.scale import ticks
+from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 
@@ -29,7 +37,23 @@ def plan(**changes: object) -> Schedule:
 
 
 def drawn(one: Schedule, width: int = 80) -> list[str]:
-    return [line.text for line in timeline_lines(one, width=width)]
+    return terminal.text(timeline_report(one), width=width).splitlines()
+
+
+def title(one: Schedule) -> str:
+    return sentence_text(headline(one))
+
+
+def timeline_svg(one: Schedule) -> str:
+    return svg.timeline_svg(one, title=title(one))
+
+
+def timeline_mermaid(one: Schedule) -> str:
+    return mermaid.timeline_mermaid(one, title=title(one))
+
+
+def timeline_png(one: Schedule) -> bytes:
+    return png.timeline_png(one, title=title(one))
 
 
 def row(lines: list[str], label: str) -> str:
@@ -96,7 +120,7 @@ def test_an_overrun_is_said_and_seen() -> None:
     one = plan(cycle__period_us=300.0)
     lines = drawn(one)
     assert "does not fit, 55.917 us short, 205.917 us needed of 150.000 us (paper model)" in lines[0]
-    assert timeline_lines(one, width=80)[0].tone == "bad"
+    assert headline(one).state == "fails"
     over = row(lines, "over")
     assert over.lstrip() == "!" * over.count("!")
     assert over.count("!") / len(over) == pytest.approx(55.917 / 205.917, abs=0.03)
@@ -191,7 +215,61 @@ def test_documents_hold_the_schedules_own_numbers() -> None:
     assert [(row["start_us"], row["end_us"]) for row in document["events"]] == [one[1:] for one in spans(one)]
     assert document["required_us"] == one.figures.required_us
     assert [row["share"] for row in document["totals"]] == [part.share for part in totals(one)]
-    assert {row["profile"] for row in timeline_rows(one)} == {"paper-4ms"}
+    assert {row["profile"] for row in timeline_records(one)} == {"paper-4ms"}
+
+
+@pytest.mark.parametrize(
+    "one",
+    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__gap_count=5)],
+    ids=["whole", "overrun", "window", "unsafe"],
+)
+def test_figures_of_the_answer_stand_in_its_document(
+    one: Schedule, values_in_their_places: Callable[[Report], int]
+) -> None:
+    # Three for each kind of event; the margin of an overrun is said as what is short, and stands nowhere.
+    short = not one.figures.fits
+    head = ["period_us", "required_us", "available_us"] if short else ["period_us", "margin_us", "available_us"]
+    caption = ["nodes", "from_us"] if one.is_whole and not short else ["nodes", "from_us", "to_us"]
+    assert values_in_their_places(timeline_report(one)) == len(head + caption) + 3 * len(totals(one))
+    placed = [value.key for value in values_in(headline(one)) if value.at]
+    assert sorted(placed) == sorted(head)
+    assert [value.key for value in values_in(timeline_chart(one)) if value.at] == caption
+
+
+def test_the_table_says_what_takes_how_much_of_what() -> None:
+    window = zoom(plan(), from_us=100.0, to_us=180.0)
+    captions = [totals_table(one).caption for one in (plan(), window, plan(cycle__period_us=300.0))]
+    assert [sentence_text(one) for one in captions if one] == [
+        "What takes the slice, 2000.000 us",
+        "What takes the window, 80.000 us",
+        "What takes the cycle, 205.917 us",
+    ]
+    lines = drawn(plan())
+    assert lines[-2].split() == [":", "arbitration", "reset", "gap", "(10)", "4", "21.047", "1.05"]
+
+
+def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
+    report = timeline_report(plan(name=HOSTILE))
+    text = markdown.text(report)
+    assert "```mermaid\ngantt\n" in text
+    assert "| arbitration | " in text
+    page = html.page(report)
+    assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="busplan-timeline"') == 1
+    assert page.count(".busplan-timeline .track{") == 2
+    assert '<data value="8" data-at="/totals/1/events">8</data>' in page
+    assert HOSTILE not in page
+
+
+def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
+    many = plan(bus__nodes=62, bus__max_hops=3)
+    said = "by node, a bar for each transaction"
+    assert said in words_of(timeline_chart(many).drawing.svg())
+    assert said not in words_of(timeline_chart(plan()).drawing.svg()) + words_of(timeline_svg(many))
+
+
+def words_of(drawing: str | None) -> str:
+    """Everything that a drawing says in words, its lines behind one another."""
+    return " ".join(one.text or "" for one in ET.fromstring(drawing or "").iter(f"{SVG}text"))
 
 
 def spans(one: Schedule) -> list[tuple[str, float, float]]:

@@ -240,6 +240,42 @@ def test_the_environment_sets_the_default_format(folder: Path) -> None:
     assert process("rule", cwd=folder, BUSPLAN_FORMAT="yaml").returncode == 0
 
 
+ADDED = """
+import sys
+from types import ModuleType
+from busplan.answers.gate import FORMATS, GateFormat, Registered
+
+class Shout(GateFormat):
+    def write(self, report):
+        return "".join(f"{one.finding.code}!\\n" for one in report.located)
+
+    def log(self, report):
+        return ["shouted"]
+
+module = ModuleType("busplan.answers.gate.shout")
+module.Shout = Shout
+sys.modules[module.__name__] = module
+FORMATS["shout"] = Registered("shout", "Shout", is_for_builds=True)
+from busplan.__main__ import main
+main()
+"""
+
+
+def test_a_format_is_added_by_a_class_and_a_line_of_the_register(folder: Path) -> None:
+    def call(*arguments: str) -> Run:
+        return subprocess.run(
+            [sys.executable, "-c", ADDED, "check", *arguments],
+            capture_output=True, text=True, cwd=folder, check=False, timeout=60, env=environment(COLUMNS="100"),
+        )  # fmt: skip
+
+    words = " ".join(call("--help").stdout.split())
+    assert "|junit|sarif|shout>" in words
+    assert "github, gitlab, junit, sarif and shout are for the build service" in words
+    run = call("p/fails.toml", "--format", "shout", "-q")
+    assert (run.returncode, run.stdout, run.stderr) == (1, "BP101!\n", "shouted\n")
+    assert "'shout'" in call("p", "--format", "xml").stderr
+
+
 def test_github_has_the_plain_report_on_stderr(busplan: Busplan, folder: Path) -> None:
     plain = busplan("check", "p", cwd=folder)
     run = busplan("check", "p", "--format", "github", cwd=folder)

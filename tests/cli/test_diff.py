@@ -1,7 +1,9 @@
 """`busplan diff` as users and gates call it: figures of the other commands, exit codes, revisions, refusals."""
 
+import csv
 import json
 from collections.abc import Callable
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +78,9 @@ def test_forms_say_the_same_verdict(run: Run) -> None:
     pair = ("diff", "paper-optimal-gap", "paper-1ms")
     verdict = answer(run, *pair)["verdict"]
     assert run(*pair).stdout.startswith(f"{verdict}\n")
-    assert run(*pair, "--format", "markdown").stdout.startswith(f"**busplan diff:** {verdict}\n")
+    title, _, said = run(*pair, "--format", "markdown").stdout.splitlines()[:3]
+    assert title == "### Changes from `paper-optimal-gap` to `paper-1ms`"
+    assert said.replace("\\", "") == f"**{verdict}**"
 
 
 # --- the gate ---------------------------------------------------------------------------------------------
@@ -89,7 +93,7 @@ def test_a_report_exits_0_and_a_gate_1_on_a_regression(run: Run) -> None:
     done = run(*worse, GATE)
     assert (done.returncode, done.stdout) == (1, run(*worse).stdout)
     assert done.stderr.startswith("regression: B is worse in 10 figures: margin, utilisation, required N T_cs, ")
-    for form in ("json", "markdown"):
+    for form in ("json", "markdown", "html", "csv"):
         assert run(*worse, GATE, "--format", form).returncode == 1
 
 
@@ -167,9 +171,21 @@ def test_what_is_wrong_with_either_side_is_said_together(refused: Refused, repos
     assert len(refused("diff", "none.toml", "none.toml", cwd=repository).splitlines()) == 1
 
 
+def test_the_rows_of_csv_are_the_figures_of_json(run: Run) -> None:
+    pair = ("diff", "paper-1ms", "paper-optimal-gap", "--no-circle")
+    rows = list(csv.DictReader(StringIO(run(*pair, "--format", "csv").stdout)))
+    figures = answer(run, *pair)["figures"]
+    assert [{key: "" if value is None else cell(value) for key, value in one.items()} for one in figures] == rows
+    assert {row["judgement"] for row in rows} == {"better", "same", "neutral"}
+
+
+def cell(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def test_usage(refused: Refused) -> None:
     assert "Missing argument 'B'" in refused("diff", "paper-1ms")
-    assert "csv" in refused("diff", "paper-1ms", "paper-4ms", "--format", "csv")
+    assert "Invalid value for '--format'" in refused("diff", "paper-1ms", "paper-4ms", "--format", "text")
 
 
 def test_without_a_circle_numpy_is_not_loaded(run: Run) -> None:

@@ -1,7 +1,9 @@
 """`busplan explain` as a process: its forms, its options, and what it refuses."""
 
+import csv
 import json
 from collections.abc import Callable
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -102,9 +104,43 @@ def test_without_a_figure_all_are_listed(run: Run) -> None:
     assert {"assumptions", "figures", "equations", "constants"} <= set(registry)
     grades = {"published", "derived", "recalled", "measured", "calibrated", "assumed"}
     assert {row["grade"] for row in registry["constants"]} <= grades
-    assert run("explain", "paper-4ms", "--format", "markdown").stdout.startswith(
-        "What the figures of `paper-4ms` rest on"
-    )
+    page = run("explain", "paper-4ms", "--format", "markdown").stdout.splitlines()
+    assert page[0] == "### The figures of `paper-4ms`"
+    assert page[2] == "What the figures of `paper-4ms` rest on, the least well known first:"
+    rows = list(csv.DictReader(StringIO(run("explain", "paper-4ms", "--format", "csv").stdout)))
+    assert rows == registry["figures"]
+
+
+def test_the_rows_of_csv_are_the_steps_of_json(run: Run) -> None:
+    question = ("explain", "paper-4ms", "required_us", "--timing", "both")
+    rows = list(csv.DictReader(StringIO(run(*question, "--format", "csv").stdout)))
+    found = json.loads(run(*question, "--format", "json").stdout)["derivations"]
+    steps = [(one, number, step) for one in found for number, step in enumerate(one["steps"], start=1)]
+    assert len(rows) == len(steps) > 30
+    for row, (one, number, step) in zip(rows, steps, strict=True):
+        assert (row["profile"], row["command"], row["figure"]) == ("paper-4ms", "capacity", "required_us")
+        assert (row["timing_model"], row["transaction"], float(row["period_us"])) == (one["timing_model"], "", 4000)
+        assert row["step"] == str(number)
+        keys = ("reference", "symbol", "formula", "numbers", "unit")
+        assert {key: row[key] for key in keys} == {key: step[key] for key in keys}
+        assert row["value"] == str(step["value"])
+    assert list(rows[0]) == [
+        *("profile", "command", "figure", "timing_model", "transaction", "period_us"),
+        *("step", "reference", "symbol", "formula", "numbers", "value", "unit"),
+    ]
+
+
+def test_an_input_is_one_row_without_a_formula(run: Run) -> None:
+    (row,) = csv.DictReader(StringIO(run("explain", "paper-4ms", "period_us", "--format", "csv").stdout))
+    assert (row["symbol"], row["formula"], row["numbers"], row["value"]) == ("T_s", "", "", "4000.0")
+
+
+def test_what_has_parts_is_json_in_its_cell(run: Run) -> None:
+    question = ("explain", "paper-1ms", "cheapest_change")
+    *_, row = csv.DictReader(StringIO(run(*question, "--format", "csv").stdout))
+    (one,) = json.loads(run(*question, "--format", "json").stdout)["derivations"]
+    assert json.loads(row["value"]) == one["value"]
+    assert run(*question).stdout.startswith("cheapest_change of paper-1ms at 1 ms, paper model: bus.gap_count = 13\n")
 
 
 def test_markdown_shows_a_hostile_name_and_does_nothing_with_it(run: Run, tmp_path: Path) -> None:

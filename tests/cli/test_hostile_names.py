@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from busplan.forms.json_and_csv import csv_cell
+
+from busplan.forms.csv_rows import csv_cell
 
 if TYPE_CHECKING:
     from subprocess import CompletedProcess
@@ -45,15 +46,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def calls() -> Iterator[tuple[str, ...]]:
+    for form in ("markdown", "html"):
+        yield ("calibrate", PROFILE, MEASURED, "--format", form)
     for form in ("table", "json", "csv"):
         yield from ((command, PROFILE, "--format", form) for command in ("capacity", "latency", "timeline"))
         yield ("plan", PROFILE, "--no-circle", "--format", form)
         yield ("calibrate", PROFILE, MEASURED, "--format", form)
         yield ("sweep", PROFILE, "--vary", "bus.nodes=1:3", "--format", form)
         yield ("capacity", FAULTY, "--format", form)
-    for form in ("table", "json", "markdown"):
+    for form in ("table", "json", "markdown", "html", "csv"):
         yield from (("diff", one, OTHER, "--no-circle", "--format", form) for one in (PROFILE, OTHER, FAULTY))
-    yield from (("explain", PROFILE, "gaps_us", "--format", form) for form in ("text", "json", "markdown"))
+    for form in ("table", "markdown", "html", "csv", "json"):
+        yield from (("explain", PROFILE, *figure, "--format", form) for figure in ((), ("gaps_us",)))
     yield from (("report", PROFILE, OTHER, "--no-circle", "--format", form) for form in ("html", "markdown"))
     yield from (("timeline", PROFILE, "--format", form) for form in ("mermaid", "svg"))
     for form in GATE_FORMATS:

@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -81,6 +82,26 @@ def test_the_table_shows_the_top_rows_and_how_many_fit(busplan: Run, tmp_path: P
         "2 of 16 rows, smallest margin_us first.",
     ]
     assert [line.split()[0] for line in lines[-2:]] == ["16", "15"]
+
+
+def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) -> None:
+    grid = ["--vary", "bus.nodes=1:16", "--columns", "margin_us,fits", "--sort", "margin_us", "--top", "3"]
+    for form, name in (("markdown", "rows.md"), ("html", "rows.html"), ("table", "rows.txt"), ("table", "rows.out")):
+        shown = busplan("sweep", "paper-4ms", *grid, "--format", form, cwd=tmp_path)
+        assert (shown.returncode, shown.stderr) == (0, "")
+        run = busplan("sweep", "paper-4ms", *grid, "-o", name, cwd=tmp_path)
+        assert (run.returncode, run.stdout) == (0, "")
+        assert run.stderr.endswith(f" fit.\nwrote {name}\n")
+        assert (tmp_path / name).read_text(encoding="utf-8") == shown.stdout
+    rows = [line for line in (tmp_path / "rows.md").read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
+    assert rows[0] == "| bus.nodes | timing\\_model | margin\\_us | fits |"
+    assert [row.split(" | ")[0] for row in rows[2:]] == ["| 1", "| 1", "| 2"]
+    # The places of the page are those of the JSON, which has all rows in the order of the grid.
+    document = json.loads(busplan("sweep", "paper-4ms", *grid[:4], "--format", "json", cwd=tmp_path).stdout)
+    page = (tmp_path / "rows.html").read_text(encoding="utf-8")
+    places = re.findall(r'<data value="([^"]*)" data-at="/rows/([0-9]+)/margin_us"', page)
+    assert len(places) == 3
+    assert [float(value) for value, _ in places] == [document["rows"][int(number)]["margin_us"] for _, number in places]
 
 
 def has_open(pid: int, folder: Path) -> bool:
@@ -173,7 +194,7 @@ def test_figures_are_drawn(grid: list[str], tmp_path: Path) -> None:
 
 
 REFUSALS = {
-    "--vary bus.nodes=1:9 --format csv --top 3": "--top: goes with --format table",
+    "--vary bus.nodes=1:9 --format csv --top 3": "--top: goes with --format table, markdown or html; csv has every row",
     "--vary bus.nodes=1:9 --figure fits": "--figure: goes with --plot FILE",
     "--vary bus.nodes=1:9 --jobs 2": "--jobs: goes with --circle",
     "--vary bus.nodes=1:9 --top 0": "--top 0: must be 1 or more",

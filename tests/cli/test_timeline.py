@@ -55,6 +55,8 @@ def test_every_form_goes_to_a_file_by_its_name(busplan: Run, tmp_path: Path) -> 
         "a.json": b"{\n",
         "a.csv": b"profile,",
         "a.txt": b"paper-4ms at 4 ms: fits",
+        "a.md": b"### Timeline of `paper-4ms`\n",
+        "a.html": b"<!DOCTYPE html>",
     }
     for name, start in begins.items():
         run = busplan("timeline", "paper-4ms", "-o", name, "--transaction", "write:2", cwd=tmp_path)
@@ -87,7 +89,7 @@ def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> Non
         (["--transaction", "read:1", "--from", "1ms"], "shows nothing: the read of node 1 runs from 0.4 to 51.77"),
         (["--period", "0s"], "--period 0s"),
         (["--nodes", "1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
-        (["-o", "cycle.doc"], "--output cycle.doc: expected a name ending in .txt, .json, .csv, .mmd, .svg, .png"),
+        (["-o", "cycle.doc"], "cycle.doc: expected a name ending in .txt, .md, .html, .csv, .json, .mmd, .svg, .png"),
         (["-o", "no/such/cycle.svg"], "there is no folder"),
         (["--timing", "both"], "both"),
     ],

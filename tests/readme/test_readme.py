@@ -17,11 +17,12 @@ from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
 from busplan.analysis.latency import latency
-from busplan.answers.documents import capacity_rows, latency_rows
+from busplan.answers.capacity import capacity_records
 from busplan.answers.explain import constant_rows, equation_rows
+from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.forms.markdown import code, table
+from busplan.forms.markdown_words import code, table
 from busplan.profile.shipped import load, shipped_names
 from busplan.sections.machine import AxisOverride
 
@@ -142,7 +143,7 @@ def test_equations_and_constants_are_those_of_the_registry(lines: list[str]) -> 
 
 def test_every_json_key_is_listed() -> None:
     profile = load("paper-4ms").profile
-    keys = {*latency_rows(latency(profile))[0], *capacity_rows(capacity(profile))[0], *CircleFigures._fields}
+    keys = {*latency_records(latency(profile))[0], *capacity_records(capacity(profile))[0], *CircleFigures._fields}
     bus = kind_named("ieee1394")
     assert keys >= {figure.key for figure in (*bus.capacity_figures, *bus.latency_figures)}
     missing = [key for key in sorted(keys) if f"`{key}`" not in README]

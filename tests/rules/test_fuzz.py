@@ -19,7 +19,7 @@ import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
-from busplan.answers.gate import render
+from busplan.answers.gate import gate_format
 from busplan.errors import PlacedError
 from busplan.profile import positions
 from busplan.profile.shipped import shipped_folder
@@ -175,7 +175,7 @@ def hold(content: bytes) -> FileResult:
         assert finding.code in all_rules()
     assert list(result.findings) == sorted(result.findings, key=lambda one: (one.line, one.column, one.code))
     for format_ in ("text", "full", "github"):
-        assert render(CheckReport((result,)), file_format=format_).count("\n") >= len(result.findings)
+        assert gate_format(format_).write(CheckReport((result,))).count("\n") >= len(result.findings)
     return result
 
 

@@ -1,17 +1,55 @@
-"""`busplan calibrate`: for people, and as plain data."""
+"""Answer of `busplan calibrate`."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Final
 
 from busplan.analysis.calibration.calibrate import OUTLIER_DEVIATIONS, Calibration, PayloadFit
 from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.documents import Document, Row, document
-from busplan.forms.lines import BLANK, Line, plural, table, us
+from busplan.answers.documents import document, with_profile
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Code,
+    Column,
+    Document,
+    Record,
+    Report,
+    Row,
+    Sentence,
+    Snippet,
+    Table,
+    Value,
+    count_value,
+    joined,
+    sentence,
+)
+from busplan.forms.numbers import nouns, plural, with_unit
+from busplan.forms.terminal import sentence_text
 from busplan.profile.layout import written
 from busplan.sections.execution import LinearExecution, TableExecution
 
 SECTION: Final = "node.execution"
+_DECIMALS: Final = 3
+_LINE_DIGITS: Final = 6
+"""Significant digits of a line's base and slope."""
+_COLUMNS: Final = {
+    "payload_bytes": Column("payload", "bytes"),
+    "measurements": Column("n"),
+    "latency_us": Column("T_lant", "us"),
+    "packets_us": Column("packets", "us"),
+    "execution_us": Column("T_exec", "us"),
+    "deviation_us": Column("std dev", "us"),
+    "fitted_us": Column("fitted", "us"),
+    "residual_us": Column("residual", "us"),
+}
+_MEASURED_COLUMNS: Final = {
+    "request_and_acknowledge_us": Column("measured", "us", group="T1+T2"),
+    "model_request_and_acknowledge_us": Column("model", "us", group="T1+T2"),
+    "unexplained_us": Column("unexplained", "us", group="T1+T2"),
+}
+"""Columns of what was measured beside the latency."""
 _MOST_LINES: Final = 10
 _LONG_EXECUTION_US: Final = 10_000.0
 """An execution time that no motion node has; latencies in ns under a heading of us have it."""
@@ -37,139 +75,194 @@ def provenance(result: Calibration, *, source: str) -> str:
     return (
         f"busplan calibrate: {result.execution.kind} ({result.method}) of "
         f"{plural(len(result.residuals), 'measurement')} in {source}, {taken}, "
-        f"rms residual {us(result.rms_residual_us)} us"
+        f"rms residual {with_unit(_time(result.rms_residual_us, 'rms_residual_us'))}"
     )
 
 
-def calibration_lines(result: Calibration, *, source: str) -> Iterator[Line]:
+def calibration_report(result: Calibration, *, source: str, applied_to: str | None) -> Report:
+    """Answer the question of `calibrate`.
+
+    Parameters
+    ----------
+    result
+        The calibration.
+    source
+        What the measurements are called.
+    applied_to
+        The profile that the execution time was written into; None for none.
+    """
+    name = result.profile.name
+    return Report(
+        Sentence(("Execution time of ", Code(name), " from ", Code(source))),
+        lambda: tuple(_blocks(result, source)),
+        partial(calibration_document, result, source=source, applied_to=applied_to),
+        lambda: with_profile(name, calibration_records(result)),
+    )
+
+
+def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     """The fit in words, the figures by payload, and the section of the profile."""
-    sizes = plural(len(result.payloads), "payload")
-    yield Line(
-        f"{result.profile.name}: T_exec from {plural(len(result.residuals), 'measurement')} at {sizes}, {source}.",
-        "good",
+    measurements, sizes = len(result.residuals), len(result.payloads)
+    yield sentence(
+        f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
+        Code(result.profile.name),
+        count_value(measurements, "measurements", at="/measurements"),
+        count_value(sizes),
+        Code(source),
     )
-    yield Line(_way(result))
-    yield Line(_form(result))
-    yield Line(_residual(result))
-    yield from (Line(text) for text in _unexplained(result))
-    yield from (Line(f"Warning: {text}", "warning") for text in calibration_warnings(result))
-    yield BLANK
-    yield from _by_payload(result.payloads, measured=result.way == "measured-halves")
-    yield BLANK
-    yield Line(f"[{SECTION}]", "table")
-    yield from (Line(f"{key} = {written(value)}", "table") for key, value in execution_keys(result.execution).items())
+    yield _way(result)
+    yield _form(result)
+    yield _residual(result)
+    yield from _unexplained(result)
+    yield from (joined(sentence("Warning: ", state="warns"), one, by="") for one in _warnings(result))
+    yield _by_payload(result.payloads, measured=result.way == "measured-halves")
+    keys = (f"{key} = {written(value)}" for key, value in execution_keys(result.execution).items())
+    yield Snippet((f"[{SECTION}]", *keys))
 
 
-def _way(result: Calibration) -> str:
+def _time(value_us: float, key: str, *, at: str = "") -> Value:
+    return Value(value_us, key, "us", _DECIMALS, at=at)
+
+
+def _way(result: Calibration) -> Sentence:
     if result.way == "measured-halves":
-        return (
+        return sentence(
             "T_exec = T_lant - 2 (T1+T2), both as measured; the timing model is not used, and stands beside it to show "
             "what it leaves unexplained."
         )
     network = network_of(result.profile)
     bus = bus_of(result.profile)
     where = ", ".join((bus.payloads(network).carrier, *bus.setup_words(network)))
-    return (
+    return sentence(
         f"T_exec = T_lant - (T1+T2) - (T4+T5), eq (3): both halves by the {result.timing_model} timing model for "
         f"{where}."
     )
 
 
-def _form(result: Calibration) -> str:
+def _form(result: Calibration) -> Sentence:
     execution = result.execution
     if execution.kind == "linear":
         meaning = "all measurements" if result.method == "least squares" else "the median at each payload"
-        return (
-            f"Line: {execution.base_us:g} us + {execution.per_byte_us:g} us/byte * payload, by {result.method} "
-            f"through {meaning}."
+        return sentence(
+            f"Line: {{}} + {{}} * payload, by {result.method} through {meaning}.",
+            Value(execution.base_us, "base_us", "us", digits=_LINE_DIGITS, at="/execution/base_us"),
+            Value(execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS, at="/execution/per_byte_us"),
         )
-    return f"Table: the {result.method} at each payload, {execution.range_bytes}."
+    return sentence(f"Table: the {result.method} at each payload, {execution.range_bytes}.")
 
 
-def _residual(result: Calibration) -> str:
-    one = result.largest
-    where = f" at {one.payload_bytes} bytes (line {one.line})" if one.residual_us else ""
-    repeated = [fit.deviation_us for fit in result.payloads if fit.deviation_us is not None]
-    scatter = f" Repetitions scatter by {us(max(repeated))} us at most (standard deviation)." if repeated else ""
-    return (
-        f"Measured less fitted: rms {us(result.rms_residual_us)} us, largest {us(one.residual_us)} us{where}.{scatter}"
+def _residual(result: Calibration) -> Sentence:
+    one, at = result.largest, "/largest_residual"
+    said = sentence(
+        "Measured less fitted: rms {}, largest {}",
+        _time(result.rms_residual_us, "rms_residual_us", at="/rms_residual_us"),
+        _time(one.residual_us, "residual_us", at=f"{at}/residual_us"),
     )
+    if one.residual_us:
+        place = sentence(
+            " at {} (line {})",
+            Value(one.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
+            count_value(one.line, "line", at=f"{at}/line"),
+        )
+        said = joined(said, place, by="")
+    repeated = [(fit.deviation_us, at) for at, fit in enumerate(result.payloads) if fit.deviation_us is not None]
+    if not repeated:
+        return joined(said, sentence("."), by="")
+    most_us, number = max(repeated)
+    scatter = _time(most_us, "deviation_us", at=f"/payloads/{number}/deviation_us")
+    return joined(said, sentence(". Repetitions scatter by {} at most (standard deviation).", scatter), by="")
 
 
-def _unexplained(result: Calibration) -> Iterator[str]:
+def _unexplained(result: Calibration) -> Iterator[Sentence]:
     model = f"the {result.timing_model} timing model"
-    halves = [(fit.unexplained_us, fit) for fit in result.payloads if fit.unexplained_us is not None]
+    halves = [(fit.unexplained_us, at) for at, fit in enumerate(result.payloads) if fit.unexplained_us is not None]
     if halves:
         mean_us = sum(value for value, _ in halves) / len(halves)
-        value, fit = max(halves, key=lambda pair: abs(pair[0]))
-        share = value / (fit.request_and_acknowledge_us or 1)
-        yield (
-            f"Left unexplained by {model}: {us(mean_us)} us of T1+T2 on average, {us(value)} us at most "
-            f"({share:.0%} of the measured, at {fit.payload_bytes} bytes)."
+        worst_us, number = max(halves, key=lambda pair: abs(pair[0]))
+        fit, at = result.payloads[number], f"/payloads/{number}"
+        share = worst_us / (fit.request_and_acknowledge_us or 1)
+        yield sentence(
+            f"Left unexplained by {model}: {{}} of T1+T2 on average, {{}} at most ({{}} of the measured, at {{}}).",
+            _time(mean_us, "unexplained_us"),
+            _time(worst_us, "unexplained_us", at=f"{at}/unexplained_us"),
+            Value(share, "", "%", 0, fixed=True),
+            Value(fit.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
         )
-    kinds = [fit.read_less_write_us for fit in result.payloads if fit.read_less_write_us is not None]
+    kinds = [abs(fit.read_less_write_us) for fit in result.payloads if fit.read_less_write_us is not None]
     if kinds:
-        worst_us = max(map(abs, kinds))
-        yield f"Left unexplained by {model}: T_exec of reads and of writes, which differ by up to {us(worst_us)} us."
+        yield sentence(
+            f"Left unexplained by {model}: T_exec of reads and of writes, which differ by up to {{}}.",
+            _time(max(kinds), "read_less_write_us"),
+        )
 
 
 def calibration_warnings(result: Calibration) -> list[str]:
     """What to look at before these figures are used."""
-    found = []
+    return list(map(sentence_text, _warnings(result)))
+
+
+def _warnings(result: Calibration) -> Iterator[Sentence]:
     if result.outliers:
-        lines = ", ".join(str(one.line) for one in result.outliers[:_MOST_LINES])
-        more = len(result.outliers) - _MOST_LINES
-        effect = "no pull on the robust fit" if result.robust else "with a pull on this fit: see --robust"
-        found.append(
-            f"{plural(len(result.outliers), 'outlier')}, more than {OUTLIER_DEVIATIONS:g} robust standard deviations "
-            f"off: line {lines}{f' and {more} more' if more > 0 else ''}; {effect}."
-        )
+        yield _outliers(result)
     execution, payload = result.execution, result.profile.payload
     if isinstance(execution, TableExecution):
         outside = [size for size in (payload.read_bytes, payload.write_bytes) if not execution.covers(size)]
-        found += [
-            f"the profile's payload of {size} bytes is outside the table, {execution.range_bytes}: measure it, or use "
-            "--form linear."
-            for size in dict.fromkeys(outside)
-        ]
+        for size in dict.fromkeys(outside):
+            yield sentence(
+                f"the profile's payload of {{}} is outside the table, {execution.range_bytes}: measure it, or use "
+                "--form linear.",
+                Value(size, "payload_bytes", "bytes"),
+            )
     longest_us = max(fit.execution_us for fit in result.payloads)
     if longest_us > _LONG_EXECUTION_US:
-        found.append(f"an execution time of {longest_us:.0f} us is long for a motion node: is latency_us in us?")
-    return found
+        yield sentence(
+            "an execution time of {} is long for a motion node: is latency_us in us?",
+            Value(longest_us, "execution_us", "us", 0),
+        )
 
 
-def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> list[Line]:
-    def cell(value: float | None) -> str:
-        # Three decimals for all: what is less is the rounding of the result.
-        return "" if value is None else f"{round(value, 3) + 0:.3f}"
-
-    headings = [
-        "payload\nbytes",
-        "n",
-        "T_lant\nus",
-        "packets\nus",
-        "T_exec\nus",
-        "std dev\nus",
-        "fitted\nus",
-        "residual\nus",
-    ]
-    keys = ["latency_us", "packets_us", "execution_us", "deviation_us", "fitted_us", "residual_us"]
-    if measured:
-        headings += ["T1+T2\nmeasured", "T1+T2\nmodel", "un-\nexplained"]
-        keys += ["request_and_acknowledge_us", "model_request_and_acknowledge_us", "unexplained_us"]
-    rows = (
-        [str(fit.payload_bytes), str(fit.measurements), *(cell(getattr(fit, key)) for key in keys)] for fit in payloads
+def _outliers(result: Calibration) -> Sentence:
+    number = len(result.outliers)
+    shown = result.outliers[:_MOST_LINES]
+    lines = [sentence("{}", count_value(one.line, "line", at=f"/outliers/{at}/line")) for at, one in enumerate(shown)]
+    said = joined(
+        sentence(
+            f"{{}} {nouns(number, 'outlier')}, more than {{}} robust standard deviations off: line ",
+            count_value(number),
+            count_value(OUTLIER_DEVIATIONS),
+        ),
+        joined(*lines, by=", "),
+        by="",
     )
-    return table(headings, rows, left=0)
+    if number > _MOST_LINES:
+        said = joined(said, sentence("and {} more", count_value(number - _MOST_LINES)))
+    effect = "no pull on the robust fit" if result.robust else "with a pull on this fit: see --robust"
+    return joined(said, sentence(f"; {effect}."), by="")
 
 
-def calibration_rows(result: Calibration) -> list[Row]:
+def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
+    shown = {**_COLUMNS, **(_MEASURED_COLUMNS if measured else {})}
+    rows = (
+        Row(tuple(_cell(getattr(fit, key), key, f"/payloads/{number}/{key}") for key in shown))
+        for number, fit in enumerate(payloads)
+    )
+    return Table(tuple(shown.values()), tuple(rows))
+
+
+def _cell(value: float | None, key: str, at: str) -> Cell:
+    """Three decimals for all times: what is less is the rounding of the result."""
+    if value is None:
+        return ""
+    return _time(value, key, at=at)._replace(fixed=True) if key.endswith("_us") else count_value(value, key, at=at)
+
+
+def calibration_records(result: Calibration) -> list[Record]:
     """One row a payload."""
     return [fit._asdict() for fit in result.payloads]
 
 
 def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> Document:
-    """Answer of `busplan calibrate`."""
+    """Document of `busplan calibrate --format json`."""
     bus, cycle = bus_of(result.profile), cycle_of(result.profile, model=result.timing_model)
     figures = cycle.figures()
     return document(
@@ -188,7 +281,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         rms_residual_us=result.rms_residual_us,
         largest_residual=result.largest._asdict(),
         outliers=[one._asdict() for one in result.outliers],
-        payloads=calibration_rows(result),
+        payloads=calibration_records(result),
         warnings=calibration_warnings(result),
         applied_to=applied_to,
     )

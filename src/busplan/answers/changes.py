@@ -1,16 +1,16 @@
 """Keys whose values differ between two profiles: what they are, shown so that the difference is seen."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import takewhile
 from operator import eq
 from typing import Any, Final
 
 from busplan.analysis.comparison.difference import KeyDifference
+from busplan.forms.blocks import Code, Column, Document, Row, Table
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
-CHANGE_HEADINGS: Final = ("key", "A", "B")
-
+_COLUMNS: Final = tuple(Column(heading, kind="words") for heading in ("key", "A", "B"))
 _MOST_ITEMS: Final = 8
 """Longest list that is shown in full."""
 _MOST_CHARACTERS: Final = 40
@@ -19,13 +19,13 @@ _CONTEXT: Final = 8
 """Characters that are shown in front of the first that differs."""
 
 
-def change_rows(keys: Iterable[KeyDifference]) -> Iterator[tuple[str, str, str]]:
+def change_table(keys: Iterable[KeyDifference]) -> Table:
     """One row a key: its values, and where they come from when that is not the file."""
-    for one in keys:
-        yield one.key, change_cell(one.a, one.b), change_cell(one.b, one.a)
+    rows = ((one.key, _written(one.a, one.b), _written(one.b, one.a)) for one in keys)
+    return Table(_COLUMNS, tuple(Row(tuple(map(Code, row))) for row in rows))
 
 
-def change_cell(value: KeyValue | None, other: KeyValue | None) -> str:
+def _written(value: KeyValue | None, other: KeyValue | None) -> str:
     """Write one side of a difference; the other side tells which part of a long value matters."""
     if value is None:
         return "-"
@@ -85,7 +85,7 @@ def _text(text: str, other: str) -> str:
     return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
 
 
-def change_document(one: KeyDifference) -> dict[str, Any]:
+def change_document(one: KeyDifference) -> Document:
     """Write a difference as plain data: both values in full."""
     return {
         "key": one.key,

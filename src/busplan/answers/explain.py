@@ -1,29 +1,113 @@
-"""`busplan explain` as text, as Markdown and as plain data."""
+"""Answer of `busplan explain`: the way to a figure, or what all figures of a profile rest on."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, Final
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
 from busplan.analysis.derivation.formulas import formula_of
-from busplan.analysis.derivation.trace import Input, short
+from busplan.analysis.derivation.trace import DIGITS, Input, short
 from busplan.analysis.network import bus_of
 from busplan.analysis.register import Command, figures_of
-from busplan.answers.documents import Document, Row, capacity_document, document
-from busplan.answers.verdict_sentences import period
+from busplan.answers.capacity import capacity_document
+from busplan.answers.documents import document, with_profile
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
-from busplan.forms import markdown
-from busplan.forms.lines import BLANK, Line, table
+from busplan.forms import blocks
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Code,
+    Column,
+    Document,
+    Part,
+    Record,
+    Report,
+    Row,
+    Section,
+    Sentence,
+    Steps,
+    Table,
+    Value,
+    Words,
+    joined,
+)
+from busplan.forms.numbers import period_value, written
+from busplan.printable import json_text
 from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 
-_INPUT_HEADINGS: Final = ("symbol", "name", "value", "unit", "grade", "source")
-_FIGURE_HEADINGS: Final = ("command", "figure", "eq", "unit", "what it is")
+_NONE: Final = Words("none")
+_SYMBOL: Final = Column("symbol", kind="words")
+_NAME: Final = Column("name", kind="words")
+_MEANING: Final = Column("meaning", kind="words")
+_KNOWN: Final = (
+    Column("value"),
+    Column("unit", kind="words"),
+    Column("grade", kind="words"),
+    Column("source", kind="words"),
+)
+"""Columns that say how well an input is known."""
+_FIGURES: Final = tuple(Column(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is"))
 
 
-def figure_rows(bus: Bus) -> list[Row]:
+def explain_report(explanation: Explanation) -> Report:
+    """Answer the question of `explain PROFILE FIGURE`: a section for each derivation.
+
+    Parameters
+    ----------
+    explanation
+        The derivations.
+    """
+    found = _in_words(explanation)
+    name = found.profile.name
+    return Report(
+        Sentence(("Where ", Code(found.derivations[0].figure.key), " of ", Code(name), " comes from")),
+        lambda: [_section(one, name, f"/derivations/{at}") for at, one in enumerate(found.derivations)],
+        partial(_explain_document, found),
+        lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
+    )
+
+
+def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
+    """Answer the question of `explain PROFILE`: what its figures rest on, and all that can be explained.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    assumptions
+        What its figures rest on.
+    """
+    caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
+    return Report(
+        Sentence(("The figures of ", Code(profile.name))),
+        lambda: (
+            assumptions_table(assumptions)._replace(caption=caption),
+            _figure_table(bus_of(profile)),
+        ),
+        partial(assumptions_document, profile, assumptions),
+        lambda: figure_rows(bus_of(profile)),
+    )
+
+
+def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions") -> Table:
+    """What figures rest on, one row each.
+
+    Parameters
+    ----------
+    assumptions
+        The inputs.
+    at
+        Place of their list in the JSON document.
+    """
+    rows = (Row((*_known(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
+    return Table((_NAME, *_KNOWN, _MEANING), tuple(rows), stacks=True)
+
+
+def figure_rows(bus: Bus) -> list[Record]:
     """One row a figure that can be explained."""
     return [
         {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
@@ -32,7 +116,7 @@ def figure_rows(bus: Bus) -> list[Row]:
     ]
 
 
-def equation_rows() -> list[Row]:
+def equation_rows() -> list[Record]:
     """One row an equation: its numbers, formula, function and source."""
     return [
         {
@@ -45,7 +129,7 @@ def equation_rows() -> list[Row]:
     ]
 
 
-def constant_rows(bus: Bus) -> list[Row]:
+def constant_rows(bus: Bus) -> list[Record]:
     """One row a constant: its value, unit, grade and source."""
     return [
         {"name": name, "value": float(one), "unit": one.unit}
@@ -54,8 +138,8 @@ def constant_rows(bus: Bus) -> list[Row]:
     ]
 
 
-def figure_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
-    """Answer of `busplan explain PROFILE` as JSON: what the profile's figures rest on, and the whole registry."""
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
+    """Document of `busplan explain PROFILE --format json`: what the figures rest on, and the whole registry."""
     return document(
         "explain",
         profile=profile.name,
@@ -66,39 +150,7 @@ def figure_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
     )
 
 
-def figure_lines(profile: Profile, assumptions: Sequence[Input]) -> list[Line]:
-    """Answer of `busplan explain PROFILE` for people: what its figures rest on, and all that can be explained."""
-    rows = ([command, one.key, one.reference, one.unit, one.meaning] for command, one in _all_figures(bus_of(profile)))
-    return [
-        Line(f"What the figures of {profile.name} rest on, the least well known first", "heading"),
-        *table(_INPUT_HEADINGS[1:], (_row(one)[1:] for one in assumptions), left=5),
-        BLANK,
-        Line("Figures to explain", "heading"),
-        *table(_FIGURE_HEADINGS, rows, left=5),
-    ]
-
-
-def figure_markdown(profile: Profile, assumptions: Sequence[Input]) -> str:
-    """Answer of `busplan explain PROFILE` as Markdown."""
-    rows = (
-        [command, markdown.code(one.key), one.reference, one.unit, markdown.escaped(one.meaning)]
-        for command, one in _all_figures(bus_of(profile))
-    )
-    inputs = ((markdown.code(name), *map(markdown.escaped, others)) for _, name, *others in map(_row, assumptions))
-    return _text(
-        [
-            f"What the figures of {markdown.code(profile.name)} rest on, the least well known first:",
-            "",
-            *markdown.table(_INPUT_HEADINGS[1:], inputs, left=5),
-            "",
-            "Figures to explain:",
-            "",
-            *markdown.table(_FIGURE_HEADINGS, rows, left=5),
-        ]
-    )
-
-
-def in_words(explanation: Explanation) -> Explanation:
+def _in_words(explanation: Explanation) -> Explanation:
     """Put the verdict's sentences, and its change as the document has it, where the figures behind them are derived."""
     return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
 
@@ -112,55 +164,12 @@ def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
     return one._replace(value=value, steps=(*before, last._replace(value=value)))
 
 
-def explain_document(explanation: Explanation) -> Document:
-    """Answer of `busplan explain PROFILE FIGURE` as JSON."""
+def _explain_document(explanation: Explanation) -> Document:
     return document(
         "explain",
         profile=explanation.profile.name,
         derivations=[_derivation(one) for one in explanation.derivations],
     )
-
-
-def explain_lines(explanation: Explanation) -> list[Line]:
-    """Answer of `busplan explain PROFILE FIGURE` for people."""
-    lines: list[Line] = []
-    for one in explanation.derivations:
-        if lines:
-            lines.append(BLANK)
-        headline = _headline(one, explanation.profile.name)
-        lines.append(Line(f"{headline}: {_result(one.value, one.figure.unit)}", "heading"))
-        lines.append(Line(_about(one.figure)))
-        for number, step in enumerate(one.steps, start=1):
-            lines.extend(_step(number, step))
-        lines.extend((BLANK, *_inputs(one)))
-    return lines
-
-
-def explain_markdown(explanation: Explanation) -> str:
-    """Answer of `busplan explain PROFILE FIGURE` as Markdown."""
-    lines: list[str] = []
-    for one in explanation.derivations:
-        headline = _headline(one, markdown.code(explanation.profile.name), figure=markdown.code(one.figure.key))
-        result = markdown.escaped(_result(one.value, one.figure.unit))
-        lines += [f"### {headline}: {result}", "", markdown.escaped(_about(one.figure)), ""]
-        steps = (
-            [
-                str(number),
-                step.reference,
-                markdown.code(f"{step.symbol} = {step.formula}"),
-                markdown.code(step.numbers),
-                markdown.escaped(_result(step.value, step.unit)),
-            ]
-            for number, step in enumerate(one.steps, start=1)
-        )
-        lines += [*markdown.table(["step", "eq", "formula", "numbers", "result"], steps, left=4), ""]
-        cells = ([markdown.code(cell) for cell in row[:2]] + list(map(markdown.escaped, row[2:])) for row in _rows(one))
-        lines += [_weakest(one), "", *markdown.table(_INPUT_HEADINGS, cells, left=6), ""]
-    return _text(lines[:-1])
-
-
-def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
-    yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())
 
 
 def _derivation(one: Derivation) -> Document:
@@ -181,55 +190,94 @@ def _derivation(one: Derivation) -> Document:
     }
 
 
-def _headline(one: Derivation, profile: str, *, figure: str | None = None) -> str:
+def _step_records(one: Derivation) -> Iterator[Record]:
+    """One row a step; a figure that is an input itself has one row, without a formula."""
+    figure = one.figure
+    itself = Step(figure.key, figure.symbol, figure.reference, "", "", one.value, figure.unit)
+    for number, step in enumerate(one.steps or (itself,), start=1):
+        yield {
+            "command": one.command,
+            "figure": figure.key,
+            "timing_model": one.timing_model,
+            "transaction": one.transaction,
+            "period_us": one.period_us,
+            "step": number,
+            "reference": step.reference,
+            "symbol": step.symbol,
+            "formula": step.formula,
+            "numbers": step.numbers,
+            "value": json_text(step.value) if _has_names(step.value) else step.value,
+            "unit": step.unit,
+        }
+
+
+def _section(one: Derivation, profile: str, at: str) -> Section:
+    """The result, what it is, every step to it, and what they start from."""
+    figure = one.figure
     kind = f"{one.transaction}, " if one.transaction else ""
-    return f"{figure or one.figure.key} of {profile} at {period(one.period_us)}, {kind}{one.timing_model} model"
+    title = Sentence(
+        (
+            *(Code(figure.key), " of ", Code(profile), " at ", period_value(one.period_us, at=f"{at}/period_us")),
+            *(f", {kind}{one.timing_model} model: ", *_result_parts(one, at)),
+        )
+    )
+    about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
+    steps = Steps(tuple(_step(step, f"{at}/steps/{number}") for number, step in enumerate(one.steps)))
+    found: tuple[Block, ...] = (about, steps, _inputs(one, f"{at}/inputs"))
+    return Section(title, found)
 
 
-def _about(figure: Figure) -> str:
-    return f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}."
+def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
+    """The result in a sentence: one figure, or what a change sets."""
+    if isinstance(one.value, dict):
+        settings = (
+            Sentence((Code(key), " = ", Value(new, key, at=f"{at}/value/changes/{key}")))
+            for key, new in one.value["changes"].items()
+        )
+        return joined(*settings, by=", ").parts
+    found = _result(one.value, one.figure.key, one.figure.unit, at=f"{at}/value")
+    return (found if isinstance(found, Value) else found.text,)
 
 
-def _result(value: Any, unit: str) -> str:
-    if isinstance(value, list):
-        return ", ".join(map(_item, value)) or "none"
+def _result(value: Any, key: str, unit: str, *, at: str) -> Value | Words:
+    if value is None or value == []:
+        return _NONE
     if isinstance(value, dict):
-        return ", ".join(f"{key} = {new}" for key, new in value["changes"].items())
-    return f"{short(value)} {unit}".rstrip() if value is not None else "none"
+        return Words(", ".join(f"{changed} = {new}" for changed, new in value["changes"].items()))
+    if _has_names(value):
+        return Words(", ".join(str(one.get("name", one.get("source"))) for one in value))
+    return Value(value, key, unit, digits=DIGITS, at=at)
 
 
-def _item(value: Any) -> str:
-    """One of a list: a number or a word, or what has a name itself."""
-    return str(value.get("name", value.get("source"))) if isinstance(value, dict) else short(value)
+def _has_names(value: object) -> bool:
+    """Whether it is made of parts with names of their own."""
+    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
 
 
-def _step(number: int, step: Step) -> Iterator[Line]:
-    """A line in symbols, one in numbers and the result, each where it says more than the one before."""
-    head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
+def _step(step: Step, at: str) -> blocks.Step:
+    """A line in symbols, and one in numbers where it says more than the one before or after it."""
+    result = _result(step.value, step.key, step.unit, at=f"{at}/value")
+    said = written(result) if isinstance(result, Value) else result.text
     formula = "" if step.formula == step.symbol else step.formula
-    numbers = "" if step.numbers in (formula, short(step.value)) else step.numbers
-    distinct = [text for text in (formula, numbers, _result(step.value, step.unit)) if text]
-    yield BLANK
-    for at, text in enumerate(distinct):
-        yield Line(f"{head if at == 0 else ' ' * len(head)}= {text}", "table")
+    numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
+    return blocks.Step(step.reference, step.symbol, formula, numbers, result)
 
 
-def _rows(one: Derivation) -> Iterator[Sequence[str]]:
-    yield from map(_row, one.inputs)
+def _inputs(one: Derivation, at: str) -> Table:
+    rows = (Row((Code(given.symbol), *_known(given, f"{at}/{number}"))) for number, given in enumerate(one.inputs))
+    caption = Sentence((f"It starts from these; the least well known is {one.weakest_grade}.",))
+    return Table((_SYMBOL, _NAME, *_KNOWN), tuple(rows), caption, stacks=True)
 
 
-def _row(given: Input) -> Sequence[str]:
-    value = ", ".join(map(short, given.value)) if isinstance(given.value, (list, tuple)) else short(given.value)
-    return given.symbol, given.name, value, given.unit, given.grade, given.source
+def _known(one: Input, at: str) -> tuple[Cell, ...]:
+    value = Value(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
+    return Code(one.name), value, one.unit, one.grade, one.source
 
 
-def _inputs(one: Derivation) -> list[Line]:
-    return [Line(_weakest(one), "heading"), *table(_INPUT_HEADINGS, _rows(one), left=6)]
+def _figure_table(bus: Bus) -> Table:
+    rows = (Row((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in _all_figures(bus))
+    return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
 
 
-def _weakest(one: Derivation) -> str:
-    return f"It starts from these; the least well known is {one.weakest_grade}."
-
-
-def _text(lines: Sequence[str]) -> str:
-    return "".join(f"{line}\n" for line in lines)
+def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
+    yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())

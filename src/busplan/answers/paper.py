@@ -1,43 +1,108 @@
-"""`busplan paper` for people."""
+"""Answer of `busplan paper`."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
 
+from busplan.answers.documents import document
 from busplan.buses.published import Comparison, PaperSection
-from busplan.forms.lines import BLANK, Line, table
+from busplan.forms.blocks import Cell, Column, Document, Record, Report, Row, Section, Sentence, Table, Value
+
+_DIGITS: Final = 5
+"""Significant digits of a published figure, and of a quotient of two."""
+_DECIMALS: Final = {"mm": 6, "1": 4}
+"""Contour errors are micrometres: they need more decimals than microseconds do."""
+_MICROSECOND_DECIMALS: Final = 3
+_RESIDUAL_DECIMALS: Final = 4
+
+_Numbered = tuple[int, Comparison]
+"""A comparison with its number among all figures of the document."""
 
 
-def paper_lines(sections: Sequence[PaperSection]) -> list[Line]:
-    """One table a section: published figures down, the ways to compute them across."""
-    lines: list[Line] = []
-    for section in sections:
-        lines.extend((Line(section.title, "heading"), Line(section.note), *_table(section), BLANK))
-    return lines[:-1]
+def paper_report(sections: Sequence[PaperSection]) -> Report:
+    """Answer the question of `paper`: published figures down, the ways to compute them across.
 
-
-def _table(section: PaperSection) -> list[Line]:
-    methods = list(dict.fromkeys(one.method for one in section.comparisons))
-    rows: dict[str, dict[str, Comparison]] = {}
-    for one in section.comparisons:
-        rows.setdefault(one.quantity, {})[one.method] = one
-    return table(
-        ["figure", "unit", "published", *(heading for method in methods for heading in (method, "residual", "%"))],
-        (_row(quantity, by_method, methods) for quantity, by_method in rows.items()),
-        left=2,
+    Parameters
+    ----------
+    sections
+        The published tables and passages.
+    """
+    return Report(
+        Sentence(("Published figures beside computed ones",)),
+        lambda: tuple(_sections(sections)),
+        partial(paper_document, sections),
+        lambda: paper_records(sections),
     )
 
 
-def _row(quantity: str, by_method: dict[str, Comparison], methods: Sequence[str]) -> list[str]:
-    first = next(iter(by_method.values()))
-    published = "-" if first.published is None else f"{first.published:.5g}"
-    return [quantity, first.unit, published, *(cell for method in methods for cell in _compared(by_method.get(method)))]
+def paper_records(sections: Sequence[PaperSection]) -> list[Record]:
+    """One row a published figure and way to compute it."""
+    return [
+        {
+            **comparison._asdict(),
+            "residual": comparison.residual,
+            "relative_residual": comparison.relative_residual,
+        }
+        for section in sections
+        for comparison in section.comparisons
+    ]
 
 
-def _compared(one: Comparison | None) -> tuple[str, str, str]:
-    if one is None:
+def paper_document(sections: Sequence[PaperSection]) -> Document:
+    """Document of `busplan paper --format json`."""
+    return document(
+        "paper",
+        notes={section.title: section.note for section in sections},
+        figures=paper_records(sections),
+    )
+
+
+def _sections(sections: Sequence[PaperSection]) -> Iterator[Section]:
+    start = 0
+    for section in sections:
+        numbered = list(enumerate(section.comparisons, start=start))
+        yield Section(Sentence((section.title,)), (Sentence((section.note,)), _table(numbered)))
+        start += len(numbered)
+
+
+def _table(comparisons: Sequence[_Numbered]) -> Table:
+    methods = list(dict.fromkeys(one.method for _, one in comparisons))
+    rows: dict[str, dict[str, _Numbered]] = {}
+    for at, one in comparisons:
+        rows.setdefault(one.quantity, {})[one.method] = at, one
+    columns = (
+        *(Column("figure", kind="words"), Column("unit", kind="words"), Column("published")),
+        *(column for method in methods for column in (Column(method), Column("residual"), Column("", "%"))),
+    )
+    return Table(columns, tuple(_row(by_method, methods) for by_method in rows.values()))
+
+
+def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> Row:
+    at, first = next(iter(by_method.values()))
+    published = Value(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
+    compared = (cell for method in methods for cell in _compared(by_method.get(method)))
+    return Row((first.quantity, first.unit, published, *compared))
+
+
+def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:
+    if numbered is None:
         return "", "", ""
-    # Contour errors are micrometres: they need more digits than microseconds do.
-    digits = {"mm": 6, "1": 4}.get(one.unit, 3)
-    computed = f"{one.computed:.{digits}f}"
-    if one.residual is None or one.relative_residual is None:
-        return computed, "-", "-"
-    return computed, f"{one.residual:+.{max(digits, 4)}f}", f"{one.relative_residual * 100:+.1f}"
+    at, one = numbered
+    decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
+    place = f"/figures/{at}"
+    # What the decimals do not show is the rounding of the printed figure.
+    return (
+        Value(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
+        Value(
+            one.residual,
+            "residual",
+            one.unit,
+            max(decimals, _RESIDUAL_DECIMALS),
+            signed=True,
+            at=f"{place}/residual",
+            fixed=True,
+        ),
+        Value(
+            one.relative_residual, "relative_residual", "%", 1, signed=True, at=f"{place}/relative_residual", fixed=True
+        ),
+    )

@@ -1,16 +1,46 @@
-"""`busplan profiles` for people."""
+"""Answer of `busplan profiles`."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from busplan.answers.verdict_sentences import period
-from busplan.forms.lines import BLANK, Line, plural
+from busplan.answers.documents import document
+from busplan.forms.blocks import Code, Record, Report, Section, Sentence, count_value, sentence
+from busplan.forms.numbers import nouns, period_value
+from busplan.sections.profile import Profile
 
 
-def profiles_lines(rows: Sequence[Mapping[str, Any]]) -> list[Line]:
-    """Name, key figures and description of each profile."""
-    lines: list[Line] = []
-    for row in rows:
-        figures = f"{plural(row['nodes'], 'node')} at {period(row['period_us'])}, {row['timing_model']} model decides"
-        lines.extend((Line(f"{row['name']}: {figures}", "heading"), Line(row["description"]), BLANK))
-    return lines[:-1]
+def profiles_report(profiles: Sequence[Profile]) -> Report:
+    """Answer the question of `profiles`: what every command takes by name.
+
+    Parameters
+    ----------
+    profiles
+        The shipped profiles.
+    """
+    records = [_record(profile) for profile in profiles]
+    return Report(
+        Sentence(("Shipped profiles",)),
+        lambda: [_section(record, f"/profiles/{at}") for at, record in enumerate(records)],
+        lambda: document("profiles", profiles=records),
+        lambda: records,
+    )
+
+
+def _record(profile: Profile) -> Record:
+    """What it is called and what it stands for."""
+    return {
+        "name": profile.name,
+        "nodes": profile.bus.nodes,
+        "period_us": profile.cycle.period_us,
+        "timing_model": profile.bus.timing_model,
+        "description": " ".join(profile.description.split()),
+    }
+
+
+def _section(record: Record, at: str) -> Section:
+    title = sentence(
+        f"{{}}: {{}} {nouns(record['nodes'], 'node')} at {{}}, {record['timing_model']} model decides",
+        Code(record["name"]),
+        count_value(record["nodes"], "nodes", at=f"{at}/nodes"),
+        period_value(record["period_us"], at=f"{at}/period_us"),
+    )
+    return Section(title, (Sentence((record["description"],)),))

@@ -1,18 +1,80 @@
-"""`busplan rule`: the rules of the gate as data and as text."""
+"""Answer of `busplan rule`: the rules of the gate."""
 
-import textwrap
-from collections.abc import Sequence
-from typing import Any, Final
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
 
+from busplan.answers.documents import document
 from busplan.buses.rule import Rule
-from busplan.forms.lines import plain_text, table
+from busplan.forms.blocks import (
+    Block,
+    Code,
+    Column,
+    Document,
+    Record,
+    Report,
+    Row,
+    Sentence,
+    Snippet,
+    Table,
+)
 from busplan.rules.registry import NEVER_SUPPRESSED
 
-_WIDTH: Final = 88
+_COLUMNS: Final = tuple(Column(heading, kind="words") for heading in ("code", "rule", "severity", "what is wrong"))
 
 
-def rule_rows(rules: Sequence[Rule]) -> list[dict[str, Any]]:
-    """Rules as data."""
+def rules_report(rules: Sequence[Rule]) -> Report:
+    """Answer the question of `rule`: one line a rule.
+
+    Parameters
+    ----------
+    rules
+        The rules.
+    """
+    return Report(
+        Sentence(("Rules of the gate",)),
+        lambda: (_table(rules),),
+        partial(_document, rules),
+        lambda: _records(rules),
+    )
+
+
+def rule_report(rule: Rule) -> Report:
+    """Answer the question of `rule CODE`: all that is to say of one rule.
+
+    Parameters
+    ----------
+    rule
+        The rule.
+    """
+    return Report(
+        Sentence((Code(rule.code), f" {rule.name}")),
+        lambda: tuple(_blocks(rule)),
+        partial(_document, [rule]),
+        lambda: _records([rule]),
+    )
+
+
+def _table(rules: Sequence[Rule]) -> Table:
+    rows = (Row((Code(rule.code), rule.name, rule.severity, rule.summary)) for rule in rules)
+    return Table(_COLUMNS, tuple(rows))
+
+
+def _blocks(rule: Rule) -> Iterator[Block]:
+    yield Sentence((Code(rule.code), f" {rule.name} ({rule.severity}): {rule.summary}"))
+    yield Sentence((rule.explanation,))
+    if rule.code in NEVER_SUPPRESSED:
+        yield Sentence(("It cannot be suppressed.",))
+    else:
+        yield Sentence(("Suppress it with a reason, on its line or alone on the line above:",))
+        yield Snippet((f"# busplan: ignore[{rule.code}] reason",))
+
+
+def _document(rules: Sequence[Rule]) -> Document:
+    return document("rule", rules=_records(rules))
+
+
+def _records(rules: Sequence[Rule]) -> list[Record]:
     return [
         {
             "code": rule.code,
@@ -23,21 +85,3 @@ def rule_rows(rules: Sequence[Rule]) -> list[dict[str, Any]]:
         }
         for rule in rules
     ]
-
-
-def rule_table(rules: Sequence[Rule]) -> str:
-    """One line a rule."""
-    rows = ([rule.code, rule.name, rule.severity, rule.summary] for rule in rules)
-    return plain_text(table(["code", "rule", "severity", "what is wrong"], rows, left=4))
-
-
-def rule_page(rule: Rule) -> str:
-    """All that is to say of one rule."""
-    explanation = textwrap.fill(rule.explanation, _WIDTH)
-    suppression = (
-        "It cannot be suppressed."
-        if rule.code in NEVER_SUPPRESSED
-        else "Suppress it with a reason, on its line or alone on the line above:\n\n"
-        f"  # busplan: ignore[{rule.code}] reason"
-    )
-    return f"{rule.code} {rule.name} ({rule.severity}): {rule.summary}\n\n{explanation}\n\n{suppression}\n"

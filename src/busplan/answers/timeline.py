@@ -1,13 +1,158 @@
-"""A timeline as plain data: what `--format json` and `--format csv` write."""
+"""Answer of `busplan timeline`."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Final
 
 from busplan.analysis.network import bus_of
-from busplan.analysis.timeline.schedule import Schedule, totals
-from busplan.answers.documents import Document, Row, document, safety_row
-from busplan.answers.verdict_sentences import warnings
+from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, Total, totals
+from busplan.answers.capacity import safety_record
+from busplan.answers.documents import document
+from busplan.answers.verdict import story, warnings
+from busplan.drawings.timeline.drawing import TimelineDrawing
 from busplan.drawings.timeline.kinds import kind_of
+from busplan.drawings.timeline.lanes import charged, drawn_window, overruns
+from busplan.forms.blocks import (
+    Block,
+    Chart,
+    Code,
+    Column,
+    Document,
+    Record,
+    Report,
+    Row,
+    Sentence,
+    Swatch,
+    Table,
+    Value,
+    figure_value,
+    joined,
+    sentence,
+    state_of,
+    with_values,
+)
+from busplan.forms.numbers import period_value
+from busplan.forms.terminal import sentence_text
+
+_TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
 
-def event_rows(plan: Schedule) -> list[Row]:
+def timeline_report(plan: Schedule) -> Report:
+    """Answer the question of `timeline`."""
+    return Report(
+        Sentence(("Timeline of ", Code(plan.profile.name))),
+        lambda: tuple(_blocks(plan)),
+        partial(timeline_document, plan),
+        partial(timeline_records, plan),
+    )
+
+
+def _blocks(plan: Schedule) -> Iterator[Block]:
+    """Whether the cycle fits, the cycle to scale, and what each kind of event takes of it."""
+    yield headline(plan)
+    yield from (Sentence((words,), "warns") for words in _warnings(plan))
+    yield timeline_chart(plan)
+    yield totals_table(plan)
+
+
+def headline(plan: Schedule) -> Sentence:
+    """Say whether the cycle fits, and under which model."""
+    figures = plan.figures
+    parts = (
+        *(plan.profile.name, " at ", period_value(figures.period_us), ": "),
+        *story(figures, plan.profile),
+        f" ({figures.timing_model} model).",
+    )
+    return _placed(Sentence(parts, state_of(figures.fits and figures.safe)), plan)
+
+
+def timeline_chart(plan: Schedule) -> Chart:
+    """The cycle to scale.
+
+    Parameters
+    ----------
+    plan
+        The schedule, narrowed to its window.
+    """
+    subject = Sentence((f"One communication cycle by the {plan.figures.timing_model} model, ",))
+    caption = joined(subject, charged(drawn_window(plan)), Sentence((".",)), by="")
+    return Chart(TimelineDrawing(plan, title=sentence_text(headline(plan))), _placed(caption, plan))
+
+
+def totals_table(plan: Schedule) -> Table:
+    """What each kind of event takes of the window.
+
+    Parameters
+    ----------
+    plan
+        The schedule, narrowed to its window.
+    """
+    whole = "the cycle" if overruns(plan) else "the slice"
+    part = whole if plan.is_whole else "the window"
+    return Table(
+        (
+            *(Column("kind", kind="words"), Column("eq", kind="words")),
+            *(Column(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
+        ),
+        tuple(_total_row(plan, number, one) for number, one in enumerate(totals(plan))),
+        sentence(f"What takes {part}, {{}}", Value(plan.to_us - plan.from_us, "duration_us", "us", 3)),
+    )
+
+
+def _total_row(plan: Schedule, number: int, one: Total) -> Row:
+    kind = kind_of(plan.profile, one.kind)
+    values = (
+        figure_value(figure, getattr(one, figure.key), at=f"/totals/{number}/{figure.key}") for figure in _TOTAL_FIGURES
+    )
+    return Row((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
+
+
+def _placed(one: Sentence, plan: Schedule) -> Sentence:
+    """Give each figure its place in the document, where it stands there as it is."""
+    facts = _facts(plan)
+    return with_values(
+        one, lambda value: value._replace(at=f"/{value.key}") if facts.get(value.key) == value.value else value
+    )
+
+
+def _warnings(plan: Schedule) -> list[str]:
+    return warnings(plan.profile, nodes=plan.figures.nodes, most=0)
+
+
+def _facts(plan: Schedule) -> Document:
+    """What the document says of the whole cycle, and the window."""
+    figures = plan.figures
+    return document(
+        "timeline",
+        profile=plan.profile.name,
+        timing_model=figures.timing_model,
+        period_us=figures.period_us,
+        nodes=figures.nodes,
+        **{key: getattr(figures, key) for key in bus_of(plan.profile).facts},
+        required_us=figures.required_us,
+        available_us=figures.available_us,
+        margin_us=figures.margin_us,
+        exceeded=list(figures.exceeded),
+        fits=figures.fits,
+        **safety_record(figures, plan.profile),
+        warnings=_warnings(plan),
+        from_us=plan.from_us,
+        to_us=plan.to_us,
+    )
+
+
+def timeline_document(plan: Schedule) -> Document:
+    """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
+    return {**_facts(plan), "events": _event_records(plan), "totals": [one._asdict() for one in totals(plan)]}
+
+
+def timeline_records(plan: Schedule) -> list[Record]:
+    """Rows for CSV, one an event: profile and model in front."""
+    head = {"profile": plan.profile.name, "timing_model": plan.figures.timing_model}
+    return [{**head, **record} for record in _event_records(plan)]
+
+
+def _event_records(plan: Schedule) -> list[Record]:
     """One row an event of the window."""
     return [
         {
@@ -22,33 +167,3 @@ def event_rows(plan: Schedule) -> list[Row]:
         }
         for event in plan.events
     ]
-
-
-def timeline_rows(plan: Schedule) -> list[Row]:
-    """Rows for CSV: profile and model in front."""
-    head = {"profile": plan.profile.name, "timing_model": plan.figures.timing_model}
-    return [{**head, **row} for row in event_rows(plan)]
-
-
-def timeline_document(plan: Schedule) -> Document:
-    """Answer of `busplan timeline`: the figures are those of the whole cycle, events and totals those of the window."""
-    figures = plan.figures
-    return document(
-        "timeline",
-        profile=plan.profile.name,
-        timing_model=figures.timing_model,
-        period_us=figures.period_us,
-        nodes=figures.nodes,
-        **{key: getattr(figures, key) for key in bus_of(plan.profile).facts},
-        required_us=figures.required_us,
-        available_us=figures.available_us,
-        margin_us=figures.margin_us,
-        exceeded=list(figures.exceeded),
-        fits=figures.fits,
-        **safety_row(figures, plan.profile),
-        warnings=warnings(plan.profile, nodes=figures.nodes, most=0),
-        from_us=plan.from_us,
-        to_us=plan.to_us,
-        events=event_rows(plan),
-        totals=[one._asdict() for one in totals(plan)],
-    )

@@ -4,11 +4,11 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from busplan.answers.gate import render
-from busplan.answers.gate.plain import summary_line
+from busplan.answers.check import check_report, summary_sentence
 from busplan.api.answer import Answer
 from busplan.api.inputs import Path, argument, items
-from busplan.forms.lines import Line
+from busplan.forms.blocks import Report
+from busplan.forms.terminal import sentence_text
 from busplan.profile.collect import collect
 from busplan.rules.gate import FileResult, check_source
 from busplan.rules.report import CheckReport, Located, Summary
@@ -41,17 +41,11 @@ class CheckAnswer(Answer):
         """Whether every file could be checked, and none has an error."""
         return not self._found.failed and not self._found.has_findings("error")
 
-    def to_json(self) -> str:
-        """Write the document of `busplan check --format json`."""
-        return render(self._found, file_format="json")
-
-    def _report(self) -> list[Line]:
-        text = render(self._found, file_format="text")
-        failures = [file.failure for file in self.files if file.failure is not None]
-        return [Line(line) for line in (*text.splitlines(), *failures, self._headline())]
+    def _report(self) -> Report:
+        return check_report(self._found)
 
     def _headline(self) -> str:
-        return summary_line(self._found)
+        return sentence_text(summary_sentence(self._found))
 
     @property
     def _found(self) -> CheckReport:

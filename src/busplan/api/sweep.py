@@ -1,5 +1,6 @@
 """`busplan.sweep`."""
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -13,12 +14,12 @@ from busplan.analysis.sweep.blocks import Block, Column
 from busplan.analysis.sweep.circles import MOST_CIRCLES_UNASKED, all_columns, require_circles, run_task, with_circles
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
 from busplan.answers.sweep.rows import json_footer, json_header, json_rows
-from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows
+from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows, sweep_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
 from busplan.errors import BusplanError
-from busplan.forms.json_and_csv import spelled
-from busplan.forms.lines import Line
+from busplan.forms.blocks import Report
+from busplan.forms.csv_rows import spelled
 from busplan.profile.kinds import words_of
 from busplan.sections.profile import Profile
 
@@ -76,23 +77,17 @@ class SweepAnswer(Answer):
         rows = "".join(json_rows(block, self.columns) for block in self.blocks)
         return header + rows + json_footer(complete=True)
 
-    def _report(self) -> list[Line]:
+    def _report(self) -> Report:
         circle = [name for name in CIRCLE_COLUMNS if name in self.columns]
         shown = dict.fromkeys((*self.grid.axes, "timing_model", *DEFAULT_COLUMNS, *circle))
         top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
-        for block in self.blocks:
-            top.add(block)
-        return top.lines(self._tally, self.profile.name, expected=self.grid.points)
-
-    def _headline(self) -> str:
-        return self._tally.lines(self.profile.name, expected=self.grid.points)[0].text
-
-    @property
-    def _tally(self) -> Tally:
         tally = Tally(bus_of(self.profile), self.timing_models)
         for block in self.blocks:
+            top.add(block)
             tally.add(block)
-        return tally
+        return sweep_report(
+            top, tally, name=self.profile.name, expected=self.grid.points, document=lambda: json.loads(self.to_json())
+        )
 
 
 def _rows(block: Block, name: str) -> Array:

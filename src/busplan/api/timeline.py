@@ -1,21 +1,15 @@
 """`busplan.timeline`."""
 
 from dataclasses import dataclass
-from typing import Final
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule, totals, zoom
-from busplan.answers.timeline import timeline_document
+from busplan.answers.timeline import timeline_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
-from busplan.drawings.timeline.characters import timeline_lines
 from busplan.errors import BusplanError
-from busplan.forms.json_and_csv import to_json
-from busplan.forms.lines import Line
+from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
-
-_COLUMNS: Final = 80
-"""Width of the drawing."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -50,12 +44,8 @@ class TimelineAnswer(Answer):
         """What the events of the window add up to, by kind."""
         return totals(self._found)
 
-    def to_json(self) -> str:
-        """Write the document of `busplan timeline --format json`."""
-        return to_json(timeline_document(self._found))
-
-    def _report(self) -> list[Line]:
-        return timeline_lines(self._found, width=_COLUMNS)
+    def _report(self) -> Report:
+        return timeline_report(self._found)
 
     @property
     def _found(self) -> Schedule:

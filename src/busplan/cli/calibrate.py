@@ -1,21 +1,27 @@
 """`busplan calibrate`."""
 
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from busplan.cli.answering import answer
 from busplan.cli.apply import apply_changes, require_own_file
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     BUS_OPTIONS,
     NO_CHANGES,
     Changes,
     FormatOption,
+    OutputOption,
     ProfileArgument,
     takes_bus_options,
     timing_model,
 )
-from busplan.cli.output import emit, emit_document, say
+from busplan.cli.output import say
 from busplan.errors import BusplanError
 
 
@@ -63,7 +69,8 @@ def calibrate_command(
             help="Write [node.execution] into PROFILE, a file, with a comment where it is from; the rest stays.",
         ),
     ] = False,
-    format_: FormatOption = "table",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Find the execution time T_exec of a node from measured latencies.
 
@@ -82,37 +89,36 @@ def calibrate_command(
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
     if apply:
         require_own_file(profile)
-    from busplan.analysis.calibration.calibrate import calibrate
-    from busplan.answers import calibration as report
-    from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
-    from busplan.profile.shipped import load, locate_measurements
-    from busplan.profile.toml import override, read_bytes
+    with answer(format_, output, inputs=chain(profile_files(profile), _measurements_file(measurements))) as give:
+        from busplan.analysis.calibration.calibrate import calibrate
+        from busplan.answers import calibration as said
+        from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
+        from busplan.profile.shipped import load, locate_measurements
+        from busplan.profile.toml import override, read_bytes
 
-    loaded = load(profile)
-    bench = override(loaded.profile, changes, origin=BUS_OPTIONS)
-    path, name, shipped = locate_measurements(measurements)
-    result = calibrate(
-        bench,
-        parse_measurements(read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES), name=name),
-        source=name,
-        timing_model=None if timing is None else timing_model(timing, bench),
-        form=form,
-        robust=robust,
-        # The shipped example holds published figures: what is computed from them is derived.
-        grade="derived" if shipped else "measured",
-    )
-    if apply:
-        note = report.provenance(result, source=Path(name).name)
-        apply_changes(loaded.document, report.execution_changes(result.execution), notes={report.SECTION: note})
-        say(f"wrote [{report.SECTION}] of {profile}; every comment of yours is kept")
-    if format_ == "table":
-        emit(report.calibration_lines(result, source=name))
-        return
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
+        loaded = load(profile)
+        bench = override(loaded.profile, changes, origin=BUS_OPTIONS)
+        path, name, shipped = locate_measurements(measurements)
+        result = calibrate(
+            bench,
+            parse_measurements(read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES), name=name),
+            source=name,
+            timing_model=None if timing is None else timing_model(timing, bench),
+            form=form,
+            robust=robust,
+            # The shipped example holds published figures: what is computed from them is derived.
+            grade="derived" if shipped else "measured",
+        )
+        if apply:
+            note = said.provenance(result, source=Path(name).name)
+            apply_changes(loaded.document, said.execution_changes(result.execution), notes={said.SECTION: note})
+            say(f"wrote [{said.SECTION}] of {profile}; every comment of yours is kept")
+        give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
-    emit_document(
-        json_and_csv.to_json(report.calibration_document(result, source=name, applied_to=profile if apply else None))
-        if format_ == "json"
-        else json_and_csv.to_csv(documents.with_profile(bench.name, report.calibration_rows(result)))
-    )
+
+def _measurements_file(argument: str) -> Iterator[Path]:
+    """The file that MEASUREMENTS means; whoever reads it says what is wrong with any other."""
+    from busplan.profile.shipped import locate_measurements
+
+    with suppress(BusplanError, ValueError):  # ValueError: a NUL in the path
+        yield locate_measurements(argument).path

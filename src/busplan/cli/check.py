@@ -2,10 +2,11 @@
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
+from busplan.answers.gate import FORMATS, gate_format
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, emit_text, say, write_document
@@ -19,7 +20,13 @@ if TYPE_CHECKING:
     from busplan.rules.gate import FileResult
     from busplan.rules.report import CheckReport
 
+    FormatName = str
+else:
+    # What typer takes as choices.
+    FormatName = Literal[tuple(FORMATS)]
+
 Recordings = dict[str, dict[str, float]]
+_BUILD_FORMATS: Final = [name for name, one in FORMATS.items() if one.is_for_builds]
 
 
 def check_command(
@@ -34,11 +41,12 @@ def check_command(
         ),
     ],
     format_: Annotated[
-        Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"],
+        FormatName,
         typer.Option(
             "--format",
             envvar="BUSPLAN_FORMAT",
-            help="Form of the report; github, gitlab, junit and sarif are for the build service.",
+            help=f"Form of the report; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for the build "
+            "service.",
         ),
     ] = "text",
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
@@ -102,9 +110,10 @@ def check_command(
     if update_baseline and baseline is not None:
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
-        from busplan.answers.gate.plain import summary_line
+        from busplan.answers.check import summary_sentence
+        from busplan.forms.terminal import sentence_text
 
-        say(summary_line(report))
+        say(sentence_text(summary_sentence(report)))
     if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
@@ -168,19 +177,11 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
         say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
 
 
-def _write(
-    report: "CheckReport",
-    *,
-    format_: Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"],
-    output: Path | None,
-) -> None:
-    from busplan.answers.gate import render
-
-    text = render(report, file_format=format_)
-    if output is None and format_ in {"text", "full"}:
+def _write(report: "CheckReport", *, format_: str, output: Path | None) -> None:
+    chosen = gate_format(format_)
+    text = chosen.write(report)
+    if output is None and chosen.is_for_people:
         emit_text(text)
     else:
         write_document(text, output, quiet=True)
-    if format_ == "github":
-        # GitHub shows ten annotations of a kind a step: the log has them all.
-        say(*render(report, file_format="text").splitlines())
+    say(*chosen.log(report))

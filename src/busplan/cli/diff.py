@@ -2,12 +2,21 @@
 
 from itertools import count
 from math import isfinite
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from busplan.cli.options import ALL_MODELS, TimingOption, complete_profile, timing_models
-from busplan.cli.output import PlanFailsError, emit, emit_document, say
+from busplan.cli.answering import answer
+from busplan.cli.destinations import profile_files
+from busplan.cli.options import (
+    ALL_MODELS,
+    FormatOption,
+    OutputOption,
+    TimingOption,
+    complete_profile,
+    timing_models,
+)
+from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
@@ -16,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from busplan.analysis.circle.roundness import CircleFigures
-    from busplan.analysis.comparison.difference import Difference
     from busplan.progress import Progress
     from busplan.sections.profile import Profile
 
@@ -54,35 +62,34 @@ def diff_command(
             help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
         ),
     ] = None,
-    format_: Annotated[
-        Literal["table", "json", "markdown"],
-        typer.Option("--format", help="Form of the document on standard output; markdown is for a pull request."),
-    ] = "table",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Tell what changed between two profiles, and what that does to every figure.
 
-    First the keys whose values differ, defaults applied; then the figures of capacity, latency and circle-test for
-    both, with B - A, its share of A, and whether B is better, worse, the same or neutral: what describes the plan
-    (period, nodes, how the bus is set, time available, largest term) is neutral. Times are in us, contour errors in um
-    in the table and in mm in JSON. Exits 0 whatever the figures are; with --fail-on-regression 1 when the report calls
-    any figure worse, under either timing model whichever decides, or of the circle; --timing and --no-circle leave some
-    out, but never whether B fits as its own timing_model decides. A circle that cannot be run is not passed.
+    First the keys whose values differ, defaults applied; then the figures of capacity, latency and circle-test that
+    differ, with B - A, its share of A, and whether B is better, worse or neutral: what describes the plan (period,
+    nodes, how the bus is set, time available, largest term) is neutral. JSON and CSV have those that are the same, too.
+    Times are in us, contour errors in um in the table and in mm in JSON. Markdown is for a pull request. Exits 0
+    whatever the figures are; with --fail-on-regression 1 when the report calls any figure worse, under either timing
+    model whichever decides, or of the circle; --timing and --no-circle leave some out, but never whether B fits as its
+    own timing_model decides. A circle that cannot be run is not passed.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
-    from busplan.analysis.comparison.difference import difference
-    from busplan.profile.revision import load_revision
+    with answer(format_, output, inputs=profile_files(a, b)) as give:
+        from busplan.analysis.comparison.difference import difference
+        from busplan.answers.diff import diff_report, regression_words
+        from busplan.profile.revision import load_revision
 
-    one, other = load_each((a, b), lambda argument: load_revision(argument).profile)
-    with progress_bar("circle tests") as progress:
-        test = _circle(progress) if circle else None
-        found = difference(one, other, timing_models=_models(timing, one, other), circle=test)
-    _emit(found, (a, b), format_=format_)
+        one, other = load_each((a, b), lambda argument: load_revision(argument).profile)
+        with progress_bar("circle tests") as progress:
+            test = _circle(progress) if circle else None
+            found = difference(one, other, timing_models=_models(timing, one, other), circle=test)
+        give(diff_report(found, arguments=(a, b)))
     regressions = found.regressions(tolerance=allowed / 100)
     if fail_on_regression and regressions:
-        from busplan.answers.diff import regression_words
-
         say(regression_words(found, regressions, tolerance=allowed))
         raise PlanFailsError
 
@@ -119,15 +126,3 @@ def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
         return circle_test(plan, explain=False, progress=part_of(progress, number=next(number), of=2)).results[0]
 
     return run
-
-
-def _emit(found: "Difference", arguments: tuple[str, str], *, format_: str) -> None:
-    from busplan.answers import diff
-    from busplan.forms import json_and_csv
-
-    if format_ == "table":
-        emit(diff.diff_lines(found, arguments=arguments))
-    elif format_ == "markdown":
-        emit_document(diff.diff_markdown(found, arguments=arguments))
-    else:
-        emit_document(json_and_csv.to_json(diff.diff_document(found, arguments=arguments)))

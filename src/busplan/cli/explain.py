@@ -1,13 +1,17 @@
 """`busplan explain`."""
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from busplan.cli.answering import answer
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
     NO_CHANGES,
     Changes,
+    FormatOption,
+    OutputOption,
     PeriodsOption,
     ProfileArgument,
     load_changed,
@@ -15,16 +19,13 @@ from busplan.cli.options import (
     takes_bus_options,
     timing_models,
 )
-from busplan.cli.output import emit, emit_document
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.analysis.derivation.explain import Explanation
+    from busplan.forms.blocks import Report
     from busplan.sections.profile import Profile
-
-ExplainFormat = Literal["text", "json", "markdown"]
 
 
 def complete_figure(incomplete: str) -> list[str]:
@@ -71,9 +72,8 @@ def explain_command(
             help="Which transaction, for a figure of latency, as read or write.  [default: both]",
         ),
     ] = None,
-    format_: Annotated[
-        ExplainFormat, typer.Option("--format", help="Form of the document on standard output.")
-    ] = "text",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Show where a figure comes from: every step in symbols and in numbers, and what it starts from.
 
@@ -83,24 +83,27 @@ def explain_command(
 
     Example: busplan explain paper-4ms required_us
     """
-    plan = load_changed(profile, changes)
     if figure is None:
         _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
-        _list(plan, format_)
-        return
-    from busplan.analysis.derivation.explain import explain
-    from busplan.cli.progress import progress_bar
+    with answer(format_, output, inputs=profile_files(profile)) as give:
+        plan = load_changed(profile, changes)
+        if figure is None:
+            give(_list(plan))
+            return
+        from busplan.analysis.derivation.explain import explain
+        from busplan.answers.explain import explain_report
+        from busplan.cli.progress import progress_bar
 
-    with progress_bar("circle test") as progress:
-        found = explain(
-            plan,
-            figure,
-            periods_us=periods_us(period, plan),
-            timing_models=None if timing is None else timing_models(timing, plan),
-            transactions=_transactions(transaction, plan),
-            progress=progress,
-        )
-    _write(found, format_)
+        with progress_bar("circle test") as progress:
+            found = explain(
+                plan,
+                figure,
+                periods_us=periods_us(period, plan),
+                timing_models=None if timing is None else timing_models(timing, plan),
+                transactions=_transactions(transaction, plan),
+                progress=progress,
+            )
+        give(explain_report(found))
 
 
 def _transactions(asked: str | None, profile: "Profile") -> "Sequence[str] | None":
@@ -121,28 +124,8 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
         raise BusplanError(f"{' and '.join(given)}: goes with a FIGURE, as in busplan explain PROFILE required_us")
 
 
-def _list(plan: "Profile", format_: ExplainFormat) -> None:
+def _list(plan: "Profile") -> "Report":
     from busplan.analysis.derivation.explain import assumptions
-    from busplan.answers import explain as report
-    from busplan.forms import json_and_csv
+    from busplan.answers.explain import assumptions_report
 
-    found = assumptions(plan)
-    if format_ == "text":
-        emit(report.figure_lines(plan, found))
-    elif format_ == "json":
-        emit_document(json_and_csv.to_json(report.figure_document(plan, found)))
-    else:
-        emit_document(report.figure_markdown(plan, found))
-
-
-def _write(found: "Explanation", format_: ExplainFormat) -> None:
-    from busplan.answers import explain as report
-    from busplan.forms import json_and_csv
-
-    found = report.in_words(found)
-    if format_ == "text":
-        emit(report.explain_lines(found))
-    elif format_ == "json":
-        emit_document(json_and_csv.to_json(report.explain_document(found)))
-    else:
-        emit_document(report.explain_markdown(found))
+    return assumptions_report(plan, assumptions(plan))

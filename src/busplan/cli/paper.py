@@ -1,11 +1,11 @@
 """`busplan paper`."""
 
-from busplan.cli.options import FormatOption
-from busplan.cli.output import emit, emit_document
+from busplan.cli.answering import answer
+from busplan.cli.options import FormatOption, OutputOption
 from busplan.cli.progress import progress_bar
 
 
-def paper_command(format_: FormatOption = "table") -> None:
+def paper_command(format_: FormatOption = None, output: OutputOption = None) -> None:
     """Show every published figure that the equations reach, beside the computed one and the residual.
 
     Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of equation (10), Figs. 9 and
@@ -15,23 +15,12 @@ def paper_command(format_: FormatOption = "table") -> None:
 
     Example: busplan paper --format csv
     """
-    from busplan.analysis.circle.roundness import circle_test
-    from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
-    from busplan.profile.shipped import load
+    with answer(format_, output) as give:
+        from busplan.analysis.circle.roundness import circle_test
+        from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
+        from busplan.answers.paper import paper_report
+        from busplan.profile.shipped import load
 
-    with progress_bar("circle tests") as progress:
-        circles = [circle_test(load(name).profile, progress=progress).results[0] for name in CIRCLE_PROFILES]
-    sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
-    if format_ == "table":
-        from busplan.answers.paper import paper_lines
-
-        emit(paper_lines(sections))
-        return
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
-
-    emit_document(
-        json_and_csv.to_json(documents.paper_document(sections))
-        if format_ == "json"
-        else json_and_csv.to_csv(documents.paper_rows(sections))
-    )
+        with progress_bar("circle tests") as progress:
+            circles = [circle_test(load(name).profile, progress=progress).results[0] for name in CIRCLE_PROFILES]
+        give(paper_report(paper_sections(load(BENCH_PROFILE).profile, circles=circles)))

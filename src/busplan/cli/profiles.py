@@ -1,34 +1,18 @@
 """`busplan profiles`."""
 
-from typing import Annotated, Literal
-
-import typer
-
-from busplan.cli.output import emit, emit_document
+from busplan.cli.answering import answer
+from busplan.cli.options import FormatOption, OutputOption
 
 
-def profiles_command(
-    format_: Annotated[
-        Literal["table", "json", "csv"],
-        typer.Option("--format", help="Form of the document on standard output."),
-    ] = "table",
-) -> None:
+def profiles_command(format_: FormatOption = None, output: OutputOption = None) -> None:
     """List the shipped profiles: what every command takes by name.
 
     Each with its number of nodes, its period, the timing model that decides and what it is about. A report: it exits 0.
 
     Example: busplan profiles
     """
-    from busplan.answers import documents
-    from busplan.forms import json_and_csv
-    from busplan.profile.shipped import load, shipped_names
+    with answer(format_, output) as give:
+        from busplan.answers.profiles import profiles_report
+        from busplan.profile.shipped import load, shipped_names
 
-    rows = documents.profile_rows([load(name).profile for name in shipped_names()])
-    if format_ == "table":
-        from busplan.answers.profiles import profiles_lines
-
-        emit(profiles_lines(rows))
-    elif format_ == "json":
-        emit_document(json_and_csv.to_json(documents.document("profiles", profiles=rows)))
-    else:
-        emit_document(json_and_csv.to_csv(rows))
+        give(profiles_report([load(name).profile for name in shipped_names()]))

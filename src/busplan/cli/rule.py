@@ -1,10 +1,11 @@
 """`busplan rule`."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
-from busplan.cli.output import emit_document, emit_text
+from busplan.cli.answering import answer
+from busplan.cli.options import FormatOption, OutputOption
 from busplan.errors import BusplanError
 
 
@@ -20,9 +21,8 @@ def rule_command(
         str | None,
         typer.Argument(help="Code of a rule, as BP101.  [default: all of them]", autocompletion=complete_code),
     ] = None,
-    format_: Annotated[
-        Literal["text", "json"], typer.Option("--format", help="Form of the document on standard output.")
-    ] = "text",
+    format_: FormatOption = None,
+    output: OutputOption = None,
 ) -> None:
     """Explain a rule of `busplan check`: what is wrong, why it matters, and how to mend it.
 
@@ -30,16 +30,14 @@ def rule_command(
 
     Example: busplan rule BP110
     """
-    from busplan.answers import documents
-    from busplan.answers.rules import rule_page, rule_rows, rule_table
-    from busplan.forms import json_and_csv
-    from busplan.rules.registry import all_rules
+    with answer(format_, output) as give:
+        from busplan.answers.rules import rule_report, rules_report
+        from busplan.rules.registry import all_rules
 
-    rules = all_rules()
-    if code is not None and code.upper() not in rules:
-        raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")
-    chosen = list(rules.values()) if code is None else [rules[code.upper()]]
-    if format_ == "json":
-        emit_document(json_and_csv.to_json(documents.document("rule", rules=rule_rows(chosen))))
-    else:
-        emit_text(rule_table(chosen) if code is None else rule_page(chosen[0]))
+        rules = all_rules()
+        if code is None:
+            give(rules_report(list(rules.values())))
+        elif code.upper() in rules:
+            give(rule_report(rules[code.upper()]))
+        else:
+            raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")

@@ -1,6 +1,8 @@
 """`busplan sweep`: its options, and what of them goes together."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
@@ -8,14 +10,15 @@ import typer
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
 from busplan.cli.output import partial_path, refuse_terminal
-from busplan.cli.sweep_job import SweepFormat, SweepJob
+from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.errors import BusplanError
+from busplan.forms import ENDINGS
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-_ENDINGS: Final[dict[str, SweepFormat]] = {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".npz": "npz"}
+_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl", ".npz": "npz"})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "max_axes"
 
@@ -36,18 +39,18 @@ def sweep_command(
     ] = None,
     timing: TimingOption = "both",
     format_: Annotated[
-        SweepFormat | None,
+        SweepForm | None,
         typer.Option(
             "--format",
-            help="Form of the document: a table of the top rows, or every row as csv, json (one document), jsonl (a "
-            "JSON object a line, the first describes the sweep) or npz (NumPy columns, no text).  [default: by the "
-            "ending of -o, else table]",
+            help="Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
+            "json (one document), jsonl (a JSON object a line, the first describes the sweep) or npz (NumPy columns, "
+            "no text).  [default: by the ending of --output, else table]",
             show_default=False,
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        output_option("Write the document to FILE.csv, .json, .jsonl or .npz, or as a table to any other name"),
+        output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}, or as a table to any other name"),
     ] = None,
     columns: Annotated[
         str | None,
@@ -55,7 +58,7 @@ def sweep_command(
             "--columns",
             metavar="NAMES",
             help="Figures to write, between commas, as margin_us,max_axes: the names in "
-            "`busplan capacity --format json`.  [default: all of them; in a table the main ones]",
+            "`busplan capacity --format json`.  [default: all of them; of the top rows the main ones]",
         ),
     ] = None,
     sort: Annotated[
@@ -63,11 +66,11 @@ def sweep_command(
         typer.Option(
             "--sort",
             metavar="COLUMN[:asc]",
-            help="Table: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
+            help="Top rows: largest first by this column, or smallest first with :asc.  [default: order of the grid]",
         ),
     ] = None,
     top: Annotated[
-        int | None, typer.Option("--top", metavar="N", help="Table: number of rows.  [default: 20]", show_default=False)
+        int | None, typer.Option("--top", metavar="N", help="Top rows: how many.  [default: 20]", show_default=False)
     ] = None,
     plot: Annotated[
         Path | None,
@@ -114,8 +117,8 @@ def sweep_command(
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
-    wanted = format_ or (_ENDINGS.get(output.suffix.lower(), "table") if output else "table")
-    _require_sense(wanted, output=output, sort=sort, top=top)
+    form = format_ or (_ENDINGS.get(output.suffix.lower(), "table") if output else "table")
+    _require_sense(form, output=output, sort=sort, top=top)
     _require_needed("--plot FILE", plot is not None, {"--figure": figure})
     _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None})
     for option, number in (("--top", top), ("--jobs", jobs)):
@@ -145,8 +148,8 @@ def sweep_command(
             profile=loaded,
             grid=grid,
             timing_models=timing_models(timing, loaded),
-            columns=_columns(loaded, columns, grid, circle=circle, short=wanted == "table", sort_by=sort_by),
-            format_=wanted,
+            columns=_columns(loaded, columns, grid, circle=circle, short=form in TOP_FORMS, sort_by=sort_by),
+            form=form,
             output=output,
             top=top or _DEFAULT_TOP,
             sort_by=sort_by or None,
@@ -160,13 +163,14 @@ def sweep_command(
     )
 
 
-def _require_sense(format_: SweepFormat, *, output: Path | None, sort: str | None, top: int | None) -> None:
-    """Refuse options that the format cannot follow."""
-    if format_ == "npz" and output is None:
+def _require_sense(form: SweepForm, *, output: Path | None, sort: str | None, top: int | None) -> None:
+    """Refuse options that the form cannot follow."""
+    if form == "npz" and output is None:
         refuse_terminal("npz")
     for option, value in (("--sort", sort), ("--top", top)):
-        if value is not None and format_ != "table":
-            raise BusplanError(f"{option}: goes with --format table; {format_} has every row in the order of the grid")
+        if value is not None and form not in TOP_FORMS:
+            forms = f"{', '.join(TOP_FORMS[:-1])} or {TOP_FORMS[-1]}"
+            raise BusplanError(f"{option}: goes with --format {forms}; {form} has every row in the order of the grid")
 
 
 def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> None:
@@ -191,7 +195,7 @@ def _require_number(profile: "Profile", grid: "Grid", asked: dict[str, str | Non
 def _columns(
     profile: "Profile", asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str
 ) -> tuple[str, ...]:
-    """Columns to write: the varied keys and timing_model, then those asked for, or all, or a table's main ones."""
+    """Columns to write: the varied keys and timing_model, then those asked for, or all, or the main ones."""
     from busplan.analysis.sweep.circles import all_columns
 
     known = all_columns(profile, grid, with_circle=circle)

@@ -1,13 +1,19 @@
 """What a sweep is asked for, each value checked."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-SweepFormat = Literal["table", "csv", "json", "jsonl", "npz"]
+TopForm = Literal["table", "markdown", "html"]
+"""Forms of the rows at the top, for people."""
+RowsForm = Literal["csv", "json", "jsonl"]
+"""Forms of every row as text, written as it comes."""
+SweepForm = Literal[TopForm, RowsForm, "npz"]
+TOP_FORMS: Final = get_args(TopForm)
+ROWS_FORMS: Final = get_args(RowsForm)
 
 
 class SweepJob(NamedTuple):
@@ -17,7 +23,7 @@ class SweepJob(NamedTuple):
     grid: "Grid"
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]
-    format_: SweepFormat
+    form: SweepForm
     output: Path | None
     top: int
     sort_by: str | None

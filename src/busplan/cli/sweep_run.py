@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
 from busplan.cli.output import CANNOT, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
+from busplan.cli.sweep_job import ROWS_FORMS, TOP_FORMS
 from busplan.cli.sweep_sinks import opened_sink
 from busplan.errors import BusplanError, WorkerLostError
 
@@ -38,6 +39,7 @@ def run_sweep(job: "SweepJob") -> None:
     """
     from busplan.analysis.network import bus_of
     from busplan.answers.sweep.top import Tally
+    from busplan.forms.terminal import sentence_text
 
     drawing = _drawing(job)
     if job.jobs is not None:
@@ -53,8 +55,8 @@ def run_sweep(job: "SweepJob") -> None:
             lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
-        if job.format_ != "table" or file is not None:
-            say(*(line.text for line in tally.lines(job.profile.name, expected=expected)))
+        if job.form not in TOP_FORMS or file is not None:
+            say(*map(sentence_text, tally.sentences(job.profile.name, expected=expected)))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
             say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
@@ -115,7 +117,7 @@ def _blocks(job: "SweepJob") -> "Iterator[Iterable[Block]]":
     from busplan.answers.sweep.rows import TEXT_POINTS
 
     if job.jobs is None:
-        chunk_points = TEXT_POINTS if job.format_ in {"csv", "jsonl", "json"} else CHUNK_POINTS
+        chunk_points = TEXT_POINTS if job.form in ROWS_FORMS else CHUNK_POINTS
         yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=chunk_points)
         return
     from busplan.analysis.sweep.circles import with_circles

@@ -1,18 +1,23 @@
-"""Where the blocks of a sweep go: a table, rows as text, one JSON document or an archive of columns."""
+"""Where the blocks of a sweep go: the rows at the top, rows as text, one JSON document or an archive of columns."""
 
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Protocol
+from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol, assert_never
 
-from busplan.cli.output import document_bytes, emit, emit_document
+from busplan.cli.answering import give
+from busplan.cli.output import document_bytes, emit_document
+from busplan.errors import BusplanError
+from busplan.forms import render
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
+    from busplan.answers.sweep.rows import Style
     from busplan.answers.sweep.top import Tally
     from busplan.cli.npz import Archive, NpzColumns
-    from busplan.cli.sweep_job import SweepJob
+    from busplan.cli.sweep_job import SweepJob, TopForm
 
 
 class Sink(Protocol):
@@ -28,17 +33,22 @@ class Sink(Protocol):
 @contextmanager
 def opened_sink(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Iterator[Sink]:
     """Where the document goes."""
-    if job.format_ == "table":
-        yield _TableSink(job, file, tally)
-    elif job.format_ == "npz":
-        from busplan.cli.npz import NpzColumns
+    write = emit_document if file is None else partial(_write, file)
+    match job.form:
+        case "table" | "markdown" | "html":
+            yield _TopSink(job, job.form, file, tally)
+        case "csv" | "jsonl":
+            yield _LinesSink(job, job.form, write)
+        case "json":
+            yield _JsonSink(job, write)
+        case "npz":
+            from busplan.cli.npz import NpzColumns
 
-        folder = Path(os.path.realpath(job.output)).parent if job.output else None
-        with NpzColumns(job.columns, folder=folder) as columns:
-            yield _NpzSink(job, file or _Pipe(), columns)
-    else:
-        sink = _JsonSink if job.format_ == "json" else _TextSink
-        yield sink(job, emit_document if file is None else lambda text: _write(file, text))
+            folder = Path(os.path.realpath(job.output)).parent if job.output else None
+            with NpzColumns(job.columns, folder=folder) as columns:
+                yield _NpzSink(job, file or _Pipe(), columns)
+        case _:
+            assert_never(job.form)
 
 
 def _write(file: BinaryIO, text: str) -> None:
@@ -59,44 +69,46 @@ class _Pipe:
         """It stays open for others."""
 
 
-class _TableSink:
-    """Keeps the rows at the top, for a table at the end."""
+class _TopSink:
+    """Keeps the rows at the top, for an answer at the end."""
 
-    def __init__(self, job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> None:
+    def __init__(self, job: "SweepJob", form: "TopForm", file: BinaryIO | None, tally: "Tally") -> None:
         from busplan.answers.sweep.top import TopRows
 
-        self._job, self._file, self._tally = job, file, tally
+        self._job, self._form, self._file, self._tally = job, form, file, tally
         self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
         self.add = self._rows.add
 
     def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - the tally knows
-        """Write the table."""
-        lines = self._rows.lines(self._tally, self._job.profile.name, expected=self._job.grid.points)
+        """Write the answer."""
+        from busplan.answers.sweep.top import sweep_report
+
+        name, expected = self._job.profile.name, self._job.grid.points
+        report = sweep_report(self._rows, self._tally, name=name, expected=expected, document=_not_kept)
         if self._file is None:
-            emit(lines)
+            give(report, self._form)
         else:
-            from busplan.forms.lines import plain_text
-
-            _write(self._file, plain_text(lines))
+            _write(self._file, render(report, self._form))
 
 
-class _TextSink:
+def _not_kept() -> NoReturn:
+    raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")
+
+
+class _LinesSink:
     """Writes every row as it comes, and each ends itself."""
 
-    def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
+    def __init__(self, job: "SweepJob", form: "Style", write: Callable[[str], None]) -> None:
         from busplan.answers.sweep.rows import csv_header, jsonl_header
 
-        self._job, self._write = job, write
-        if job.format_ == "csv":
-            write(csv_header(job.columns))
-        else:
-            write(jsonl_header(job.profile.name, job.grid, job.timing_models))
+        self._columns, self._form, self._write = job.columns, form, write
+        write(csv_header(job.columns) if form == "csv" else jsonl_header(job.profile.name, job.grid, job.timing_models))
 
     def add(self, block: "Block") -> None:
         """Write one more block."""
         from busplan.answers.sweep.rows import block_text
 
-        self._write(block_text(block, self._job.columns, style="csv" if self._job.format_ == "csv" else "jsonl"))
+        self._write(block_text(block, self._columns, style=self._form))
 
     def finish(self, *, complete: bool) -> None:
         """Nothing is left to write."""

@@ -1,12 +1,14 @@
 """`busplan timeline`."""
 
 import re
-import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Final, Literal, assert_never
 
 import typer
 
+from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     NO_CHANGES,
@@ -20,24 +22,20 @@ from busplan.cli.options import (
     time_us,
     timing_model,
 )
-from busplan.cli.output import emit, refuse_terminal, write_document
+from busplan.cli.output import refuse_terminal, write_document
 from busplan.errors import BusplanError
+from busplan.forms import ENDINGS, Form
 
 if TYPE_CHECKING:
     from busplan.analysis.timeline.schedule import Schedule
     from busplan.sections.profile import Profile
 
-TimelineFormat = Literal["table", "json", "csv", "mermaid", "svg", "png"]
+Picture = Literal["mermaid", "svg", "png"]
+TimelineForm = Literal[Form, Picture]
 
-_SUFFIXES: Final[dict[str, TimelineFormat]] = {
-    ".txt": "table",
-    ".json": "json",
-    ".csv": "csv",
-    ".mmd": "mermaid",
-    ".svg": "svg",
-    ".png": "png",
-}
-_PIPE_COLUMNS: Final = 80
+_ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType(
+    {**ENDINGS, ".mmd": "mermaid", ".svg": "svg", ".png": "png"}
+)
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
@@ -95,17 +93,15 @@ def timeline_command(
         ),
     ] = None,
     format_: Annotated[
-        TimelineFormat | None,
+        TimelineForm | None,
         typer.Option(
             "--format",
-            help="Form of the document. png is for a file or a pipe, and needs the extra plot (matplotlib).  "
-            "[default: by the ending of -o, else table]",
+            help="Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
+            "(matplotlib).  [default: by the ending of --output, else table]",
             show_default=False,
         ),
     ] = None,
-    output: Annotated[
-        Path | None, output_option("Write it to FILE.svg, .png, .mmd (mermaid), .json, .csv or .txt")
-    ] = None,
+    output: Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}")] = None,
 ) -> None:
     """Show one communication cycle as events, node by node and to scale.
 
@@ -116,33 +112,36 @@ def timeline_command(
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
-    chosen = _format(format_, output)
+    chosen = _form(format_, output)
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
-    require_apart({"--output": output}, inputs=profile_files(profile))
-    from busplan.analysis.timeline.schedule import schedule, zoom
-    from busplan.profile.toml import override
 
-    plan = load_changed(profile, changes)
-    asked_us = periods_us([period], plan) if period is not None else None
-    if asked_us is not None:
-        plan = override(plan, {"cycle.period_us": asked_us[0]})
-    one = None if transaction is None else _transaction(transaction, plan)
-    model = None if timing is None else timing_model(timing, plan)
-    shown = zoom(
-        schedule(plan, model=model),
-        from_us=from_us,
-        to_us=to_us,
-        transaction=one,
-    )
-    _write(shown, chosen, output)
+    def shown() -> "Schedule":
+        from busplan.analysis.timeline.schedule import schedule, zoom
+
+        plan = _network(profile, changes, period)
+        one = None if transaction is None else _transaction(transaction, plan)
+        model = None if timing is None else timing_model(timing, plan)
+        return zoom(schedule(plan, model=model), from_us=from_us, to_us=to_us, transaction=one)
+
+    match chosen:
+        case "table" | "markdown" | "html" | "csv" | "json":
+            with answer(chosen, output, inputs=profile_files(profile)) as give:
+                from busplan.answers.timeline import timeline_report
+
+                give(timeline_report(shown()))
+        case "mermaid" | "svg" | "png":
+            require_apart({"--output": output}, inputs=profile_files(profile))
+            write_document(_picture(shown(), chosen), output)
+        case _:
+            assert_never(chosen)
 
 
-def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineFormat:
+def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
     """The form that is asked for, by name or by the file's ending; what cannot be drawn is said before any work."""
-    chosen = form_of_file(format_, output, forms=_SUFFIXES, default="table")
+    chosen = form_of_file(format_, output, forms=_ENDINGS, default="table")
     if chosen == "png":
         if output is None:
             refuse_terminal("png")
@@ -150,6 +149,14 @@ def _format(format_: TimelineFormat | None, output: Path | None) -> TimelineForm
 
         require_matplotlib("--format png")
     return chosen
+
+
+def _network(profile: str, changes: Changes, period: str | None) -> "Profile":
+    from busplan.profile.toml import override
+
+    plan = load_changed(profile, changes)
+    asked_us = None if period is None else periods_us([period], plan)
+    return plan if asked_us is None else override(plan, {"cycle.period_us": asked_us[0]})
 
 
 def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
@@ -166,48 +173,24 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
     return match["kind"], int(match["node"])
 
 
-def _write(shown: "Schedule", chosen: TimelineFormat, output: Path | None) -> None:
-    if chosen == "table" and output is None:
-        from busplan.drawings.timeline.characters import timeline_lines
+def _picture(shown: "Schedule", form: Picture) -> str | bytes:
+    """The drawing alone, as a file of its own."""
+    from busplan.answers.timeline import headline
+    from busplan.forms.terminal import sentence_text
 
-        emit(timeline_lines(shown, width=_columns()))
-    elif chosen == "png":
-        from busplan.drawings.timeline.png import timeline_png
+    title = sentence_text(headline(shown))
+    match form:
+        case "mermaid":
+            from busplan.drawings.timeline.mermaid import timeline_mermaid
 
-        write_document(timeline_png(shown), output)
-    else:
-        write_document(_text(shown, chosen), output)
+            return timeline_mermaid(shown, title=title)
+        case "svg":
+            from busplan.drawings.timeline.svg import timeline_svg
 
+            return timeline_svg(shown, title=title)
+        case "png":
+            from busplan.drawings.timeline.png import timeline_png
 
-def _text(shown: "Schedule", chosen: TimelineFormat) -> str:
-    """The document in one of the forms that are text."""
-    if chosen == "table":
-        from busplan.drawings.timeline.characters import timeline_lines
-        from busplan.forms.lines import plain_text
-
-        return plain_text(timeline_lines(shown, width=_PIPE_COLUMNS))
-    if chosen == "svg":
-        from busplan.drawings.timeline.svg import timeline_svg
-
-        return timeline_svg(shown)
-    if chosen == "mermaid":
-        from busplan.drawings.timeline.mermaid import timeline_mermaid
-
-        return timeline_mermaid(shown)
-    from busplan.answers.timeline import timeline_document, timeline_rows
-    from busplan.forms import json_and_csv
-
-    return (
-        json_and_csv.to_json(timeline_document(shown))
-        if chosen == "json"
-        else json_and_csv.to_csv(timeline_rows(shown))
-    )
-
-
-def _columns() -> int:
-    """Width of the terminal; in a pipe the drawing is the same wherever it runs."""
-    if not sys.stdout.isatty():
-        return _PIPE_COLUMNS
-    from shutil import get_terminal_size
-
-    return get_terminal_size((_PIPE_COLUMNS, 24)).columns
+            return timeline_png(shown, title=title)
+        case _:
+            assert_never(form)

@@ -38,6 +38,12 @@ class Value(NamedTuple):
     state: State = "neutral"
     command: str = ""
     """Id of the `Command` whose document that is, where the answer holds several."""
+    digits: int | None = None
+    """Significant digits of a number without `decimals`; None for as many as it has."""
+    fixed: bool = False
+    """Whether what is too small for `decimals` is rounding, and written as zero."""
+    grouped: bool = False
+    """Whether commas part its thousands."""
 
 
 class Words(NamedTuple):
@@ -274,9 +280,9 @@ def figure_value(figure: Figure, value: Any, *, at: str = "", state: State = "ne
     return Value(value, figure.key, figure.column or figure.unit, decimals, at=at, state=state)
 
 
-def count_value(value: float, key: str = "", *, at: str = "") -> Value:
+def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> Value:
     """A number of things."""
-    return Value(value, key, at=at)
+    return Value(value, key, at=at, grouped=grouped)
 
 
 def state_of(passes: object) -> State:

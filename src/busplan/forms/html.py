@@ -15,7 +15,7 @@ from busplan.forms.inks import DARK, fills
 from busplan.forms.numbers import MISSING, with_unit, written
 from busplan.forms.signed_bar import signed_bar
 from busplan.forms.terminal import sentence_text
-from busplan.printable import json_text
+from busplan.printable import json_text, printable_lines
 
 _TYPES: Final = ("Value", "Words", "Code", "Link", "Swatch", "Bar", "Command", "Sentence")
 _BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Steps", "Question", "Section")
@@ -37,6 +37,7 @@ def page(report: Report) -> str:
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
         autoescape=True,
+        finalize=_shown,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -68,6 +69,11 @@ def page(report: Report) -> str:
         program=f"busplan {__version__}",
         colours=colours,
     )
+
+
+def _shown(piece: object) -> object:
+    """What a template writes: nothing in it commands a terminal that shows the file."""
+    return printable_lines(piece) if isinstance(piece, str) and not isinstance(piece, Markup) else piece
 
 
 def _unit(value: Value) -> str:

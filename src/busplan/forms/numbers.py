@@ -7,6 +7,8 @@ from busplan.buses.figure import unit_of
 from busplan.forms.blocks import Value
 
 MISSING: Final = "-"
+_DIGITS: Final = 12
+"""Digits of a number that has as many as it takes: float rounding is not among them."""
 _FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6}
 """From the unit of a key to the one it is written in."""
 _MILLISECOND_US: Final = 1e3
@@ -26,6 +28,10 @@ def written(value: Value) -> str:
     ('3.600', '97.00')
     >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("hops", "nodes")))
     ('-', 'yes', '16', 'hops, nodes')
+    >>> written(Value([2.38808777, 4000.0], digits=4)), written(Value(-4e-16, decimals=3, fixed=True))
+    ('2.388, 4000', '0.000')
+    >>> written(Value(1234567)), written(Value(1234567, grouped=True))
+    ('1234567', '1,234,567')
     """
     match value.value:
         case None:
@@ -35,7 +41,7 @@ def written(value: Value) -> str:
         case int() | float():
             return _number(value)
         case list() | tuple():
-            return ", ".join(map(str, value.value)) or MISSING
+            return ", ".join(written(value._replace(value=one)) for one in value.value) or MISSING
     return str(value.value)
 
 
@@ -116,5 +122,8 @@ def _number(value: Value) -> str:
     if value.unit == "um" and abs(number) < _ROUNDING_UM:
         number = 0.0
     if value.decimals is not None:
+        # Plus zero: a negative one is no number to show.
+        number = round(number, value.decimals) + 0.0 if value.fixed else number
         return decimals_of(number, value.decimals, signed=value.signed)
-    return f"{number:+.12g}" if value.signed and number else f"{number:.12g}"
+    sign, comma = "+" if value.signed and number > 0 else "", "," if value.grouped else ""
+    return f"{number:{sign}{comma}.{value.digits or _DIGITS}g}"

@@ -63,14 +63,15 @@ def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line
         lines = _lines(block, width)
         if not lines:
             continue
-        if before is not None and not (_is_words(before) and _is_words(block)):
+        if before is not None and not _belong(before, block):
             yield BLANK
         yield from lines
         before = block
 
 
-def _is_words(block: Block) -> bool:
-    return isinstance(block, Sentence | Facts)
+def _belong(one: Block, other: Block) -> bool:
+    """Whether two blocks stand below one another without a blank line."""
+    return any(isinstance(one, kind) and isinstance(other, kind) for kind in (Sentence | Facts, Command))
 
 
 def _lines(block: Block, width: int) -> Sequence[Line]:

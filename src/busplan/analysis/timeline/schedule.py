@@ -12,12 +12,18 @@ from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import IDLE, BusEvent
+from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
 """Nodes that are still laid out one by one: far beyond those of a bus, so that a plan that breaks this limit can be
 seen; few enough for a document."""
+
+
+EVENTS: Final = Figure("events", "n", "schedule", "events of one kind in the window", "events", sort="count")
+TOTAL: Final = Figure("total_us", "t", "schedule", "what the events of one kind take together", "time")
+SHARE: Final = Figure("share", "s", "schedule", "share of the window that they take, 0..1", "share", "%", decimals=2)
 
 
 class Event(NamedTuple):

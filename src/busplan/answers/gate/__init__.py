@@ -1,34 +1,59 @@
-"""The gate's report in each of its formats."""
+"""The gate's report in its formats: each is a class and a line in `FORMATS`."""
 
-from collections.abc import Callable, Mapping
+from abc import ABC, abstractmethod
 from importlib import import_module
-from typing import Final, Literal
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
-from busplan.rules.report import CheckReport
+if TYPE_CHECKING:
+    from busplan.rules.report import CheckReport
 
-GateFormat = Literal["text", "full", "json", "github", "gitlab", "junit", "sarif"]
 
-_MODULES: Final[Mapping[GateFormat, str]] = {
-    "text": "plain",
-    "full": "plain",
-    "json": "documents",
-    "github": "plain",
-    "gitlab": "documents",
-    "junit": "junit",
-    "sarif": "sarif",
+class GateFormat(ABC):
+    """One format of the gate's report."""
+
+    is_for_people: ClassVar[bool] = False
+    """Whether people read it, in the encoding of their terminal; a program reads UTF-8."""
+
+    @abstractmethod
+    def write(self, report: "CheckReport") -> str:
+        """Write a report."""
+
+    def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats are all there is to read
+        """Lines for standard error beside it."""
+        return []
+
+
+class Registered(NamedTuple):
+    """Where a format is, so that only the one that is asked for is loaded."""
+
+    module: str
+    """In this folder."""
+    name: str
+    """Of its class."""
+    is_for_builds: bool = False
+    """Whether it is for a build service."""
+
+
+FORMATS: Final[dict[str, Registered]] = {
+    "text": Registered("plain", "Text"),
+    "full": Registered("plain", "Full"),
+    "json": Registered("documents", "Json"),
+    "github": Registered("github", "GitHub", is_for_builds=True),
+    "gitlab": Registered("documents", "GitLab", is_for_builds=True),
+    "junit": Registered("junit", "JUnit", is_for_builds=True),
+    "sarif": Registered("sarif", "Sarif", is_for_builds=True),
 }
+"""Every format by its name, in the order of the help."""
 
 
-def render(report: CheckReport, *, file_format: GateFormat) -> str:
-    """Write a report in one of the formats.
+def gate_format(name: str) -> GateFormat:
+    """Load one of the formats.
 
     Parameters
     ----------
-    report
-        What was found.
-    file_format
-        Which format; only its own module is loaded.
+    name
+        One of `FORMATS`.
     """
-    module = import_module(f"busplan.answers.gate.{_MODULES[file_format]}")
-    writer: Callable[[CheckReport], str] = getattr(module, f"as_{file_format}")
-    return writer(report)
+    place = FORMATS[name]
+    made: type[GateFormat] = getattr(import_module(f"{__name__}.{place.module}"), place.name)
+    return made()

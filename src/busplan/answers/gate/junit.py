@@ -4,6 +4,7 @@ import re
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from busplan.answers.gate import GateFormat
 from busplan.answers.gate.plain import finding_line
 from busplan.printable import printable_lines
 from busplan.rules.gate import FileResult
@@ -12,17 +13,20 @@ from busplan.rules.report import CheckReport
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def as_junit(report: CheckReport) -> str:
-    """Errors are failures, files that could not be checked are errors, warnings are output."""
-    failures = sum(any(one.severity == "error" for one in file.findings) for file in report.files)
-    errors = sum(file.failure is not None for file in report.files)
-    counts = {"tests": str(len(report.files)), "failures": str(failures), "errors": str(errors)}
-    root = Element("testsuites", {"name": "busplan check", **counts})
-    suite = SubElement(root, "testsuite", {"name": "busplan check", **counts})
-    for file in report.files:
-        _case(suite, file)
-    indent(root)
-    return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+class JUnit(GateFormat):
+    """One test case a profile."""
+
+    def write(self, report: CheckReport) -> str:
+        """Write errors as failures, files that could not be checked as errors, warnings as output."""
+        failures = sum(any(one.severity == "error" for one in file.findings) for file in report.files)
+        errors = sum(file.failure is not None for file in report.files)
+        counts = {"tests": str(len(report.files)), "failures": str(failures), "errors": str(errors)}
+        root = Element("testsuites", {"name": "busplan check", **counts})
+        suite = SubElement(root, "testsuite", {"name": "busplan check", **counts})
+        for file in report.files:
+            _case(suite, file)
+        indent(root)
+        return tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
 def _case(suite: Element, file: FileResult) -> None:

@@ -1,9 +1,10 @@
-"""Findings as lines: for people, for editors, and for GitHub's log."""
+"""Findings as lines: for people, for editors, and for a build's log."""
 
 from collections.abc import Iterator
 from typing import Final
 from unicodedata import category, east_asian_width
 
+from busplan.answers.gate import GateFormat
 from busplan.printable import printable
 from busplan.rules.finding import Finding
 from busplan.rules.report import CheckReport
@@ -12,28 +13,34 @@ _WIDEST: Final = 160
 """Of a line that is longer, `full` shows what stands around the finding."""
 
 
+def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
+    """Where a finding is, and what it says."""
+    return f"{path}:{finding.line}:{finding.column}:", f"{finding.code} {finding.message}"
+
+
 def finding_line(path: str, finding: Finding) -> str:
     """Write path:line:column: CODE message."""
-    return printable(f"{path}:{finding.line}:{finding.column}: {finding.code} {finding.message}")
+    return printable(" ".join(finding_parts(path, finding)))
 
 
-def summary_line(report: CheckReport) -> str:
-    """Say how many profiles were checked, and what was found."""
-    counts = report.summary
-    failed = sum(file.failure is not None for file in report.files)
-    words = (("profile", counts.files - failed), ("error", counts.errors), ("warning", counts.warnings))
-    profiles, errors, warnings = (f"{number} {word}{'s' * (number != 1)}" for word, number in words)
-    return f"checked {profiles}: {errors}, {warnings}{f'; {failed} could not be checked' if failed else ''}"
-
-
-def as_text(report: CheckReport) -> str:
+class Text(GateFormat):
     """One line a finding."""
-    return "".join(f"{finding_line(one.path, one.finding)}\n" for one in report.located)
+
+    is_for_people = True
+
+    def write(self, report: CheckReport) -> str:
+        """Write the lines."""
+        return "".join(f"{finding_line(one.path, one.finding)}\n" for one in report.located)
 
 
-def as_full(report: CheckReport) -> str:
+class Full(GateFormat):
     """Each finding with its line of the file and a caret below its column."""
-    return "".join(f"{line}\n" for line in _full(report))
+
+    is_for_people = True
+
+    def write(self, report: CheckReport) -> str:
+        """Write some lines a finding."""
+        return "".join(f"{line}\n" for line in _full(report))
 
 
 def _full(report: CheckReport) -> Iterator[str]:
@@ -67,27 +74,3 @@ def _space(character: str) -> str:
     if category(character) in ("Mn", "Me"):
         return ""
     return "  " if east_asian_width(character) in "WF" else " "
-
-
-def as_github(report: CheckReport) -> str:
-    """One workflow command a finding, which GitHub shows beside the line of the file."""
-    return "".join(f"{line}\n" for line in _github(report))
-
-
-def _github(report: CheckReport) -> Iterator[str]:
-    for one in report.located:
-        finding = one.finding
-        properties = {
-            "file": one.path,
-            "line": str(finding.line),
-            "col": str(finding.column),
-            "title": f"{finding.code} {finding.rule}",
-        }
-        said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
-        yield f"::{finding.severity} {said}::{_escaped(finding.message, property_=False)}"
-
-
-def _escaped(text: str, *, property_: bool) -> str:
-    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    # What GitHub has no escape for commands no terminal either.
-    return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)

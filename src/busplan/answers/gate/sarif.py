@@ -11,6 +11,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from busplan import __version__
+from busplan.answers.gate import GateFormat
 from busplan.buses.rule import Rule
 from busplan.printable import json_text
 from busplan.rules.registry import all_rules
@@ -19,30 +20,33 @@ from busplan.rules.report import CheckReport, Located
 _SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def as_sarif(report: CheckReport) -> str:
-    """One run, with all rules, the results, and what could not be checked as notifications."""
-    failures = [file for file in report.files if file.failure is not None]
-    run = {
-        "tool": {
-            "driver": {
-                "name": "busplan",
-                "semanticVersion": __version__,
-                "rules": [_rule(rule) for rule in all_rules().values()],
-            }
-        },
-        "columnKind": "unicodeCodePoints",
-        "invocations": [
-            {
-                "executionSuccessful": not failures,
-                "toolExecutionNotifications": [
-                    {"level": "error", "message": {"text": file.failure}} for file in failures
-                ],
-            }
-        ],
-        "results": [_result(one) for one in report.located],
-    }
-    document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
-    return json_text(document, indent=2) + "\n"
+class Sarif(GateFormat):
+    """One run, for services that scan code."""
+
+    def write(self, report: CheckReport) -> str:
+        """Write all rules, the results, and what could not be checked as notifications."""
+        failures = [file for file in report.files if file.failure is not None]
+        run = {
+            "tool": {
+                "driver": {
+                    "name": "busplan",
+                    "semanticVersion": __version__,
+                    "rules": [_rule(rule) for rule in all_rules().values()],
+                }
+            },
+            "columnKind": "unicodeCodePoints",
+            "invocations": [
+                {
+                    "executionSuccessful": not failures,
+                    "toolExecutionNotifications": [
+                        {"level": "error", "message": {"text": file.failure}} for file in failures
+                    ],
+                }
+            ],
+            "results": [_result(one) for one in report.located],
+        }
+        document = {"$schema": _SCHEMA, "version": "2.1.0", "runs": [run]}
+        return json_text(document, indent=2) + "\n"
 
 
 def _rule(rule: Rule) -> dict[str, Any]:

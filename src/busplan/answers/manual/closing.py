@@ -32,6 +32,10 @@ _COMPLETION: Final = Entry(
     "",
     "Set by the completion script of a shell, which --install-completion puts in place; not for use by hand.",
 )
+_FIGURES: Final = (
+    "Keys of the JSON of `busplan capacity`, `busplan latency` and `busplan circle-test`, with what they are, their "
+    "unit and the equation that they come from. `busplan explain` derives each of them."
+)
 _PAPER: Final = (
     'G. Gu, L. Zhu, Z. Xiong and H. Ding, "Design of a Distributed Multiaxis Motion Control System Using the '
     'IEEE-1394 Bus", IEEE Transactions on Industrial Electronics 57 (12), December 2010, pp. 4209 ff.: the paper '
@@ -59,10 +63,7 @@ def _figures() -> ManualSection:
     figures = by_key(figure for one in registers for command in one.values() for figure in command.values())
     return ManualSection(
         "Figures",
-        (
-            "Keys of the JSON of `busplan capacity`, `busplan latency` and `busplan circle-test`, with what they are, "
-            "their unit and the equation that they come from. `busplan explain` derives each of them.",
-        ),
+        (_FIGURES,),
         tuple(Entry((figure.key,), "", _about(figure)) for figure in figures.values()),
     )
 

@@ -107,7 +107,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     if limit is not None and limit.is_broken(network):
         yield Sentence((f"Not drawn: {limit.words(network)}.",))
     else:
-        yield timeline_chart(answer.schedule)
+        yield source.gives(timeline_chart(answer.schedule))
     yield source.gives(totals_table(answer.schedule))
     yield source.line
 
@@ -153,7 +153,7 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Section:
             ),
         ),
         tuple(_over_period(answer)),
-        Sentence(("Most nodes and axes; the profile's own period in bold",)),
+        Sentence(("Most nodes and axes at the profile's own period and about it",)),
     )
     chart = Chart(AxesDrawing(answer.profile, steps), caption)
     return Section(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")

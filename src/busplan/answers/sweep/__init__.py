@@ -1,1 +1,1 @@
-"""`busplan sweep`: rows as text, the best of them for people, and a figure."""
+"""`busplan sweep`: every row as text, and the best of them for people."""

@@ -11,8 +11,9 @@ import numpy as np
 
 from busplan.analysis.sweep.blocks import Block, Column
 from busplan.analysis.sweep.grid import Array, Grid
-from busplan.answers.documents import Document, document
-from busplan.forms.json_and_csv import csv_cell
+from busplan.answers.documents import document
+from busplan.forms.blocks import Document
+from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
 
 Style = Literal["csv", "jsonl"]

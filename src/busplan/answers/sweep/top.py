@@ -1,14 +1,32 @@
-"""A sweep for people: how many points fit, and the rows at the top."""
+"""Answer of `busplan sweep` for people: how many points fit, and the rows at the top."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isnan
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.sweep.blocks import Block
+from busplan.answers.figure_tables import cell_state
 from busplan.buses.bus import Bus
-from busplan.forms.lines import BLANK, Line, plural, table, us, yes
+from busplan.buses.figure import Figure, by_key
+from busplan.forms.blocks import (
+    Code,
+    Column,
+    Document,
+    Record,
+    Report,
+    Row,
+    Sentence,
+    Table,
+    Value,
+    count_value,
+    figure_value,
+    joined,
+    sentence,
+)
+from busplan.forms.numbers import nouns
 
 DEFAULT_COLUMNS: Final = (
     "required_us",
@@ -38,7 +56,7 @@ class Tally:
 
     def __init__(self, bus: Bus, timing_models: Sequence[str]) -> None:
         self.points = 0
-        self._bus = bus
+        self.bus = bus
         self._models = timing_models
         self._fits = [0] * len(timing_models)
         self._unsafe = 0
@@ -55,7 +73,7 @@ class Tally:
         self.points += points
         for number, figures in enumerate(block.models):
             self._fits[number] += _share(figures["fits"].values, points)
-        safety = self._bus.safety_figure
+        safety = self.bus.safety_figure
         if safety is not None:
             # The same under every model: how the bus is set is the profile's.
             self._unsafe += points - _share(block.models[0][safety.key].values, points)
@@ -64,30 +82,55 @@ class Tally:
             before = self._passed or [0] * len(passed)
             self._passed = [old + new for old, new in zip(before, passed, strict=True)]
 
-    def lines(self, name: str, *, expected: int) -> list[Line]:
-        """Summary of all that was counted."""
-        cut = "" if self.points == expected else f" of {expected:,} (interrupted)"
-        noun = "point" if self.points == 1 else "points"
-        found = [Line(f"{name}: {self.points:,} {noun}{cut}; {self._by_model(self._fits)} fit.")]
-        if self._passed is not None:
-            found.append(Line(f"The circle holds every tolerance at {self._by_model(self._passed)}."))
-        safety = self._bus.safety_figure
-        if self._unsafe and safety is not None:
-            found.append(
-                Line(f"At {self._unsafe:,} points the {self._bus.safety} is unsafe ({safety.key}).", "warning")
-            )
-        return found
+    def sentences(self, name: str, *, expected: int) -> Iterator[Sentence]:
+        """Summary of all that was counted.
 
-    def _by_model(self, counts: Sequence[int]) -> str:
-        return " and ".join(
-            f"{count:,} by the {model} model" for count, model in zip(counts, self._models, strict=True)
+        Parameters
+        ----------
+        name
+            The profile's.
+        expected
+            Points of the whole grid.
+        """
+        whole = count_value(expected, "points", at="/points", grouped=True)
+        found = whole if self.points == expected else count_value(self.points, grouped=True)
+        cut = Sentence(()) if self.points == expected else sentence(" of {} (interrupted)", whole)
+        head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", name, found)
+        yield joined(head, cut, Sentence(("; ",)), self._by_model(self._fits), Sentence((" fit.",)), by="")
+        if self._passed is not None:
+            yield joined(
+                Sentence(("The circle holds every tolerance at ",)),
+                self._by_model(self._passed),
+                Sentence((".",)),
+                by="",
+            )
+        safety = self.bus.safety_figure
+        if self._unsafe and safety is not None:
+            words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
+            yield sentence(words, count_value(self._unsafe, grouped=True), state="warns")
+
+    def _by_model(self, counts: Sequence[int]) -> Sentence:
+        parts = (
+            sentence(f"{{}} by the {model} model", count_value(count, grouped=True))
+            for count, model in zip(counts, self._models, strict=True)
         )
+        return joined(*parts, by=" and ")
 
 
 def _share(flags: Any, points: int) -> int:
     """How many points of a block a flag holds for, from its values before they broadcast."""
     count = int(flags.sum())
     return count * (points // int(flags.size))
+
+
+class TopRow(NamedTuple):
+    """One of the rows at the top."""
+
+    rank: float
+    """What it is sorted by, the smallest first."""
+    number: int
+    """Its place among all rows."""
+    record: Record
 
 
 class TopRows:
@@ -106,55 +149,94 @@ class TopRows:
     """
 
     def __init__(self, columns: Sequence[str], *, sort_by: str | None, ascending: bool, top: int) -> None:
-        self._columns, self._sort_by, self._top = columns, sort_by, top
+        self.columns = columns
+        self.kept: list[TopRow] = []
+        self._sort_by, self._top = sort_by, top
         self._sign = 1.0 if ascending else -1.0
-        self._kept: list[tuple[float, dict[str, Any]]] = []
 
     def add(self, block: Block) -> None:
         """Take one more block."""
         if self._sort_by is None:
             rows = block.chunk.points * len(block.models)
-            chosen = range(min(rows, self._top - len(self._kept)))
-            self._kept += [(0.0, block.row(index, self._columns)) for index in chosen]
+            chosen = range(min(rows, self._top - len(self.kept)))
+            self.kept += [self._row(block, index, rank=0.0) for index in chosen]
             return
         ranks = self._sign * block.rows(self._sort_by).astype(float)
-        worst = self._kept[-1][0] if len(self._kept) >= self._top else np.inf
+        worst = self.kept[-1].rank if len(self.kept) >= self._top else np.inf
         # What does not exist (NaN) has no rank; of equals, the first in the grid stays.
         better = np.flatnonzero(ranks < worst)
         best = better[np.argsort(ranks[better], kind="stable")[: self._top]]
-        self._kept += [(float(ranks[index]), block.row(int(index), self._columns)) for index in best]
-        self._kept = sorted(self._kept, key=lambda pair: pair[0])[: self._top]
+        self.kept += [self._row(block, int(index), rank=float(ranks[index])) for index in best]
+        self.kept = sorted(self.kept, key=lambda row: row.rank)[: self._top]
+
+    def _row(self, block: Block, index: int, *, rank: float) -> TopRow:
+        number = block.chunk.start * len(block.models) + index
+        return TopRow(rank, number, block.row(index, self.columns))
 
     @property
-    def rows(self) -> list[dict[str, Any]]:
-        """The rows, the best first."""
-        return [row for _, row in self._kept]
-
-    def lines(self, tally: Tally, name: str, *, expected: int) -> list[Line]:
-        """Summary and table."""
-        total = tally.rows
-        order = (
-            "" if self._sort_by is None else f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first"
-        )
-        shown = (
-            f"{len(self._kept)} of {total:,} rows{order}"
-            if len(self._kept) < total
-            else f"{plural(total, 'row')}{order}"
-        )
-        cells = [[_cell(column, row[column]) for column in self._columns] for row in self.rows]
-        return [
-            *tally.lines(name, expected=expected),
-            Line(f"{shown}."),
-            BLANK,
-            *table(self._columns, cells, left=0),
-        ]
+    def order(self) -> str:
+        """How they are sorted, in words."""
+        if self._sort_by is None:
+            return ""
+        return f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first"
 
 
-def _cell(name: str, value: Any) -> str:
-    if isinstance(value, bool):
-        return yes(value)
-    if isinstance(value, float):
-        if isnan(value):
-            return "-"
-        return f"{value:.6f}" if name.endswith("_mm") else us(value)
-    return " ".join(value) or "-" if isinstance(value, list) else str(value)
+def sweep_report(top: TopRows, tally: Tally, *, name: str, expected: int, document: Callable[[], Document]) -> Report:
+    """Answer the question of `sweep`, with a few of its rows.
+
+    Parameters
+    ----------
+    top
+        The rows to show.
+    tally
+        All points, counted.
+    name
+        The profile's.
+    expected
+        Points of the whole grid.
+    document
+        Gives all rows.
+    """
+    return Report(
+        Sentence(("Sweep of ", Code(name))),
+        lambda: (*tally.sentences(name, expected=expected), _shown(top, tally), top_table(top, tally.bus)),
+        document,
+        lambda: document()["rows"],
+    )
+
+
+def _shown(top: TopRows, tally: Tally) -> Sentence:
+    total = count_value(tally.rows, grouped=True)
+    words = f"{nouns(tally.rows, 'row')}{top.order}."
+    if len(top.kept) < tally.rows:
+        return sentence(f"{{}} of {{}} {words}", count_value(len(top.kept)), total)
+    return sentence(f"{{}} {words}", total)
+
+
+def top_table(top: TopRows, bus: Bus) -> Table:
+    """The rows at the top, under the names that --columns and --sort take."""
+    figures = by_key((*CIRCLE_FIGURES, *bus.capacity_figures))
+    return Table(
+        tuple(_column(name, figures.get(name)) for name in top.columns),
+        tuple(Row(tuple(_cells(row, figures))) for row in top.kept),
+    )
+
+
+def _column(name: str, figure: Figure | None) -> Column:
+    if figure is None:
+        return Column(name)
+    unit = figure.column or figure.unit
+    # Most names say the unit, and 1 is none.
+    is_said = unit == "1" or name.endswith(unit)
+    return Column(name, "" if is_said else unit, kind="words" if figure.sort in ("word", "words") else "figures")
+
+
+def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
+    for name, own in row.record.items():
+        at = f"/rows/{row.number}/{name}"
+        value = None if isinstance(own, float) and isnan(own) else own
+        figure = figures.get(name)
+        if figure is None:
+            yield Value(value, name, at=at)
+        else:
+            yield figure_value(figure, value, at=at, state=cell_state(figure, value))

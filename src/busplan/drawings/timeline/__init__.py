@@ -1,1 +1,1 @@
-"""The timeline of a cycle: drawn for the terminal, as SVG, PNG and Mermaid, and as plain data."""
+"""The timeline of a cycle: drawn in characters, as SVG, PNG and Mermaid."""

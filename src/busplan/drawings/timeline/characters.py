@@ -4,25 +4,23 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from busplan.analysis.network import bus_of
-from busplan.analysis.timeline.schedule import Event, Schedule, totals
-from busplan.answers.verdict_sentences import warnings
+from busplan.analysis.timeline.schedule import Event, Schedule
 from busplan.buses.bus import IDLE
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import (
     Lane,
     beyond,
-    charged,
     drawn_window,
     event_lanes,
     has_event_lanes,
-    headline,
     node_lanes,
     only_owner,
     overruns,
     stretches,
     strip_title,
+    time_text,
 )
-from busplan.forms.lines import BLANK, Line, table, us
+from busplan.forms.lines import BLANK, Line
 from busplan.forms.scale import ticks
 
 NARROWEST: Final = 60
@@ -33,7 +31,7 @@ _WINDOW: Final = "^"
 
 
 def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
-    """Verdict, the whole slice in one strip, the lanes of the window, and what each kind takes of it.
+    """Draw the whole slice in one strip, and the lanes of the window.
 
     Parameters
     ----------
@@ -43,17 +41,9 @@ def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
         Columns of the terminal.
     """
     width = max(width, NARROWEST)
-    window, figures = drawn_window(plan), plan.figures
-    lines = [
-        Line(headline(plan), "good" if figures.fits and figures.safe else "bad"),
-        Line(f"{charged(window)}."),
-        *(Line(warning, "warning") for warning in warnings(plan.profile, nodes=figures.nodes, most=0)),
-        BLANK,
-        *_strip(plan, width=width),
-        BLANK,
-    ]
-    lines.extend(_event_rows(window, width=width) if has_event_lanes(window) else _node_rows(window, width=width))
-    return [*lines, BLANK, *_totals(plan)]
+    window = drawn_window(plan)
+    lanes = _event_rows(window, width=width) if has_event_lanes(window) else _node_rows(window, width=width)
+    return [*_strip(plan, width=width), BLANK, *lanes]
 
 
 def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
@@ -72,7 +62,7 @@ def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
     bar = _Bar(0.0, plan.end_us, width - gutter - 3)
     yield Line(f"{strip_title(plan)}, {bar.per_column}", "heading")
     for label, row in rows.items():
-        yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "bad" if label == "over" else "table")
+        yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "fails" if label == "over" else "drawn")
     yield bar.scale(gutter + 2)
     yield from _wrapped("Legend: ", legend, width=width)
 
@@ -82,11 +72,11 @@ def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     lanes = node_lanes(window)
     gutter = max(len(lane.label) for lane in lanes)
     bar = _Bar(window.from_us, window.to_us, width - gutter - 3)
-    yield Line(f"{us(window.from_us)} to {us(window.to_us)} us by node, {bar.per_column}", "heading")
+    yield Line(f"{time_text(window.from_us)} to {time_text(window.to_us)} us by node, {bar.per_column}", "heading")
     for lane in lanes:
-        yield Line(f"{lane.label:<{gutter}} |{bar.cells(_marked(window, lane))}|", "table")
+        yield Line(f"{lane.label:<{gutter}} |{bar.cells(_marked(window, lane))}|", "drawn")
     if overruns(window) and window.to_us > window.figures.available_us:
-        yield Line(f"{'over':<{gutter}} |{bar.cells([(_OVER, beyond(window))])}|", "bad")
+        yield Line(f"{'over':<{gutter}} |{bar.cells([(_OVER, beyond(window))])}|", "fails")
     yield bar.scale(gutter + 2)
     shown = {event.kind for event in window.events}
     kinds = (*bus_of(window.profile).event_kinds, IDLE)
@@ -101,13 +91,13 @@ def _marked(window: Schedule, lane: Lane) -> list[tuple[str, Event]]:
 def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     """A row for each event, with how long it takes."""
     lanes, owner = event_lanes(window), only_owner(window)
-    figures = [us(event.duration_us) for event in window.events]
+    figures = [time_text(event.duration_us) for event in window.events]
     gutter, digits = max(len(lane.label) for lane in lanes), max(map(len, figures))
     bar = _Bar(window.from_us, window.to_us, max(10, width - gutter - digits - 5))
     whose = "Events" if owner is None else f"The {owner}"
-    yield Line(f"{whose}, {us(window.from_us)} to {us(window.to_us)} us, {bar.per_column}", "heading")
+    yield Line(f"{whose}, {time_text(window.from_us)} to {time_text(window.to_us)} us, {bar.per_column}", "heading")
     for lane, figure in zip(lanes, figures, strict=True):
-        yield Line(f"{lane.label:<{gutter}}  {figure:>{digits}} |{bar.cells(_marked(window, lane))}|", "table")
+        yield Line(f"{lane.label:<{gutter}}  {figure:>{digits}} |{bar.cells(_marked(window, lane))}|", "drawn")
     yield bar.scale(gutter + digits + 4)
 
 
@@ -155,22 +145,7 @@ class _Bar:
             if text[max(0, at - 1) :].strip():
                 continue
             text = f"{text[:at]}{tick.label}{text[at + len(tick.label) :]}"
-        return Line(f"{'us':<{indent}}{text.rstrip()}", "table")
-
-
-def _totals(plan: Schedule) -> Iterator[Line]:
-    whole = "the cycle" if overruns(plan) else "the slice"
-    part = whole if plan.is_whole else "the window"
-    yield Line(f"What takes {part}, {us(plan.to_us - plan.from_us)} us", "heading")
-    yield from table(
-        ["kind", "eq", "events", "us", "share, %"],
-        (
-            [f"{kind.mark} {kind.label}", kind.reference, str(one.events), us(one.total_us), f"{one.share * 100:.2f}"]
-            for one in totals(plan)
-            for kind in (kind_of(plan.profile, one.kind),)
-        ),
-        left=2,
-    )
+        return Line(f"{'us':<{indent}}{text.rstrip()}", "drawn")
 
 
 def _wrapped(head: str, words: Sequence[str], *, width: int) -> Iterator[Line]:
@@ -179,7 +154,7 @@ def _wrapped(head: str, words: Sequence[str], *, width: int) -> Iterator[Line]:
     for number, word in enumerate(words):
         piece = word if number == len(words) - 1 else f"{word}, "
         if len(line) + len(piece.rstrip()) > width and line.strip():
-            yield Line(line.rstrip(), "table")
+            yield Line(line.rstrip(), "drawn")
             line = " " * len(head)
         line += piece
-    yield Line(line.rstrip(), "table")
+    yield Line(line.rstrip(), "drawn")

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.timeline.schedule import Event, Schedule
-from busplan.answers.verdict_sentences import period, story
+from busplan.analysis.timeline.schedule import TOTAL, Event, Schedule
 from busplan.drawings.timeline.kinds import event_title
-from busplan.forms.lines import plural, us
+from busplan.forms.blocks import Sentence, Value, count_value, figure_value, joined, sentence
+from busplan.forms.numbers import nouns, written
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events are drawn in a row each; more of them in a row for each node. One node's whole cycle is 20."""
@@ -29,22 +29,26 @@ class Stretch(NamedTuple):
     """From its start to its end."""
 
 
-def headline(plan: Schedule) -> str:
-    """Say whether the cycle fits, and under which model."""
-    figures = plan.figures
-    subject = f"{plan.profile.name} at {period(figures.period_us)}"
-    return f"{subject}: {story(figures, plan.profile)} ({figures.timing_model} model)."
+def time_text(time_us: float) -> str:
+    """Write a time as tables do, without its unit."""
+    return written(figure_value(TOTAL, time_us))
 
 
-def subject(plan: Schedule) -> str:
+def subject(plan: Schedule) -> Sentence:
     """Say what is shown: how many nodes, and which part of the cycle."""
-    bus = ", ".join((plural(plan.figures.nodes, "node"), *bus_of(plan.profile).setup_words(network_of(plan.profile))))
-    return f"{bus}; {us(plan.from_us)} to {us(plan.to_us)} us of the cycle"
+    nodes = plan.figures.nodes
+    setup = ", ".join((nouns(nodes, "node"), *bus_of(plan.profile).setup_words(network_of(plan.profile))))
+    return sentence(
+        f"{{}} {setup}; {{}} to {{}} of the cycle",
+        count_value(nodes, "nodes"),
+        Value(plan.from_us, "from_us", "", TOTAL.decimals),
+        Value(plan.to_us, "to_us", "us", TOTAL.decimals),
+    )
 
 
-def charged(plan: Schedule) -> str:
+def charged(plan: Schedule) -> Sentence:
     """Say what is shown, and which way on the wire each node is charged."""
-    return f"{subject(plan)}, {bus_of(plan.profile).way_charged}"
+    return joined(subject(plan), Sentence((bus_of(plan.profile).way_charged,)), by=", ")
 
 
 def overruns(plan: Schedule) -> bool:
@@ -59,9 +63,9 @@ def beyond(plan: Schedule) -> Event:
 
 def strip_title(plan: Schedule) -> str:
     """Say what the strip above the lanes shows."""
-    slice_us = us(plan.figures.available_us)
+    slice_us = time_text(plan.figures.available_us)
     if overruns(plan):
-        return f"The cycle of {us(plan.end_us)} us, beyond its slice of {slice_us} us"
+        return f"The cycle of {time_text(plan.end_us)} us, beyond its slice of {slice_us} us"
     return f"The slice of {slice_us} us"
 
 

@@ -7,7 +7,7 @@ from typing import Final
 from busplan.analysis.timeline.schedule import Event, Schedule
 from busplan.buses.figure import Ink
 from busplan.drawings.timeline.kinds import kind_of
-from busplan.drawings.timeline.lanes import Stretch, headline, overruns, stretches
+from busplan.drawings.timeline.lanes import Stretch, overruns, stretches
 
 MOST_EVENTS: Final = 40
 """Mermaid gives each task a row: up to this many events are shown each, more of them transaction by transaction."""
@@ -18,18 +18,20 @@ _PLAIN: Final = re.compile(r"[^A-Za-z0-9 .,()+/-]")
 _TAGS: Final[Mapping[Ink, str]] = {"work": "active, ", "gap": "done, ", "long-gap": "done, ", "idle": "done, "}
 
 
-def timeline_mermaid(plan: Schedule) -> str:
+def timeline_mermaid(plan: Schedule, *, title: str) -> str:
     """Write a gantt chart; one second of Mermaid's clock stands for one us, so that its axis counts us.
 
     Parameters
     ----------
     plan
         The schedule, narrowed to its window.
+    title
+        What it tells, in a sentence.
     """
     fine = plan.to_us - plan.from_us < _FINE_US
     head = [
         "gantt",
-        f"    title {escaped(headline(plan))}",
+        f"    title {escaped(title)}",
         "    dateFormat x",
         f"    axisFormat {'%s.%L' if fine else '%s'} us",
     ]

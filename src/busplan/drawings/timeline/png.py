@@ -9,7 +9,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from busplan.analysis.timeline.schedule import Event, Schedule, totals
+from busplan.analysis.timeline.schedule import SHARE, TOTAL, Event, Schedule, Total, totals
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import (
     Lane,
@@ -18,14 +18,16 @@ from busplan.drawings.timeline.lanes import (
     drawn_window,
     event_lanes,
     has_event_lanes,
-    headline,
     node_lanes,
     overruns,
     stretches,
     strip_title,
+    time_text,
 )
+from busplan.forms.blocks import figure_value
 from busplan.forms.inks import INKS
-from busplan.forms.lines import us
+from busplan.forms.numbers import with_unit
+from busplan.forms.terminal import sentence_text
 
 _OVER: Final = "#b3261e"
 _TITLE_CHARACTERS: Final = 110
@@ -34,13 +36,15 @@ _MOST_LANE_INCHES: Final = 60.0
 """Height of the lanes at most: thousands of them become thin, the sheet does not grow without end."""
 
 
-def timeline_png(plan: Schedule) -> bytes:
+def timeline_png(plan: Schedule, *, title: str) -> bytes:
     """Draw the slice in one strip, the window in lanes, and the legend with what each kind takes.
 
     Parameters
     ----------
     plan
         The schedule, narrowed to its window.
+    title
+        What it tells, in a sentence.
 
     Returns
     -------
@@ -55,8 +59,8 @@ def timeline_png(plan: Schedule) -> bytes:
     with rc_context({"text.parse_math": False}):
         figure = Figure(figsize=(11.0, lane_inches + 2.9), layout="constrained")
         strip, area = figure.subplots(2, 1, height_ratios=(0.7, lane_inches))
-        title = "\n".join(wrap(headline(plan), _TITLE_CHARACTERS))
-        figure.suptitle(title, fontsize=11, color="black" if plan.figures.fits else _OVER)
+        head = "\n".join(wrap(title, _TITLE_CHARACTERS))
+        figure.suptitle(head, fontsize=11, color="black" if plan.figures.fits else _OVER)
         _strip(strip, plan, window)
         _draw(area, lanes, window)
         figure.legend(handles=_legend(plan), loc="outside lower center", ncols=3, fontsize=8, frameon=False)
@@ -71,7 +75,7 @@ def _lanes(window: Schedule) -> tuple[Lane, ...]:
     if not has_event_lanes(window):
         return node_lanes(window)
     return tuple(
-        lane._replace(label=f"{lane.label}, {us(lane.events[0].duration_us)} us") for lane in event_lanes(window)
+        lane._replace(label=f"{lane.label}, {time_text(lane.events[0].duration_us)} us") for lane in event_lanes(window)
     )
 
 
@@ -116,7 +120,7 @@ def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
     axes.grid(visible=True, axis="x", linewidth=0.4, color="0.85")
     axes.set_axisbelow(True)
     axes.set_xlabel("time in the cycle [us]")
-    axes.set_title(charged(window), fontsize=9, loc="left")
+    axes.set_title(sentence_text(charged(window)), fontsize=9, loc="left")
 
 
 def _over(axes: Any, plan: Schedule) -> None:
@@ -127,10 +131,9 @@ def _over(axes: Any, plan: Schedule) -> None:
 
 
 def _legend(plan: Schedule) -> list[Patch]:
-    return [
-        Patch(
-            color=_colour(plan, one.kind),
-            label=f"{kind_of(plan.profile, one.kind).label}, {us(one.total_us)} us, {one.share * 100:.2f} %",
-        )
-        for one in totals(plan)
-    ]
+    return [Patch(color=_colour(plan, one.kind), label=_total_label(plan, one)) for one in totals(plan)]
+
+
+def _total_label(plan: Schedule, one: Total) -> str:
+    values = (figure_value(TOTAL, one.total_us), figure_value(SHARE, one.share))
+    return ", ".join((kind_of(plan.profile, one.kind).label, *map(with_unit, values)))

@@ -5,7 +5,7 @@ from textwrap import wrap
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.timeline.schedule import Event, Schedule, totals
+from busplan.analysis.timeline.schedule import SHARE, Event, Schedule, totals
 from busplan.drawings.timeline.kinds import event_title, kind_of
 from busplan.drawings.timeline.lanes import (
     Stretch,
@@ -14,17 +14,19 @@ from busplan.drawings.timeline.lanes import (
     drawn_window,
     event_lanes,
     has_event_lanes,
-    headline,
     node_lanes,
     only_owner,
     overruns,
     stretches,
     strip_title,
     subject,
+    time_text,
 )
 from busplan.drawings.timeline.svg_style import stylesheet
-from busplan.forms.lines import us
+from busplan.forms.blocks import figure_value
+from busplan.forms.numbers import written
 from busplan.forms.svg import LINE, Scale, drawing, inside, markup, text_at
+from busplan.forms.terminal import sentence_text
 
 _LINE_CHARACTERS: Final = 44
 """Characters of a line of words: what a phone shows at this size."""
@@ -38,7 +40,7 @@ _MOST_BARS: Final = 400
 """Bars in the lanes of a page: beyond them a transaction is one, for a page is read and not measured."""
 
 
-def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
+def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     """Draw the slice in one strip, the window in lanes, and the legend with what each kind takes.
 
     It has no width of its own: it fills what it is put into, from 320 px on.
@@ -47,37 +49,34 @@ def timeline_svg(plan: Schedule, *, inline: bool = False) -> str:
     ----------
     plan
         The schedule, narrowed to its window.
+    title
+        What it tells, in a sentence.
     inline
         For a page that has the style sheet once, and verdict, subject and legend in its own words: without these.
     """
-    root = drawing(headline(plan), css="busplan-timeline")
-    SubElement(root, "desc").text = subject(plan)
+    root = drawing(title, css="busplan-timeline")
+    SubElement(root, "desc").text = sentence_text(subject(plan))
     if not inline:
         SubElement(root, "style").text = stylesheet()
         SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     window = drawn_window(plan)
-    height = 0 if inline else _above(body, plan, window) + _GAP
+    height = 0 if inline else _above(body, plan, window, title=title) + _GAP
     height = _strip(body, plan, window, y=height)
     if has_event_lanes(window):
         height = _event_lanes(body, window, y=height + _GAP)
     else:
-        height = _node_lanes(body, window, y=height + _GAP, coarse=inline and is_coarse(window))
+        height = _node_lanes(body, window, y=height + _GAP, coarse=inline and len(window.events) > _MOST_BARS)
     if not inline:
         height = _legend(body, plan, y=height + _GAP) + _GAP
     root.set("height", str(height))
     return markup(root)
 
 
-def is_coarse(window: Schedule) -> bool:
-    """Whether a page draws a transaction as one bar, and not its phases."""
-    return len(window.events) > _MOST_BARS
-
-
-def _above(body: Element, plan: Schedule, window: Schedule) -> int:
+def _above(body: Element, plan: Schedule, window: Schedule, *, title: str) -> int:
     """The verdict and what is shown, in words; the height below them."""
-    height = _words(body, headline(plan), y=8, css="head" if plan.figures.fits else "head bad")
-    return _words(body, charged(window), y=height, css="small")
+    height = _words(body, title, y=8, css="head" if plan.figures.fits else "head bad")
+    return _words(body, sentence_text(charged(window)), y=height, css="small")
 
 
 def _words(parent: Element, text: str, *, y: int, css: str) -> int:
@@ -132,7 +131,7 @@ def _edge(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int)
 
 
 def _tip(label: str, event: Event) -> str:
-    return f"{label}, {us(event.duration_us)} us: {us(event.start_us)} to {us(event.end_us)} us"
+    return f"{label}, {time_text(event.duration_us)} us: {time_text(event.start_us)} to {time_text(event.end_us)} us"
 
 
 class _Bars(NamedTuple):
@@ -161,7 +160,8 @@ class _Bars(NamedTuple):
 def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
     """A lane for the bus and one for each node."""
     lanes = node_lanes(window)
-    y = _words(body, f"{us(window.from_us)} to {us(window.to_us)} us, by node", y=y, css="head") + 4
+    bars = ", a bar for each transaction" if coarse else ""
+    y = _words(body, f"{time_text(window.from_us)} to {time_text(window.to_us)} us, by node{bars}", y=y, css="head") + 4
     scale = Scale(window.from_us, window.to_us)
     pitch = _BAR + 4 if len(lanes) <= _MOST_TALL_LANES else _BAR - 3
     area = inside(body, x_percent=_GUTTER_PERCENT, width_percent=100 - _GUTTER_PERCENT, y=0)
@@ -184,7 +184,7 @@ def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int
 def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
     """A lane for each event, its name above it."""
     owner = only_owner(window)
-    title = f"{us(window.from_us)} to {us(window.to_us)} us{'' if owner is None else f', {owner}'}"
+    title = f"{time_text(window.from_us)} to {time_text(window.to_us)} us{'' if owner is None else f', {owner}'}"
     y = _words(body, title, y=y, css="head")
     scale = Scale(window.from_us, window.to_us)
     pitch = LINE + _BAR
@@ -194,7 +194,7 @@ def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
     for number, lane in enumerate(event_lanes(window)):
         top = y + pitch * number
         (event,) = lane.events
-        text_at(body, f"{lane.label}, {us(event.duration_us)} us", x="0", y=top + LINE - 4, css="small")
+        text_at(body, f"{lane.label}, {time_text(event.duration_us)} us", x="0", y=top + LINE - 4, css="small")
         SubElement(body, "rect", {"class": "track", "width": "100%", "y": str(top + LINE), "height": str(_BAR - 4)})
         if over:
             _over(body, window, scale, y=top + LINE, height=_BAR - 4)
@@ -214,6 +214,6 @@ def _legend(body: Element, plan: Schedule, *, y: int) -> int:
         kind = kind_of(plan.profile, one.kind)
         SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
         text_at(body, kind.label, x="20", y=y + 15)
-        text_at(body, us(one.total_us), x="240", y=y + 15, anchor="end")
-        text_at(body, f"{one.share * 100:.2f}", x="310", y=y + 15, anchor="end")
+        text_at(body, time_text(one.total_us), x="240", y=y + 15, anchor="end")
+        text_at(body, written(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
     return y + LINE

@@ -1,0 +1,70 @@
+"""Answer of `busplan check`, as a document and in sentences; `gate` has it for build services."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from busplan.answers.documents import document
+from busplan.answers.gate.plain import finding_parts
+from busplan.forms.blocks import Code, Document, Record, Report, Sentence, State, count_value, joined, sentence
+from busplan.forms.numbers import nouns
+from busplan.rules.report import CheckReport
+
+
+def check_report(report: CheckReport) -> Report:
+    """Answer the question of `check`."""
+    return Report(
+        Sentence(("Check of profiles",)),
+        lambda: tuple(_sentences(report)),
+        partial(check_document, report),
+        partial(check_records, report),
+    )
+
+
+def _sentences(report: CheckReport) -> Iterator[Sentence]:
+    """Each finding, what could not be checked, and what it adds up to."""
+    for one in report.located:
+        place, words = finding_parts(one.path, one.finding)
+        yield Sentence((Code(place), f" {words}"), "fails" if one.finding.severity == "error" else "warns")
+    yield from (Sentence((file.failure,), "fails") for file in report.files if file.failure is not None)
+    yield summary_sentence(report)
+
+
+def summary_sentence(report: CheckReport) -> Sentence:
+    """Say how many profiles were checked, and what was found."""
+    counts = report.summary
+    failed = sum(file.failure is not None for file in report.files)
+    checked = counts.files - failed
+    summary = sentence(
+        f"checked {{}} {nouns(checked, 'profile')}: {{}} {nouns(counts.errors, 'error')}, "
+        f"{{}} {nouns(counts.warnings, 'warning')}",
+        count_value(checked, "files", at="" if failed else "/summary/files"),
+        count_value(counts.errors, "errors", at="/summary/errors"),
+        count_value(counts.warnings, "warnings", at="/summary/warnings"),
+        state=_state(report),
+    )
+    return joined(summary, sentence("{} could not be checked", count_value(failed)), by="; ") if failed else summary
+
+
+def _state(report: CheckReport) -> State:
+    if report.failed or report.has_findings("error"):
+        return "fails"
+    return "warns" if report.has_findings("warning") else "passes"
+
+
+def check_records(report: CheckReport) -> list[Record]:
+    """One row a finding."""
+    return [{"path": one.path, **one.finding._asdict()} for one in report.located]
+
+
+def check_document(report: CheckReport) -> Document:
+    """Document of `busplan check --format json`."""
+    files = []
+    for one in report.files:
+        content = {
+            "path": one.path,
+            "profile": one.profile,
+            "status": one.status,
+            "findings": [finding._asdict() for finding in one.findings],
+        }
+        files.append(content if one.failure is None else {**content, "failure": one.failure})
+    return document("check", files=files, summary=report.summary._asdict())

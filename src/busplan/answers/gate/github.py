@@ -1,0 +1,36 @@
+"""Findings as workflow commands, which GitHub shows beside the line of the file."""
+
+from busplan.answers.gate import GateFormat
+from busplan.answers.gate.plain import Text
+from busplan.printable import printable
+from busplan.rules.report import CheckReport, Located
+
+
+class GitHub(GateFormat):
+    """One workflow command a finding."""
+
+    def write(self, report: CheckReport) -> str:
+        """Write the commands."""
+        return "".join(f"{_command(one)}\n" for one in report.located)
+
+    def log(self, report: CheckReport) -> list[str]:
+        """Every finding: GitHub shows ten annotations of a kind a step."""
+        return Text().write(report).splitlines()
+
+
+def _command(one: Located) -> str:
+    finding = one.finding
+    properties = {
+        "file": one.path,
+        "line": str(finding.line),
+        "col": str(finding.column),
+        "title": f"{finding.code} {finding.rule}",
+    }
+    said = ",".join(f"{name}={_escaped(value, property_=True)}" for name, value in properties.items())
+    return f"::{finding.severity} {said}::{_escaped(finding.message, property_=False)}"
+
+
+def _escaped(text: str, *, property_: bool) -> str:
+    text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    # What GitHub has no escape for commands no terminal either.
+    return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)

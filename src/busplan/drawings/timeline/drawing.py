@@ -1,0 +1,38 @@
+"""The timeline of a cycle in every way that it is drawn inside an answer."""
+
+from busplan.analysis.timeline.schedule import Schedule
+from busplan.drawings.timeline.characters import timeline_lines
+from busplan.drawings.timeline.mermaid import timeline_mermaid
+from busplan.drawings.timeline.svg import timeline_svg
+from busplan.drawings.timeline.svg_style import stylesheet
+from busplan.forms.blocks import Drawing
+from busplan.forms.lines import Line
+
+
+class TimelineDrawing(Drawing):
+    """A cycle to scale.
+
+    Parameters
+    ----------
+    plan
+        The schedule, narrowed to its window.
+    title
+        What it tells, in a sentence.
+    """
+
+    stylesheet = stylesheet()
+
+    def __init__(self, plan: Schedule, *, title: str) -> None:
+        self._plan, self._title = plan, title
+
+    def svg(self) -> str:
+        """Draw it without the style sheet and the words that a page has once."""
+        return timeline_svg(self._plan, title=self._title, inline=True)
+
+    def characters(self, width: int) -> list[Line]:
+        """Draw the whole slice in one strip, and the lanes of the window."""
+        return timeline_lines(self._plan, width=width)
+
+    def mermaid(self) -> str:
+        """Write a gantt chart."""
+        return timeline_mermaid(self._plan, title=self._title)

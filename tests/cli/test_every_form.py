@@ -1,0 +1,182 @@
+"""Each question in each form: what the form promises, the same document in a file, and names that stay text."""
+
+import csv
+import json
+from collections.abc import Callable
+from html.parser import HTMLParser
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from markdown_it import MarkdownIt
+
+from busplan.forms import ENDINGS
+
+if TYPE_CHECKING:
+    from subprocess import CompletedProcess
+
+Run = Callable[..., "CompletedProcess[str]"]
+Refused = Callable[..., str]
+
+QUESTIONS = (
+    ("diff", "paper-1ms", "paper-optimal-gap"),
+    ("diff", "paper-1ms", "paper-1ms", "--no-circle"),
+    ("explain", "paper-1ms"),
+    ("explain", "paper-1ms", "required_us", "--timing", "both"),
+    ("explain", "paper-1ms", "cheapest_change"),
+    ("explain", "paper-1ms", "centre_offset_mm"),
+    ("explain", "paper-1ms", "period_us"),
+    ("calibrate", "paper-two-node", "table-1.csv"),
+    ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
+    ("paper",),
+    ("profiles",),
+    ("rule",),
+    ("rule", "bp110"),
+    ("rule", "BP001"),
+)
+
+NAME = "<script>alert(1)</script> | `x` [a](http://b) @team *c*"
+PROFILE = """schema_version = 1
+name = "<script>alert(1)</script> | `x` [a](http://b) @team *c*"
+description = "<img src=x onerror=alert(1)> **bold**"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+nodes = 2
+[cycle]
+period_us = 1000
+[payload]
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+execution = { kind = "linear", base_us = 30, per_byte_us = 0.35 }
+"""
+MEASUREMENTS = "<b>m `1` *c*.csv"
+HOSTILE = (
+    ("diff", "hostile.toml", "paper-1ms", "--no-circle"),
+    ("diff", "paper-1ms", "hostile.toml", "--no-circle"),
+    ("explain", "hostile.toml"),
+    ("explain", "hostile.toml", "text"),
+    ("explain", "hostile.toml", "required_us"),
+    ("calibrate", "hostile.toml", MEASUREMENTS),
+)
+
+
+class Page(HTMLParser):
+    """Tags of a page, its text, and its figures with their places."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.text = ""
+        self.figures: list[tuple[str, Any]] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        found = dict(attrs)
+        if tag == "data":
+            self.figures.append((found.get("data-at") or "", json.loads(found["value"] or "")))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def at(document: Any, pointer: str) -> Any:
+    for step in pointer.split("/")[1:]:
+        document = document[int(step) if isinstance(document, list) else step]
+    return document
+
+
+def written(run: Run, question: tuple[str, ...], form: str, **options: Any) -> str:
+    done = run(*question, "--format", form, **options)
+    assert (done.returncode, done.stderr) == (0, ""), done
+    return done.stdout
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=" ".join)
+def test_each_form_is_what_it_promises(run: Run, question: tuple[str, ...]) -> None:
+    document = json.loads(written(run, question, "json"))
+    assert (document["schema"], document["command"]) == (1, question[0])
+
+    rows = list(csv.reader(StringIO(written(run, question, "csv"))))
+    assert len(rows) > 1
+    assert {len(row) for row in rows} == {len(set(rows[0]))}
+
+    page = Page(written(run, question, "html"))
+    assert page.tags.count("h1") == 1
+    assert "script" not in page.tags
+    placed = [(place, value) for place, value in page.figures if place]
+    assert bool(placed) == (question[0] != "rule")
+    for place, value in placed:
+        assert at(document, place) == value
+
+    markdown = written(run, question, "markdown")
+    assert markdown.startswith(("# ", "### "))
+    rendered = Page(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown))
+    assert rendered.tags[0] in ("h1", "h3")
+
+    text = written(run, question, "table")
+    assert text == run(*question).stdout
+    assert text.endswith("\n")
+    assert not text.endswith("\n\n")
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=" ".join)
+def test_a_file_holds_what_standard_output_has(run: Run, question: tuple[str, ...], tmp_path: Path) -> None:
+    for ending, form in ENDINGS.items():
+        done = run(*question, "-o", f"answer{ending}", cwd=tmp_path)
+        assert (done.returncode, done.stdout, done.stderr) == (0, "", f"wrote answer{ending}\n")
+        assert (tmp_path / f"answer{ending}").read_text(encoding="utf-8") == written(run, question, form)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("markup")
+    (folder / "hostile.toml").write_text(PROFILE, encoding="utf-8")
+    for name in ("measured.csv", MEASUREMENTS):
+        (folder / name).write_text("payload_bytes,latency_us\n4,48\n64,80\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("question", HOSTILE, ids=lambda question: " ".join(question[:3]))
+def test_names_that_are_markup_stay_text(run: Run, question: tuple[str, ...], folder: Path) -> None:
+    page = Page(written(run, question, "html", cwd=folder))
+    markdown = written(run, question, "markdown", cwd=folder)
+    for shown in (page, Page(MarkdownIt("commonmark", {"html": True}).enable("table").render(markdown))):
+        assert not {"script", "img", "b", "em", "a"} & set(shown.tags)
+        assert NAME in shown.text
+        assert (MEASUREMENTS in shown.text) == (MEASUREMENTS in question)
+
+
+def test_what_is_read_is_not_overwritten(refused: Refused, folder: Path) -> None:
+    measured = folder / "measured.csv"
+    before = measured.read_bytes()
+    said = "would overwrite measured.csv, which is read; give another name"
+    calibrate = ("calibrate", "hostile.toml", "measured.csv", "-o", "measured.csv")
+    assert said in refused(*calibrate, cwd=folder)
+    (folder / "answer.json").symlink_to("hostile.toml")
+    for question in (
+        ("diff", "hostile.toml", "paper-1ms"),
+        ("diff", "paper-1ms", "hostile.toml"),
+        ("explain", "hostile.toml"),
+        ("explain", "hostile.toml", "required_us"),
+        ("calibrate", "hostile.toml", "measured.csv"),
+    ):
+        said = refused(*question, "-o", "answer.json", cwd=folder)
+        assert said == "--output answer.json: would overwrite hostile.toml, which is read; give another name"
+    assert (measured.read_bytes(), (folder / "hostile.toml").read_text(encoding="utf-8")) == (before, PROFILE)
+    assert "no such file" in refused("calibrate", "hostile.toml", "none.csv", "-o", "new.json", cwd=folder)
+    assert not (folder / "new.json").exists()
+
+
+def test_a_gate_that_fails_has_given_its_answer(run: Run, tmp_path: Path) -> None:
+    gate = ("diff", "paper-optimal-gap", "paper-1ms", "--no-circle", "--fail-on-regression", "-o", "diff.md")
+    done = run(*gate, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    wrote, regression = done.stderr.splitlines()
+    assert wrote == "wrote diff.md"
+    assert regression.startswith("regression: B is worse in 10 figures: ")
+    assert (tmp_path / "diff.md").read_text(encoding="utf-8").startswith("### Changes from `paper-optimal-gap` to ")
