@@ -259,7 +259,11 @@ def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("nodes", "bars", "said"),
-    [(16, 2 * 9 * 16, ""), (62, 2 * 62, " A bar is a whole transaction."), (1000, 0, "1000 nodes are over the 62")],
+    [
+        (16, 2 * 9 * 16, ""),
+        (62, 2 * 62, " A bar is a whole transaction."),
+        (1000, 0, "1000 nodes are over the 62"),
+    ],
 )
 def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
     profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)

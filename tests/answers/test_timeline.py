@@ -262,14 +262,10 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
 
 def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
     many = plan(bus__nodes=62, bus__max_hops=3)
-    said = "by node, a bar for each transaction"
-    assert said in words_of(timeline_chart(many).drawing.svg())
-    assert said not in words_of(timeline_chart(plan()).drawing.svg()) + words_of(timeline_svg(many))
-
-
-def words_of(drawing: str | None) -> str:
-    """Everything that a drawing says in words, its lines behind one another."""
-    return " ".join(one.text or "" for one in ET.fromstring(drawing or "").iter(f"{SVG}text"))
+    legend = timeline_chart(many).legend
+    assert legend is not None
+    assert sentence_text(legend) == "A bar is a whole transaction."
+    assert timeline_chart(plan()).legend is None
 
 
 def spans(one: Schedule) -> list[tuple[str, float, float]]:

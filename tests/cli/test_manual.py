@@ -14,7 +14,9 @@ from markdown_it import MarkdownIt
 from typer.main import get_command
 
 from busplan import __version__
+from busplan.analysis.register import figures_of
 from busplan.answers.manual.pages import Entry, Manual
+from busplan.buses import kind_named
 from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
 from busplan.cli.tree import manual_of
@@ -77,9 +79,12 @@ def test_it_has_every_command_and_every_parameter_but_help() -> None:
 
 def test_it_says_what_holds_for_all_commands() -> None:
     sections = {section.title: section for section in manual().sections}
-    assert tuple(sections) == ("Exit status", "Environment", "Files", "See also")
+    assert tuple(sections) == ("Exit status", "Figures", "Environment", "Files", "See also")
     names = {title: [name for entry in one.entries for name in entry.names] for title, one in sections.items()}
     assert names["Exit status"] == ["0", "1", "2", "130"]
+    figures = figures_of(kind_named("ieee1394"))
+    assert set(names["Figures"]) >= {key for command in figures.values() for key in command}
+    assert len(names["Figures"]) == len(set(names["Figures"]))
     assert {"NO_COLOR", "FORCE_COLOR", "BUSPLAN_FORMAT", "_BUSPLAN_COMPLETE"} <= set(names["Environment"])
     assert {"paper-4ms", "table-1.csv"} <= set(names["Files"])
 

@@ -63,7 +63,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         found = {key: value or "" for key, value in attrs}
-        if tag == "data":
+        if tag == "data" and "data-at" in found:
             self._data, self._text = found, ""
         elif tag == "code":
             self._code = found.get("id", "a name")

@@ -172,7 +172,7 @@ def circle_chart(
         else sentence("the tolerance of {} dashed.", tolerance)
     )
     magnified = sentence(
-        "magnified {} times; {} from ring to ring, the nominal circle drawn strong; ",
+        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; ",
         Value(scale.times(result.radius_mm), decimals=0),
         Value(scale.ring_um, unit="um"),
     )

@@ -12,6 +12,7 @@ from busplan.answers.verdict import story, warnings
 from busplan.drawings.timeline.drawing import TimelineDrawing
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import charged, drawn_window, overruns
+from busplan.drawings.timeline.svg import is_coarse
 from busplan.forms.blocks import (
     Block,
     Chart,
@@ -75,8 +76,10 @@ def timeline_chart(plan: Schedule) -> Chart:
         The schedule, narrowed to its window.
     """
     subject = Sentence((f"One communication cycle by the {plan.figures.timing_model} model, ",))
-    caption = joined(subject, charged(drawn_window(plan)), Sentence((".",)), by="")
-    return Chart(TimelineDrawing(plan, title=sentence_text(headline(plan))), _placed(caption, plan))
+    window = drawn_window(plan)
+    caption = joined(subject, charged(window), by="")
+    legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
+    return Chart(TimelineDrawing(plan, title=sentence_text(headline(plan))), _placed(caption, plan), legend)
 
 
 def totals_table(plan: Schedule) -> Table:

@@ -110,7 +110,7 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
     if len(subjects) == 1:
         yield from _chapter(subjects[0])
         return
-    yield Section(Sentence(("Comparison",)), (_comparison(subjects),), "comparison")
+    yield Section(Sentence(("Comparison",)), (_comparison(subjects),), "comparison", "comparison")
     for one in subjects:
         yield Section(Sentence((Code(one.name),)), tuple(_chapter(one)), key=one.key)
 

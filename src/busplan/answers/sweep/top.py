@@ -225,10 +225,9 @@ def top_table(top: TopRows, bus: Bus) -> Table:
 def _column(name: str, figure: Figure | None) -> Column:
     if figure is None:
         return Column(name)
-    unit = figure.column or figure.unit
-    # Most names say the unit, and 1 is none.
-    is_said = unit == "1" or name.endswith(unit)
-    return Column(name, "" if is_said else unit, kind="words" if figure.sort in ("word", "words") else "figures")
+    # All other units are said by the names.
+    unit = "%" if figure.column == "%" else ""
+    return Column(name, unit, kind="words" if figure.sort in ("word", "words") else "figures")
 
 
 def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
@@ -239,4 +238,7 @@ def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
         if figure is None:
             yield Value(value, name, at=at)
         else:
-            yield figure_value(figure, value, at=at, state=cell_state(figure, value))
+            shown = figure_value(figure, value, at=at, state=cell_state(figure, value))
+            # In the unit that the column's name says; a length in mm has the digits of one in um.
+            finer = 3 if figure.unit == "mm" and figure.column == "um" else 0
+            yield shown._replace(unit=figure.unit or shown.unit, decimals=shown.decimals and shown.decimals + finer)

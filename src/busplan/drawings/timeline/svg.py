@@ -66,11 +66,16 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     if has_event_lanes(window):
         height = _event_lanes(body, window, y=height + _GAP)
     else:
-        height = _node_lanes(body, window, y=height + _GAP, coarse=inline and len(window.events) > _MOST_BARS)
+        height = _node_lanes(body, window, y=height + _GAP, coarse=inline and is_coarse(window))
     if not inline:
         height = _legend(body, plan, y=height + _GAP) + _GAP
     root.set("height", str(height))
     return markup(root)
+
+
+def is_coarse(window: Schedule) -> bool:
+    """Whether a page draws a bar for a transaction, and not for each of its events."""
+    return len(window.events) > _MOST_BARS
 
 
 def _above(body: Element, plan: Schedule, window: Schedule, *, title: str) -> int:
@@ -160,8 +165,7 @@ class _Bars(NamedTuple):
 def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
     """A lane for the bus and one for each node."""
     lanes = node_lanes(window)
-    bars = ", a bar for each transaction" if coarse else ""
-    y = _words(body, f"{time_text(window.from_us)} to {time_text(window.to_us)} us, by node{bars}", y=y, css="head") + 4
+    y = _words(body, f"{time_text(window.from_us)} to {time_text(window.to_us)} us, by node", y=y, css="head") + 4
     scale = Scale(window.from_us, window.to_us)
     pitch = _BAR + 4 if len(lanes) <= _MOST_TALL_LANES else _BAR - 3
     area = inside(body, x_percent=_GUTTER_PERCENT, width_percent=100 - _GUTTER_PERCENT, y=0)
