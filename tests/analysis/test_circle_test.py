@@ -6,7 +6,7 @@ from math import cos
 import pytest
 
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.circle.contour_profile import contour_profile
+from busplan.analysis.circle.contour_profile import CONTOUR_SECTORS, contour_profile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, circle_test, to_attack
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load, shipped_names
@@ -327,6 +327,25 @@ def test_the_error_around_the_circle_lies_between_f_min_and_f_max(small: Profile
     assert len(profile.low_mm) == len(profile.high_mm) == 36
     assert min(value for value in profile.low_mm if value is not None) == result.radial_deviation_min_mm
     assert max(value for value in profile.high_mm if value is not None) == result.radial_deviation_max_mm
+
+
+@pytest.mark.parametrize("ramp_periods", [20, 600])
+def test_a_condensed_profile_is_that_of_fewer_sectors(small: Profile, ramp_periods: int) -> None:
+    run = circle_test(override(small, {"servo.reversal_mm_s": 2.0, "circle.ramp_periods": ramp_periods})).runs[0]
+    assert run is not None
+    fine = contour_profile(run)
+    assert len(fine.low_mm) == CONTOUR_SECTORS
+    # The ramps leave a part of the circle without an error.
+    assert None in fine.low_mm
+    for sectors in (360, 72, 24, 1):
+        assert fine.condensed(sectors=sectors) == contour_profile(run, sectors=sectors)
+
+
+def test_what_did_not_go_round_is_not_drawn(small: Profile) -> None:
+    run = circle_test(override(small, {"servo.position_gain_per_s": 30_000.0})).runs[0]
+    assert run is not None
+    assert drawn_profile(run) is None
+    assert drawn_profile(None) is None
 
 
 @pytest.mark.parametrize(

@@ -19,13 +19,11 @@ from markdown_it import MarkdownIt
 
 from busplan.analysis.all_answers import AllAnswers, all_answers
 from busplan.analysis.capacity.node_steps import node_steps
-from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.answers.page.commands import shell_word, sources
 from busplan.answers.page.report import ReportedProfile, page_report
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.drawings.axes import AxesDrawing, drawn_range
-from busplan.drawings.circle import circle_chart, magnified
 from busplan.drawings.terms import LEFT, TermsDrawing
 from busplan.forms import render
 from busplan.forms.blocks import Report, Section, Table, Value, values_in
@@ -371,44 +369,6 @@ def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:
     root = ET.fromstring(TermsDrawing(results).svg())
     (edge,) = (line for line in root.iter(f"{SVG}line") if line.get("class") == "edge")
     assert float((edge.get("x1") or "").rstrip("%")) == pytest.approx(150 / results[1].required_us * 100, rel=1e-3)
-
-
-def radii(path: str) -> list[float]:
-    return [math.hypot(float(x), float(y)) for x, y in re.findall(r"(-?[\d.]+) (-?[\d.]+)", path)]
-
-
-def test_a_circle_is_drawn_as_far_out_as_its_error() -> None:
-    profile = ContourProfile((0.0, -0.01, 0.0, 0.0), (0.01, 0.0, 0.0, 0.0))
-    scale = magnified(profile, tolerance_mm=0.02)
-    assert scale is not None
-    assert (scale.largest_mm, scale.ring_um, scale.tolerance_mm) == (0.02, 10.0, 0.02)
-    assert scale.times(100.0) == pytest.approx(0.25 / 0.02 * 100)
-    root = ET.fromstring(circle_chart(profile, scale))
-    rings = {ring.get("class"): float(ring.get("r") or 0) for ring in root.iter(f"{SVG}circle")}
-    (path,) = root.iter(f"{SVG}path")
-    assert max(radii(path.get("d", ""))) == pytest.approx(rings["nominal"] * 1.125, abs=0.1)
-    assert min(radii(path.get("d", ""))) == pytest.approx(rings["nominal"] * 0.875, abs=0.1)
-    assert rings["tolerance"] == pytest.approx(rings["nominal"] * 1.25, abs=0.1)
-
-
-def test_a_gap_in_the_circle_stays_a_gap() -> None:
-    low: tuple[float | None, ...] = (None, 0.001, 0.001, None, 0.001, 0.001)
-    profile = ContourProfile(low, low)
-    scale = magnified(profile, tolerance_mm=None)
-    assert scale is not None
-    (path,) = ET.fromstring(circle_chart(profile, scale)).iter(f"{SVG}path")
-    assert [part.count("L") for part in path.get("d", "").split("M")[1:]] == [3, 3]
-
-
-@pytest.mark.parametrize("error_mm", [0.0, 1e-12])
-def test_no_error_is_no_drawing(error_mm: float) -> None:
-    assert magnified(ContourProfile((-error_mm,), (error_mm,)), tolerance_mm=0.01) is None
-
-
-def test_a_tolerance_far_outside_flattens_nothing() -> None:
-    scale = magnified(ContourProfile((0.0,), (0.001,)), tolerance_mm=0.1)
-    assert scale is not None
-    assert (scale.largest_mm, scale.tolerance_mm) == (0.001, None)
 
 
 def test_signed_bars_share_one_zero() -> None:

@@ -1,13 +1,17 @@
 """What `busplan plan` says, and the data it gives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
-from busplan.forms.json_and_csv import to_csv, to_json
 
 from busplan.analysis.planning.options import plan
-from busplan.answers.plan import plan_csv_rows, plan_document, plan_lines
+from busplan.answers.plan import plan_document, plan_records, plan_report, settings
+from busplan.forms import render
+from busplan.forms.blocks import Report, Row, Table, Value, Words, values_in
+from busplan.forms.columns import cell_text
+from busplan.forms.csv_rows import to_csv
+from busplan.forms.json_document import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -30,9 +34,20 @@ def paper() -> Profile:
     return load("paper-1ms").profile
 
 
-def text(profile: Profile, circle: Callable[[Profile], tuple[str, ...]] | None = None, **options: Any) -> str:
-    result = plan(profile, circle=circle, **options)
-    return "\n".join(line.text for line in plan_lines(result, with_circle=circle is not None))
+Circle = Callable[[Profile], tuple[str, ...]]
+
+
+def report(profile: Profile, circle: Circle | None = None, **options: Any) -> Report:
+    return plan_report(plan(profile, circle=circle, **options), with_circle=circle is not None)
+
+
+def text(profile: Profile, circle: Circle | None = None, **options: Any) -> str:
+    return render(report(profile, circle, **options), "table")
+
+
+def rows(answer: Report) -> Sequence[Row]:
+    (table,) = (block for block in answer.blocks() if isinstance(block, Table))
+    return table.rows
 
 
 def test_the_first_line_says_what_to_set(paper: Profile) -> None:
@@ -44,8 +59,10 @@ def test_the_first_line_says_what_to_set(paper: Profile) -> None:
 
 
 def test_no_plan_says_why(paper: Profile) -> None:
-    lines = text(paper, circle=lambda _: ("the circle is an egg",), max_circles=2).splitlines()
+    found = report(paper, circle=lambda _: ("the circle is an egg",), max_circles=2)
+    lines = render(found, "table").splitlines()
     assert "NO PLAN" in lines[0]
+    assert found.blocks()[0].state == "fails"  # type: ignore[union-attr]
     assert lines[0].endswith("; as it is, the circle is an egg.")
     assert "Smallest period: none, no period passes the circle (not proven: the search was cut short" in "\n".join(
         lines
@@ -56,13 +73,64 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
     def circle(profile: Profile) -> tuple[str, ...]:
         return () if profile.cycle.period_us > 3000 else ("rough",)
 
-    lines = text(paper, circle=circle, max_circles=3).splitlines()
-    (recommended,) = (line for line in lines if line.startswith("*") and "recommended." not in line)
-    assert recommended.startswith("*?  cheapest that meets both models")
-    assert any(line.startswith("?   smallest period") for line in lines)
-    assert any("not proven" in line for line in lines)
-    (proven,) = (line for line in text(paper).splitlines() if line.startswith("*  "))
-    assert "as it is" in proven
+    found = report(paper, circle, max_circles=3)
+    (recommended,) = (row for row in rows(found) if row.sought)
+    assert recommended.cells[:2] == ("cheapest that meets both models", "*?")
+    marks = {str(row.cells[0]): row.cells[1] for row in rows(found)}
+    assert [title for title, mark in marks.items() if "*" in str(mark)] == ["cheapest that meets both models"]
+    assert marks["smallest period"] == "?"
+    assert marks["as it is"] == ""
+    # The mark is seen in every form, without weight or colour.
+    for form in ("table", "markdown", "html"):
+        said = render(found, form)  # type: ignore[arg-type]
+        assert "* recommended." in said
+        assert "? not proven" in said
+    (proven,) = (row for row in rows(report(paper)) if row.sought)
+    assert proven.cells[:2] == ("as it is", "*")
+    assert "not proven" not in text(paper)
+    assert "recommended" not in text(paper, circle=lambda _: ("the circle is an egg",), max_circles=2)
+
+
+def test_what_fails_is_set_apart(paper: Profile) -> None:
+    def circle(profile: Profile) -> tuple[str, ...]:
+        return () if profile.cycle.period_us > 3000 else ("rough",)
+
+    first = rows(report(paper, circle, max_circles=3))[0]
+    assert first.cells[5] == Words("FAILS", "fails")
+    result = plan(paper, wanted={"bus.nodes": 4})
+    for row, option in zip(rows(plan_report(result, with_circle=False)), result.options, strict=True):
+        margins = [cell for cell in row.cells if isinstance(cell, Value) and "margin" in cell.key]
+        assert [margin.state == "fails" for margin in margins] == [
+            not one.fits for one in (option.deciding, *option.others)
+        ]
+        assert row.cells[5] == "-"
+
+
+@pytest.mark.parametrize("wanted", [{}, {"bus.nodes": 4}, {"bus.nodes": 17}, {"bus.gap_count": 3}])
+@pytest.mark.parametrize("name", ["paper-1ms", "paper-dma"])
+def test_every_figure_stands_in_its_place(
+    name: str, wanted: dict[str, Any], values_in_their_places: Callable[[Report], int]
+) -> None:
+    found = report(load(name).profile, wanted=wanted)
+    assert values_in_their_places(found) > 6 * len(rows(found))
+
+
+def test_a_cell_writes_what_its_option_sets(paper: Profile) -> None:
+    result = plan(paper, wanted={"bus.nodes": 4})
+    cells = [row.cells[2] for row in rows(plan_report(result, with_circle=False))]
+    for number, (cell, option) in enumerate(zip(cells, result.options, strict=True)):
+        values = list(values_in(cell))
+        assert {value.at for value in values} <= {f"/options/{number}/changes/{key}" for key in option.changes}
+        assert {value.value for value in values} == set(option.changes.values())
+    assert [*map(cell_text, cells)] == [
+        *("-", "gap count 10", "835 us", "gap count 10, 714 us", "ratio 0.4173", "payload 36 bytes", "4 nodes"),
+        "5 nodes, gap count 13",
+    ]
+
+
+def test_settings_are_written_as_a_profile_has_them(paper: Profile) -> None:
+    written = settings(paper, {"cycle.period_us": 900.0, "bus.speed": "S400"})
+    assert written.startswith('cycle.period_us = 900, bus.speed = "S400" (')
 
 
 def test_a_gate_that_the_plan_would_not_pass_is_said(paper: Profile) -> None:
@@ -72,8 +140,11 @@ def test_a_gate_that_the_plan_would_not_pass_is_said(paper: Profile) -> None:
 
 
 def test_no_line_of_the_table_is_longer_than_a_screen(paper: Profile) -> None:
-    result = plan(paper, wanted={"bus.nodes": 17})
-    assert max(len(line.text) for line in plan_lines(result, with_circle=False) if line.tone == "table") <= 140
+    lines = text(paper, wanted={"bus.nodes": 17}).splitlines()
+    start = next(number for number, line in enumerate(lines) if line.startswith("option "))
+    table = lines[start : lines.index("", start)]
+    assert len(table) > 6
+    assert max(map(len, table)) <= 140
 
 
 def test_data_holds_the_contract(paper: Profile) -> None:
@@ -85,4 +156,4 @@ def test_data_holds_the_contract(paper: Profile) -> None:
     (recommended,) = (option for option in document["options"] if option["recommended"])
     assert recommended["changes"] == document["recommended_changes"] == {"bus.nodes": 4, "bus.gap_count": 10}
     assert recommended["circle_passed"] is None
-    assert to_csv(plan_csv_rows(result)).splitlines()[2].startswith("best gap count,bus.nodes=4 bus.gap_count=10,true,")
+    assert to_csv(plan_records(result)).splitlines()[2].startswith("best gap count,bus.nodes=4 bus.gap_count=10,true,")

@@ -115,7 +115,7 @@ def test_a_missed_tolerance_is_exit_1_with_its_size_and_what_to_attack(circle_te
     assert run.returncode == 1
     assert "FAILED, the largest contour error of " in run.stdout
     assert " um over its 1 um" in run.stdout
-    assert "Attack velocity_feedforward first" in run.stdout
+    assert "Attack velocity feedforward first" in run.stdout
 
 
 def test_a_cycle_that_does_not_fit_is_exit_1_without_figures(circle_test: Run, profile: Path) -> None:
@@ -216,6 +216,62 @@ def test_without_a_circle_the_answer_is_told_and_the_old_plot_stays(circle_test:
     assert json.loads(run.stdout)["results"][0]["failures"][0]["name"] == "required_us"
     assert old.read_bytes() == b"old"
     assert len(list(profile.parent.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("report.md", "### Circle test of `quick`\n"),
+        ("report.html", '<svg xmlns="http://www.w3.org/2000/svg" class="chart circle"'),
+        ("report.txt", "deg  0   "),
+        ("report.csv", "profile,period_us,feed_mm_per_min,"),
+        ("report.json", '"command": "circle-test"'),
+    ],
+)
+def test_the_report_goes_to_a_file_in_the_form_of_its_name(
+    circle_test: Run, profile: Path, name: str, words: str
+) -> None:
+    (profile.parent / name).write_text("old", encoding="utf-8")
+    run = circle_test(profile, "-o", name, "--trace", "t.csv", "--every", "1000", cwd=profile.parent)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", f"wrote t.csv\nwrote {name}\n")
+    assert words in (profile.parent / name).read_text(encoding="utf-8")
+
+
+def test_a_circle_that_fails_is_written_and_exits_1(circle_test: Run, profile: Path) -> None:
+    run = circle_test(profile, "--period", "100us", "-o", "report.md", cwd=profile.parent)
+    assert (run.returncode, run.stdout, run.stderr) == (1, "", "wrote report.md\n")
+    assert "FAILED, the cycle does not fit the bus" in (profile.parent / "report.md").read_text(encoding="utf-8")
+
+
+def test_a_report_that_cannot_be_written_is_said_before_the_simulation(
+    circle_test: Run, profile: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulated(*_: object, **__: object) -> None:
+        pytest.fail("a simulation")
+
+    monkeypatch.setattr("busplan.analysis.circle.roundness.circle_test", simulated)
+    run = circle_test(profile, "-o", "no/where.md", cwd=profile.parent)
+    assert run.returncode == 2
+    assert "no folder" in run.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["-o", "quick.toml", "--format", "json"], "quick.toml, which is read; give another name"),
+        (["-o", "new.toml", "--format", "json"], ".toml is a profile's name"),
+        (["-o", "t.csv", "--trace", "t.csv"], "--output t.csv and --trace t.csv: the same file"),
+        (["-o", "c.html", "--plot", "c.svg"], "--output c.html and --plot c.svg: the same file"),
+        (["-o", "report.xyz"], "expected a name ending in .txt, .md, .html, .csv, .json"),
+    ],
+)
+def test_a_report_destroys_nothing(circle_test: Run, profile: Path, arguments: list[str], message: str) -> None:
+    (profile.parent / "c.svg").symlink_to("c.html")
+    run = circle_test(profile, *arguments, cwd=profile.parent)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert message in run.stderr
+    assert sorted(path.name for path in profile.parent.iterdir()) == ["c.svg", "quick.toml"]
+    assert profile.read_text(encoding="utf-8") == QUICK
 
 
 def test_trace_and_plot_in_one_file_are_refused(circle_test: Run, profile: Path) -> None:

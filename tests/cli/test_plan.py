@@ -85,6 +85,47 @@ def test_a_new_file_holds_the_plan_and_the_old_one_stays(profile: Path) -> None:
     assert profile.read_text(encoding="utf-8") == PROFILE
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("report.md", "### Plan of `mine`\n"),
+        ("report.HTML", "<!DOCTYPE html>"),
+        ("report.txt", "* recommended."),
+        ("report.csv", "profile,title,changes,recommended,"),
+        ("report.json", '"command": "plan"'),
+    ],
+)
+def test_a_reports_name_takes_the_report(profile: Path, name: str, words: str) -> None:
+    report = profile.parent / name
+    report.write_text("old", encoding="utf-8")
+    run = busplan("mine.toml", "-o", name, cwd=profile.parent)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", f"wrote {name}\n")
+    assert words in report.read_text(encoding="utf-8")
+    assert profile.read_text(encoding="utf-8") == PROFILE
+
+
+def test_a_report_is_written_without_a_plan_too(profile: Path) -> None:
+    run = busplan("mine.toml", "--gap-count", 3, "-o", "report.md", cwd=profile.parent)
+    assert (run.returncode, run.stdout, run.stderr) == (1, "", "wrote report.md\n")
+    assert "NO PLAN" in (profile.parent / "report.md").read_text(encoding="utf-8")
+
+
+def test_a_plan_is_applied_and_reported_in_one_call(profile: Path) -> None:
+    run = busplan("mine.toml", "--nodes", 4, "--apply", "-o", "report.json", cwd=profile.parent)
+    assert (run.returncode, run.stdout) == (0, "")
+    assert run.stderr == "changed mine.toml: bus.nodes = 4, bus.gap_count = 10\nwrote report.json\n"
+    document = json.loads((profile.parent / "report.json").read_text(encoding="utf-8"))
+    assert document["recommended_changes"] == {"bus.nodes": 4, "bus.gap_count": 10}
+    assert "nodes = 4 " in profile.read_text(encoding="utf-8")
+
+
+def test_the_form_beside_a_new_profile_is_that_of_standard_output(profile: Path) -> None:
+    run = busplan("mine.toml", "-o", "new.toml", "--format", "markdown", cwd=profile.parent)
+    assert (run.returncode, run.stderr) == (0, "wrote new.toml\n")
+    assert run.stdout.startswith("### Plan of `mine`\n")
+    assert tomllib.loads((profile.parent / "new.toml").read_text(encoding="utf-8"))["name"] == "mine"
+
+
 @pytest.mark.parametrize("option", [["--apply"], ["-o", "new.toml", "--force"], ["-o", "new.toml"]])
 def test_without_a_plan_nothing_is_written(profile: Path, option: list[str]) -> None:
     before = sorted(profile.parent.iterdir())
@@ -113,6 +154,10 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
         (["mine.toml", "--nodes", "2", "--axes", "8"], "give one of them"),
         (["mine.toml", "--apply", "-o", "x.toml"], "give one of them"),
         (["mine.toml", "--force"], "goes with -o"),
+        (["mine.toml", "--force", "-o", "report.md"], "goes with -o NEW.toml"),
+        (["mine.toml", "-o", "link.md"], "would overwrite mine.toml, which is read"),
+        (["mine.toml", "-o", "no/such/folder.md"], "no folder"),
+        (["mine.toml", "-o", "-", "--format", "json"], "standard output takes one document"),
         (["mine.toml", "-o", "mine.toml", "--force"], "would overwrite mine.toml, which is read"),
         (["mine.toml", "--nodes", "0"], "--nodes 0"),
         (["mine.toml", "--axes", "0"], "--axes"),
@@ -123,6 +168,7 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
     ],
 )
 def test_what_cannot_be_done_is_said(profile: Path, arguments: list[str], words: str) -> None:
+    (profile.parent / "link.md").symlink_to("mine.toml")
     run = busplan(*arguments, cwd=profile.parent)
     assert (run.returncode, run.stdout) == (2, "")
     assert words in run.stderr

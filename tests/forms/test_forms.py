@@ -79,7 +79,7 @@ def one_of_each(text: str = "text") -> Sequence[Block]:
             Row((Code(text), MARGIN, Value(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
             Row((Link(text, "s", "x.toml"), Value(None), FAILED, ""), level=1),
             Row((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), sought=True),
-            Row((Command("busplan capacity p", "what", "c"), "-", "-", "")),
+            Row((Command("busplan capacity p", "what", "c"), sentence("{} of {}", MARGIN, Code(text)), "-", "")),
         ),
         sentence("A table of {}", Code(text)),
     )
@@ -87,7 +87,7 @@ def one_of_each(text: str = "text") -> Sequence[Block]:
         sentence(f"{text.replace('{', '')}: {{}} to spare.", MARGIN, state="passes"),
         Facts((("margin", MARGIN), ("profile", Code(text)))),
         table,
-        Chart(Picture(), Sentence((text,))),
+        Chart(Picture(), Sentence((text,)), Sentence(("It is read so: ", Code(text)))),
         Snippet(("[bus]", 'speed = "S400"')),
         Steps((Step("(1)", "T", "a + b", "1 + 2", MARGIN), Step("x", "W", "", "", Words("time")))),
         Question(text, Words("FAILED", "fails"), (Sentence((text,)),), Facts((("margin", MARGIN),))),
@@ -104,7 +104,7 @@ def test_every_form_writes_every_block_and_the_same_each_time(form: Form) -> Non
     assert text == render(answer(*one_of_each()), form)
     assert text.endswith("\n")
     if form not in ("csv", "json"):
-        assert text.count(">3.969<" if form == "html" else "3.969") == 6  # a bar stands beside its figure
+        assert text.count(">3.969<" if form == "html" else "3.969") == 7  # a bar stands beside its figure
         assert "None" not in text
         assert "worse" in text
 
@@ -116,7 +116,7 @@ def test_every_form_has_one_ending() -> None:
 def test_figures_are_found_and_changed_wherever_they_stand() -> None:
     blocks = tuple(one_of_each())
     found = list(values_in(blocks))
-    assert found.count(MARGIN) == 7
+    assert found.count(MARGIN) == 8
     moved = with_values(blocks, lambda value: value._replace(at=f"/x{value.at}"))
     assert [one.at for one in values_in(moved)] == [f"/x{one.at}" for one in found]
     assert with_values(moved, lambda value: value._replace(at=value.at.removeprefix("/x"))) == blocks
@@ -147,6 +147,23 @@ def test_a_state_is_marked_where_it_stands() -> None:
     assert [failed.text[mark.start : mark.end] for mark in failed.marks] == ["no"]
     assert failed.marks[0] == Mark(12, 14, "fails")
     assert passed.marks == ()
+
+
+def test_a_sentence_in_a_cell_keeps_its_units_and_its_state() -> None:
+    said = sentence("{} to spare", MARGIN, state="fails")
+    table = Table((Column("set", kind="words"), Column("x")), (Row((said, "1")),))
+    *_, row = block_lines([table])
+    assert row.text == "3.969 us to spare  1"
+    assert row.marks == (Mark(0, 17, "fails"),)
+    assert "| **3.969 us to spare** | 1 |" in render(answer(table), "markdown")
+    assert '<span class="fails"><data value="3.96912"' in render(answer(table), "html")
+
+
+def test_how_a_drawing_is_read_stands_where_it_is_drawn_so() -> None:
+    chart = Chart(Picture(), Sentence(("A picture",)), Sentence(("rings of 5 um.",)))
+    assert "<figcaption>A picture: rings of 5 um.</figcaption>" in render(answer(chart), "html")
+    assert "rings" not in render(answer(chart), "table")
+    assert "rings" not in render(answer(chart), "markdown")
 
 
 def test_sentences_stand_together_and_all_else_apart() -> None:

@@ -6,7 +6,7 @@ from typing import Final
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.forms.lines import Line
 
-_COLUMNS: Final = (72, 60, 48, 36, 24, 12)
+_COLUMNS: Final = (72, 60, 48, 36, 24)
 """Columns that a plot may have, the most that fit: one for every 5 degrees, or for more."""
 _ROWS: Final = 9
 _ROUNDING_UM: Final = 1e-6

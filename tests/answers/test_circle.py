@@ -1,0 +1,260 @@
+"""The answer of `busplan circle-test`: sentences, tables, drawing and data of the same figures."""
+
+import json
+import re
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+
+from busplan.analysis.circle.failures import Failure, Stated
+from busplan.analysis.circle.roundness import CircleTest, circle_test
+from busplan.answers.circle import circle_document, circle_records, circle_report, circle_table, contributions_table
+from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
+from busplan.answers.circle_verdict import circle_sentences, servo_sentence
+from busplan.forms import render
+from busplan.forms.blocks import Bar, Chart, Report, Sentence, Table, Value, values_in
+from busplan.forms.json_document import to_json
+from busplan.forms.numbers import written
+from busplan.forms.terminal import sentence_text
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+
+SMALL = {"circle.radius_mm": 25.0, "circle.ramp_periods": 20}
+TIGHT = {**SMALL, "tolerance.max_contour_error_mm": 0.001, "tolerance.mean_contour_error_mm": 0.0005}
+UNSTABLE = {**SMALL, "servo.position_gain_per_s": 1e5}
+
+
+@cache
+def circle_of(
+    *changes: tuple[str, object], periods_us: tuple[float, ...] = (4000.0,), ranked: bool = True
+) -> CircleTest:
+    profile = override(load("paper-4ms").profile, dict(changes))
+    return circle_test(profile, periods_us=periods_us, with_contributions=ranked)
+
+
+def small(*, ranked: bool = True, **changes: object) -> CircleTest:
+    given = {key.replace("__", "."): value for key, value in changes.items()}
+    return circle_of(*{**SMALL, **given}.items(), ranked=ranked)
+
+
+def texts(test: CircleTest, *, with_contributions: bool = True) -> list[str]:
+    blocks = circle_report(test, with_contributions=with_contributions).blocks()
+    return [sentence_text(block) for block in blocks if isinstance(block, Sentence)]
+
+
+@pytest.mark.parametrize("with_contributions", [True, False])
+@pytest.mark.parametrize("changes", [SMALL, TIGHT, UNSTABLE])
+def test_every_figure_stands_in_its_place(
+    changes: dict[str, object], with_contributions: bool, values_in_their_places: Callable[[Report], int]
+) -> None:
+    test = circle_of(*changes.items(), periods_us=(4000.0, 2000.0, 100.0), ranked=with_contributions)
+    assert values_in_their_places(circle_report(test, with_contributions=with_contributions)) > 3 * 18
+
+
+@pytest.mark.parametrize("form", ["table", "markdown", "html"])
+def test_each_period_has_a_column(form: str) -> None:
+    test = circle_of(*SMALL.items(), periods_us=(4000.0, 2000.0, 100.0))
+    table = circle_table(test.results)
+    assert [column.heading for column in table.columns] == ["figure", "eq", "unit", "4 ms", "2 ms", "100 us"]
+    rows = {str(row.cells[0]): row.cells for row in table.rows}
+    for cells in rows.values():
+        places = [cell.at for cell in cells if isinstance(cell, Value)]
+        assert [place.split("/")[2] for place in places] == ["0", "1", "2"]
+    assert [written(cell) for cell in rows["passed"] if isinstance(cell, Value)] == ["yes", "yes", "no"]
+    # What was not simulated is a dash; only what fails is set apart.
+    assert [written(cell) for cell in rows["circular deviation G"] if isinstance(cell, Value)][2] == "-"
+    assert [value for value in values_in(table) if value.state == "fails"] == [rows["passed"][-1]]
+    assert "nan" not in render(circle_report(test, with_contributions=True), form).lower()  # type: ignore[arg-type]
+
+
+def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for() -> None:
+    shown = {value.key for value in values_in(circle_table(small().results))}
+    record = circle_document(small(), with_contributions=False)["results"][0]
+    assert {key for key in record if key not in shown} == {
+        *("steps", "delay_us", "timing_model", "bus_fits", "required_us", "available_us", "servo_grade"),
+        *("centre_offset_mm", "constant_speed_deg", "failures"),
+    }
+
+
+def test_the_second_result_stands_at_its_own_place() -> None:
+    table = circle_table(small().results, start=4)
+    assert {value.at.rsplit("/", 1)[0] for value in values_in(table)} == {"/results/4"}
+
+
+# --- sentences --------------------------------------------------------------------------------------------------
+
+
+def test_a_circle_that_holds_says_so() -> None:
+    (said,) = circle_sentences("mine", small().results[0], at="/results/0")
+    assert sentence_text(said) == "mine at 4 ms and 2500 mm/min: the circle holds every tolerance."
+    assert said.state == "passes"
+
+
+def test_a_circle_that_fails_says_by_how_much_and_what_to_attack() -> None:
+    result = circle_of(*TIGHT.items()).results[0]
+    failed, attack = circle_sentences("mine", result, at="/results/0")
+    text = ", and ".join(failure.text for failure in result.failures)
+    assert sentence_text(failed) == f"mine at 4 ms and 2500 mm/min: FAILED, {text}."
+    assert failed.state == "fails"
+    assert {value.at for value in values_in(failed) if value.at} == {
+        *("/results/0/period_us", "/results/0/feed_mm_per_min"),
+        *("/results/0/mean_contour_error_mm", "/results/0/max_contour_error_mm"),
+    }
+    contributions = result.contributions or ()
+    best = min(range(len(contributions)), key=lambda number: contributions[number].mean_contour_error_mm)
+    source = contributions[best].source.replace("_", " ")
+    assert sentence_text(attack).startswith(f"Attack {source} first: without it the mean contour error is ")
+    assert next(values_in(attack)).at == f"/results/0/contributions/{best}/mean_contour_error_mm"
+    # Without --contributions the document has no place for it.
+    assert [value.at for value in values_in([*circle_sentences("", result, at="", with_contributions=False)][1])] == [
+        *("", ""),
+    ]
+
+
+def test_what_no_single_source_explains_is_said() -> None:
+    result = circle_of(*TIGHT.items()).results[0]._replace(contributions=())
+    _, said = circle_sentences("mine", result, at="/results/0")
+    assert sentence_text(said) == "No single error source of the profile explains the mean contour error."
+
+
+@pytest.mark.parametrize(
+    "failure",
+    [
+        Failure("required_us", 205.917, 50.0),
+        Failure("stability", None, None),
+        Failure("circle_not_followed", 17.0, 360.0),
+        Failure("min_phase_margin_deg", 20.125, 30.0),
+        Failure("min_gain_margin_db", 2.0, 6.5),
+        Failure("mean_contour_error_mm", 0.00456, 0.003),
+        Failure("constant_speed_deg", 201.0, 270.0),
+        Failure("circular_deviation_mm", 0.0264, 0.0),
+        Failure("nodes", 70.0, 62.0, "70 nodes are too many"),
+    ],
+)
+def test_a_sentence_writes_a_failure_as_its_text_does(failure: Failure) -> None:
+    result = small().results[0]._replace(passed=False, failures=(failure,))
+    first = next(circle_sentences("mine", result, at="/results/0"))
+    assert sentence_text(first).endswith(f": FAILED, {failure.text}.")
+    numbers = [part for part in failure.parts() if isinstance(part, Stated)]
+    assert len([*values_in(first)]) == 2 + len(numbers)
+    # No number of the failure stands in the words between.
+    assert not failure.said or numbers == []
+    assert all(not re.search("[0-9]", part) for part in failure.parts() if isinstance(part, str) and not failure.said)
+
+
+def test_how_the_servo_values_are_known_is_said_once_and_only_with_figures() -> None:
+    (known,) = servo_sentence(small().results[0])
+    assert (sentence_text(known), known.state) == (
+        "The servo values behind these figures are calibrated.",
+        "neutral",
+    )
+    (assumed,) = servo_sentence(small().results[0]._replace(servo_grade="assumed"))
+    assert assumed.state == "warns"
+    both = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0, 2000.0))
+    assert len([text for text in texts(both) if "servo values" in text]) == 1
+    assert not [text for text in texts(circle_of(*SMALL.items(), periods_us=(100.0,))) if "servo values" in text]
+
+
+# --- sources ----------------------------------------------------------------------------------------------------
+
+
+def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> None:
+    result = small().results[0]
+    table = contributions_table(result, at="/results/0")
+    bars = [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
+    takes = [row.cells[2] for row in table.rows]
+    assert [bar.value for bar in bars] == takes
+    removed = [one.removed_mm for one in result.contributions or ()]
+    assert {(bar.least, bar.most) for bar in bars} == {(min(0.0, *removed), max(0.0, *removed))}
+    assert removed == sorted(removed, reverse=True)
+    assert written(takes[0]).startswith("+")  # type: ignore[arg-type]
+
+
+def test_sources_that_take_nothing_have_no_bar() -> None:
+    result = small().results[0]
+    nothing = tuple(one._replace(removed_mm=0.0) for one in result.contributions or ())
+    report = circle_report(small()._replace(results=(result._replace(contributions=nothing),)), with_contributions=True)
+    assert "takes" in render(report, "html")
+    table = contributions_table(result._replace(contributions=nothing), at="")
+    assert not [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
+
+
+def test_sources_stand_only_where_they_were_asked_for() -> None:
+    test = circle_of(*TIGHT.items(), ranked=False)
+    assert test.results[0].contributions
+    blocks = circle_report(test, with_contributions=False).blocks()
+    assert len([block for block in blocks if isinstance(block, Table)]) == 1
+    assert "contributions" not in circle_document(test, with_contributions=False)["results"][0]
+    without = small()._replace(results=(small().results[0]._replace(contributions=()),))
+    assert "The profile has no error source that could be removed." in texts(without)
+
+
+# --- drawing ----------------------------------------------------------------------------------------------------
+
+
+def chart_of(test: CircleTest) -> Chart:
+    (chart,) = (block for block in circle_report(test, with_contributions=False).blocks() if isinstance(block, Chart))
+    return chart
+
+
+@pytest.mark.parametrize(
+    ("tolerance_mm", "words"),
+    [
+        (0.025, "the tolerance of 25 um dashed."),
+        (10.0, "the tolerance of 10000 um lies outside the drawing."),
+    ],
+)
+def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float, words: str) -> None:
+    test = small(tolerance__max_contour_error_mm=tolerance_mm)
+    legend = chart_of(test).legend
+    assert legend is not None
+    assert re.match(r"magnified \d+ times; [\d.]+ um from ring to ring, the nominal", sentence_text(legend))
+    assert sentence_text(legend).endswith(words)
+    report = circle_report(test, with_contributions=False)
+    page = render(report, "html")
+    assert page.count('class="chart circle"') == 1
+    assert "from ring to ring" in page
+    text = render(report, "table")
+    assert "Contour error at constant speed, at 4 ms and 2500 mm/min\n   um\n" in text
+    assert "ring" not in text
+
+
+def test_without_a_tolerance_the_legend_says_so() -> None:
+    profile = load("paper-4ms").profile
+    bare = profile.model_copy(update={"tolerance": profile.tolerance.model_copy(update={"max_contour_error_mm": None})})
+    legend = chart_of(small()._replace(profile=bare)).legend
+    assert legend is not None
+    assert sentence_text(legend).endswith("; the profile has no tolerance of the largest contour error.")
+
+
+def test_what_was_not_simulated_or_did_not_go_round_has_no_drawing() -> None:
+    for test in (circle_of(*SMALL.items(), periods_us=(100.0,)), circle_of(*UNSTABLE.items())):
+        assert not [
+            block for block in circle_report(test, with_contributions=True).blocks() if isinstance(block, Chart)
+        ]
+
+
+# --- data -------------------------------------------------------------------------------------------------------
+
+
+def test_documents_hold_the_results_own_numbers() -> None:
+    test = circle_of(*TIGHT.items(), periods_us=(4000.0, 100.0))
+    document = json.loads(to_json(circle_document(test, with_contributions=True)))
+    for record, result in zip(document["results"], test.results, strict=True):
+        assert record["max_contour_error_mm"] == result.max_contour_error_mm
+        assert record["failures"] == [failure.document() for failure in result.failures]
+        assert (record["contributions"] is None) == (result.contributions is None)
+    flat = circle_records(test, with_contributions=True)
+    assert flat[0]["centre_offset_x_mm"] == (test.results[0].centre_offset_mm or (None,))[0]
+    removed = {one.source: one.removed_mm for one in test.results[0].contributions or ()}
+    assert {key: value for key, value in flat[0].items() if key.startswith("removed_")} == {
+        f"removed_{source}_mm": value for source, value in sorted(removed.items())
+    }
+
+
+def test_a_trace_has_the_columns_that_it_says() -> None:
+    test = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0))
+    rows = list(trace_records(test, every=1000))
+    assert {tuple(row) for row in rows} == {TRACE_COLUMNS}
+    assert {row["period_us"] for row in rows} == {4000.0}
