@@ -13,7 +13,8 @@ from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.comparison.difference import Difference, cycle_figures, difference, plan_figures
 from busplan.analysis.network import bus_of
 from busplan.answers.changes import shown_value
-from busplan.answers.diff import diff_document, diff_records, diff_report, regression_words
+from busplan.answers.diff import diff_document, diff_records, diff_report
+from busplan.answers.diff_headline import regression_words
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.errors import BusplanError
 from busplan.forms import render

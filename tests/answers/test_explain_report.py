@@ -6,7 +6,8 @@ import pytest
 
 from busplan.analysis.derivation.explain import assumptions, explain
 from busplan.analysis.register import figures_of
-from busplan.answers.explain import assumptions_report, assumptions_table, explain_report
+from busplan.answers.assumptions import assumptions_report, assumptions_table
+from busplan.answers.explain import explain_report
 from busplan.buses import kind_named
 from busplan.forms import render
 from busplan.forms.blocks import Code, Report, Section, Steps, Table, Value, Words, values_in

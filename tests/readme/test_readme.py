@@ -17,8 +17,8 @@ from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
 from busplan.analysis.latency import latency
+from busplan.answers.assumptions import constant_rows, equation_rows
 from busplan.answers.capacity import capacity_records
-from busplan.answers.explain import constant_rows, equation_rows
 from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile

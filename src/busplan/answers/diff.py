@@ -1,12 +1,12 @@
 """Answer of `busplan diff`: for people, for a pull request, and as plain data."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
-from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, Difference, Judgement
-from busplan.analysis.network import bus_of, model_names
+from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, Difference
 from busplan.answers.changes import change_document, change_table
+from busplan.answers.diff_headline import STATES, headline, named
 from busplan.answers.documents import document
 from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
@@ -18,16 +18,14 @@ from busplan.forms.blocks import (
     Report,
     Row,
     Sentence,
-    State,
     Table,
     Value,
     Words,
     count_value,
     figure_value,
-    joined,
     sentence,
 )
-from busplan.forms.numbers import nouns, plural
+from busplan.forms.numbers import nouns
 from busplan.forms.terminal import sentence_text
 from busplan.sections.profile import Profile
 
@@ -51,19 +49,6 @@ _FIGURES: Final = (
     Column("relative", "%"),
     Column("B is", kind="words"),
 )
-_STATES: Final[dict[Judgement, State]] = {
-    "worse": "fails",
-    "better": "passes",
-    "same": "neutral",
-    "neutral": "neutral",
-}
-_FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
-_PASSES: Final[dict[Judgement, str]] = {
-    "worse": "B does not pass the circle where A does",
-    "better": "B passes the circle where A does not",
-}
-_MOST_NAMED: Final = 4
-"""Figures that a headline names."""
 _MOST_KEYS: Final = 20
 """Keys that a reader is shown: a comment on a pull request is no listing."""
 
@@ -106,7 +91,7 @@ def diff_document(found: Difference, *, arguments: Arguments) -> Document:
         "diff",
         a=a,
         b=b,
-        verdict=sentence_text(_headline(found)),
+        verdict=sentence_text(headline(found)),
         same=not found.keys,
         changes=[change_document(one) for one in found.keys],
         figures=diff_records(found),
@@ -118,16 +103,9 @@ def diff_records(found: Difference) -> list[Record]:
     return [_figure_record(figure) for figure in found.figures]
 
 
-def regression_words(found: Difference, regressions: Sequence[ComparedFigure], *, tolerance: float) -> str:
-    """Say which figures fail a gate."""
-    by = f" by more than {tolerance:.12g} %" if tolerance else ""
-    names = _named(regressions, found)
-    return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}"
-
-
 def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     """The verdict, the two sides, the keys that differ, and the figures that do."""
-    yield _headline(found)
+    yield headline(found)
     yield _sides(found, arguments)
     if not found.keys:
         return
@@ -143,79 +121,12 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     rows = tuple(_row(one, f"/figures/{at}") for at, one in shown if one.judgement != "same")
     if rows:
         yield Table(_FIGURES, rows)
-    same = len(_named([one for _, one in shown if one.judgement == "same"], found))
+    same = len(named([one for _, one in shown if one.judgement == "same"], found))
     if same:
         are = "is" if same == 1 else "are"
         yield sentence(
             f"{{}} {nouns(same, 'figure')} {are} the same: JSON and CSV list all figures.", count_value(same)
         )
-
-
-def _headline(found: Difference) -> Sentence:
-    if not found.keys:
-        return sentence("A and B are the same profile: every key has the same value.")
-    verdicts = [
-        one for judgement in ("worse", "better") for one in (*_loud(found, judgement), *_counted(found, judgement))
-    ]
-    if verdicts:
-        said = joined(*verdicts, by="; ")
-        return said._replace(parts=(*said.parts, "."))
-    keys = len(found.keys)
-    figures = "and only figures that are neither" if found.judged("neutral") else "and no figure"
-    return sentence(
-        f"B is neither better nor worse: {{}} {nouns(keys, 'key')} {'differs' if keys == 1 else 'differ'}, {figures}.",
-        count_value(keys),
-    )
-
-
-def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
-    """Figures that speak for themselves, beside whether it fits."""
-    loud: dict[str, dict[Judgement, str]] = {}
-    for bus in (bus_of(found.a), bus_of(found.b)):
-        if bus.safety_figure is not None:
-            loud[bus.safety_figure.key] = {
-                "worse": f"B has an unsafe {bus.safety} where A has a safe one",
-                "better": f"B has a safe {bus.safety} where A has an unsafe one",
-            }
-    return {**loud, "passed": _PASSES}
-
-
-def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
-    figures = found.judged(judgement)
-    judged = {one.figure.key for one in figures}
-    models = " and ".join(one.part for one in figures if one.figure.key == "fits")
-    state = _STATES[judgement]
-    if "verdict_fits" in judged:
-        timing = f"{models} timing" if models else "each by the timing that decides"
-        yield sentence(f"{_FITS[judgement]} ({timing})", state=state)
-    elif models:
-        yield sentence(f"{_FITS[judgement]} ({models} timing, which does not change the verdict)", state=state)
-    for key, words in _loud_figures(found).items():
-        if key in judged:
-            yield sentence(words[judgement], state=state)
-
-
-def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
-    told = {"verdict_fits", "fits", *_loud_figures(found)}
-    names = _named([one for one in found.judged(judgement) if one.figure.key not in told], found)
-    if not names:
-        return
-    said = sentence(
-        f"B is {judgement} in {{}} {nouns(len(names), 'figure')}: {', '.join(names[:_MOST_NAMED])}",
-        count_value(len(names)),
-        state=_STATES[judgement],
-    )
-    hidden = len(names) - _MOST_NAMED
-    yield joined(said, sentence("and {} more", count_value(hidden))) if hidden > 0 else said
-
-
-def _named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
-    """Names of figures, each once, with the timing model where that is not all of them."""
-    models = {*model_names(found.a), *model_names(found.b)}
-    parts: dict[str, list[str]] = {}
-    for one in figures:
-        parts.setdefault(one.figure.label, []).append(one.part)
-    return [f"{label} ({of[0]})" if len(of) == 1 and of[0] in models else label for label, of in parts.items()]
 
 
 def _sides(found: Difference, arguments: Arguments) -> Table:
@@ -263,7 +174,7 @@ def _row(one: ComparedFigure, at: str) -> Row:
     relative = Value(
         one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
     )
-    judged = Words(one.judgement, _STATES[one.judgement])
+    judged = Words(one.judgement, STATES[one.judgement])
     return Row((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
 
 

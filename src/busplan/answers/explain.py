@@ -1,24 +1,19 @@
-"""Answer of `busplan explain`: the way to a figure, or what all figures of a profile rest on."""
+"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and what it starts from."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
 from typing import Any, Final
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
-from busplan.analysis.derivation.formulas import formula_of
-from busplan.analysis.derivation.trace import DIGITS, Input, short
-from busplan.analysis.network import bus_of
-from busplan.analysis.register import Command, figures_of
+from busplan.analysis.derivation.trace import DIGITS, short
+from busplan.answers.assumptions import INPUT_COLUMNS, input_cells
 from busplan.answers.capacity import capacity_document
 from busplan.answers.documents import document, with_profile
-from busplan.buses.bus import Bus
-from busplan.buses.figure import Figure
 from busplan.forms import blocks
 from busplan.forms.blocks import (
     Block,
-    Cell,
     Code,
     Column,
     Document,
@@ -36,21 +31,9 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import period_value, written
 from busplan.printable import json_text
-from busplan.sections.profile import Profile
-from busplan.sourced import EQUATIONS
 
 _NONE: Final = Words("none")
 _SYMBOL: Final = Column("symbol", kind="words")
-_NAME: Final = Column("name", kind="words")
-_MEANING: Final = Column("meaning", kind="words")
-_KNOWN: Final = (
-    Column("value"),
-    Column("unit", kind="words"),
-    Column("grade", kind="words"),
-    Column("source", kind="words"),
-)
-"""Columns that say how well an input is known."""
-_FIGURES: Final = tuple(Column(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is"))
 
 
 def explain_report(explanation: Explanation) -> Report:
@@ -68,85 +51,6 @@ def explain_report(explanation: Explanation) -> Report:
         lambda: [_section(one, name, f"/derivations/{at}") for at, one in enumerate(found.derivations)],
         partial(_explain_document, found),
         lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
-    )
-
-
-def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
-    """Answer the question of `explain PROFILE`: what its figures rest on, and all that can be explained.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    assumptions
-        What its figures rest on.
-    """
-    caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
-    return Report(
-        Sentence(("The figures of ", Code(profile.name))),
-        lambda: (
-            assumptions_table(assumptions)._replace(caption=caption),
-            _figure_table(bus_of(profile)),
-        ),
-        partial(assumptions_document, profile, assumptions),
-        lambda: figure_rows(bus_of(profile)),
-    )
-
-
-def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions") -> Table:
-    """What figures rest on, one row each.
-
-    Parameters
-    ----------
-    assumptions
-        The inputs.
-    at
-        Place of their list in the JSON document.
-    """
-    rows = (Row((*_known(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
-    return Table((_NAME, *_KNOWN, _MEANING), tuple(rows), stacks=True)
-
-
-def figure_rows(bus: Bus) -> list[Record]:
-    """One row a figure that can be explained."""
-    return [
-        {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
-        | {"reference": one.reference, "meaning": one.meaning}
-        for command, one in _all_figures(bus)
-    ]
-
-
-def equation_rows() -> list[Record]:
-    """One row an equation: its numbers, formula, function and source."""
-    return [
-        {
-            "reference": one.reference,
-            "formula": f"{one.symbol} = {formula_of(one)}",
-            "function": name,
-            "source": one.source,
-        }
-        for name, one in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
-    ]
-
-
-def constant_rows(bus: Bus) -> list[Record]:
-    """One row a constant: its value, unit, grade and source."""
-    return [
-        {"name": name, "value": float(one), "unit": one.unit}
-        | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
-        for name, one in bus.constants.items()
-    ]
-
-
-def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
-    """Document of `busplan explain PROFILE --format json`: what the figures rest on, and the whole registry."""
-    return document(
-        "explain",
-        profile=profile.name,
-        assumptions=[one._asdict() for one in assumptions],
-        figures=figure_rows(bus_of(profile)),
-        equations=equation_rows(),
-        constants=constant_rows(bus_of(profile)),
     )
 
 
@@ -264,20 +168,6 @@ def _step(step: Step, at: str) -> blocks.Step:
 
 
 def _inputs(one: Derivation, at: str) -> Table:
-    rows = (Row((Code(given.symbol), *_known(given, f"{at}/{number}"))) for number, given in enumerate(one.inputs))
+    rows = (Row((Code(given.symbol), *input_cells(given, f"{at}/{number}"))) for number, given in enumerate(one.inputs))
     caption = Sentence((f"It starts from these; the least well known is {one.weakest_grade}.",))
-    return Table((_SYMBOL, _NAME, *_KNOWN), tuple(rows), caption, stacks=True)
-
-
-def _known(one: Input, at: str) -> tuple[Cell, ...]:
-    value = Value(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
-    return Code(one.name), value, one.unit, one.grade, one.source
-
-
-def _figure_table(bus: Bus) -> Table:
-    rows = (Row((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in _all_figures(bus))
-    return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
-
-
-def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
-    yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())
+    return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)

@@ -80,7 +80,8 @@ def diff_command(
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     with answer(format_, output, inputs=profile_files(a, b)) as give:
         from busplan.analysis.comparison.difference import difference
-        from busplan.answers.diff import diff_report, regression_words
+        from busplan.answers.diff import diff_report
+        from busplan.answers.diff_headline import regression_words
         from busplan.profile.revision import load_revision
 
         one, other = load_each((a, b), lambda argument: load_revision(argument).profile)

@@ -126,6 +126,6 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
 
 def _list(plan: "Profile") -> "Report":
     from busplan.analysis.derivation.explain import assumptions
-    from busplan.answers.explain import assumptions_report
+    from busplan.answers.assumptions import assumptions_report
 
     return assumptions_report(plan, assumptions(plan))

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.capacity.verdict import verdicts
+from busplan.answers.assumptions import assumptions_document
 from busplan.answers.capacity import capacity_document
 from busplan.answers.circle import circle_document
-from busplan.answers.explain import assumptions_document
 from busplan.answers.latency import latency_document
 from busplan.answers.timeline import timeline_document
 from busplan.forms.blocks import Command, Document, Made, with_values

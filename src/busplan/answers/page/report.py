@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of
+from busplan.answers.assumptions import assumptions_table
 from busplan.answers.documents import document
-from busplan.answers.explain import assumptions_table
 from busplan.answers.figure_tables import cell_state
 from busplan.answers.page.bus import axes_part, bus_question, models_part, terms_part, timeline_part
 from busplan.answers.page.circle import circle_part, circle_question, sources_part

@@ -1,0 +1,121 @@
+"""Answer of `busplan explain PROFILE`: what its figures rest on, and all figures, equations and constants."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
+
+from busplan.analysis.derivation.formulas import formula_of
+from busplan.analysis.derivation.trace import DIGITS, Input
+from busplan.analysis.network import bus_of
+from busplan.analysis.register import Command, figures_of
+from busplan.answers.documents import document
+from busplan.buses.bus import Bus
+from busplan.buses.figure import Figure
+from busplan.forms.blocks import Cell, Code, Column, Document, Record, Report, Row, Sentence, Table, Value
+from busplan.sections.profile import Profile
+from busplan.sourced import EQUATIONS
+
+_MEANING: Final = Column("meaning", kind="words")
+INPUT_COLUMNS: Final = (
+    Column("name", kind="words"),
+    Column("value"),
+    Column("unit", kind="words"),
+    Column("grade", kind="words"),
+    Column("source", kind="words"),
+)
+"""What an input is, and how well it is known."""
+_FIGURES: Final = tuple(Column(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is"))
+
+
+def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
+    """Answer the question of `explain PROFILE`: what its figures rest on, and all that can be explained.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    assumptions
+        What its figures rest on.
+    """
+    caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
+    return Report(
+        Sentence(("The figures of ", Code(profile.name))),
+        lambda: (
+            assumptions_table(assumptions)._replace(caption=caption),
+            _figure_table(bus_of(profile)),
+        ),
+        partial(assumptions_document, profile, assumptions),
+        lambda: figure_rows(bus_of(profile)),
+    )
+
+
+def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions") -> Table:
+    """What figures rest on, one row each.
+
+    Parameters
+    ----------
+    assumptions
+        The inputs.
+    at
+        Place of their list in the JSON document.
+    """
+    rows = (Row((*input_cells(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
+    return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
+
+
+def figure_rows(bus: Bus) -> list[Record]:
+    """One row a figure that can be explained."""
+    return [
+        {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
+        | {"reference": one.reference, "meaning": one.meaning}
+        for command, one in _all_figures(bus)
+    ]
+
+
+def equation_rows() -> list[Record]:
+    """One row an equation: its numbers, formula, function and source."""
+    return [
+        {
+            "reference": one.reference,
+            "formula": f"{one.symbol} = {formula_of(one)}",
+            "function": name,
+            "source": one.source,
+        }
+        for name, one in sorted(EQUATIONS.items(), key=lambda item: item[1].numbers[0])
+    ]
+
+
+def constant_rows(bus: Bus) -> list[Record]:
+    """One row a constant: its value, unit, grade and source."""
+    return [
+        {"name": name, "value": float(one), "unit": one.unit}
+        | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
+        for name, one in bus.constants.items()
+    ]
+
+
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
+    """Document of `busplan explain PROFILE --format json`: what the figures rest on, and the whole registry."""
+    return document(
+        "explain",
+        profile=profile.name,
+        assumptions=[one._asdict() for one in assumptions],
+        figures=figure_rows(bus_of(profile)),
+        equations=equation_rows(),
+        constants=constant_rows(bus_of(profile)),
+    )
+
+
+def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
+    """Cells of an input, by its place in the JSON document."""
+    value = Value(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
+    return Code(one.name), value, one.unit, one.grade, one.source
+
+
+def _figure_table(bus: Bus) -> Table:
+    rows = (Row((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in _all_figures(bus))
+    return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
+
+
+def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
+    yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())
