@@ -82,7 +82,7 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
     assert marks["as it is"] == ""
     # The mark is seen in every form, without weight or colour.
     for form in ("table", "markdown", "html"):
-        said = render(found, form)  # type: ignore[arg-type]
+        said = render(found, form)
         assert "* recommended." in said
         assert "? not proven" in said
     (proven,) = (row for row in rows(report(paper)) if row.sought)
