@@ -251,8 +251,8 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
 
     Examples
     --------
-    >>> sentence("Set {} first.", Code("bus.gap_count")).parts
-    ('Set ', Code(text='bus.gap_count'), ' first.')
+    >>> sentence("Set {} first.", Code("bus.nodes")).parts
+    ('Set ', Code(text='bus.nodes'), ' first.')
     """
     given = iter(parts)
 

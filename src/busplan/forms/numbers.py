@@ -26,8 +26,8 @@ def written(value: Value) -> str:
     --------
     >>> written(Value(0.0036, "max_contour_error_mm", "um", 3)), written(Value(0.97, "utilisation", "%", 2))
     ('3.600', '97.00')
-    >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("hops", "nodes")))
-    ('-', 'yes', '16', 'hops, nodes')
+    >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("time", "nodes")))
+    ('-', 'yes', '16', 'time, nodes')
     >>> written(Value([2.38808777, 4000.0], digits=4)), written(Value(-4e-16, decimals=3, fixed=True))
     ('2.388, 4000', '0.000')
     >>> written(Value(1234567)), written(Value(1234567, grouped=True))
