@@ -3,17 +3,18 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
+from busplan.forms import Form
+
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-TopForm = Literal["table", "markdown", "html"]
-"""Forms of the rows at the top, for people."""
 RowsForm = Literal["csv", "json", "jsonl"]
 """Forms of every row as text, written as it comes."""
-SweepForm = Literal[TopForm, RowsForm, "npz"]
-TOP_FORMS: Final = get_args(TopForm)
+SweepForm = Literal[Form, RowsForm, "npz"]
 ROWS_FORMS: Final = get_args(RowsForm)
+TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in ROWS_FORMS)
+"""Forms of the rows at the top, for people."""
 
 
 class SweepJob(NamedTuple):

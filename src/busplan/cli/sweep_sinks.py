@@ -5,19 +5,19 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol, assert_never
+from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol
 
 from busplan.cli.answering import give
 from busplan.cli.output import document_bytes, emit_document
 from busplan.errors import BusplanError
-from busplan.forms import render
+from busplan.forms import Form, render
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.answers.sweep.rows import Style
     from busplan.answers.sweep.top import Tally
     from busplan.cli.npz import Archive, NpzColumns
-    from busplan.cli.sweep_job import SweepJob, TopForm
+    from busplan.cli.sweep_job import SweepJob
 
 
 class Sink(Protocol):
@@ -35,8 +35,6 @@ def opened_sink(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Itera
     """Where the document goes."""
     write = emit_document if file is None else partial(_write, file)
     match job.form:
-        case "table" | "markdown" | "html":
-            yield _TopSink(job, job.form, file, tally)
         case "csv" | "jsonl":
             yield _LinesSink(job, job.form, write)
         case "json":
@@ -48,7 +46,7 @@ def opened_sink(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Itera
             with NpzColumns(job.columns, folder=folder) as columns:
                 yield _NpzSink(job, file or _Pipe(), columns)
         case _:
-            assert_never(job.form)
+            yield _TopSink(job, job.form, file, tally)
 
 
 def _write(file: BinaryIO, text: str) -> None:
@@ -72,7 +70,7 @@ class _Pipe:
 class _TopSink:
     """Keeps the rows at the top, for an answer at the end."""
 
-    def __init__(self, job: "SweepJob", form: "TopForm", file: BinaryIO | None, tally: "Tally") -> None:
+    def __init__(self, job: "SweepJob", form: Form, file: BinaryIO | None, tally: "Tally") -> None:
         from busplan.answers.sweep.top import TopRows
 
         self._job, self._form, self._file, self._tally = job, form, file, tally

@@ -127,16 +127,14 @@ def timeline_command(
         return zoom(schedule(plan, model=model), from_us=from_us, to_us=to_us, transaction=one)
 
     match chosen:
-        case "table" | "markdown" | "html" | "csv" | "json":
-            with answer(chosen, output, inputs=profile_files(profile)) as give:
-                from busplan.answers.timeline import timeline_report
-
-                give(timeline_report(shown()))
         case "mermaid" | "svg" | "png":
             require_apart({"--output": output}, inputs=profile_files(profile))
             write_document(_picture(shown(), chosen), output)
         case _:
-            assert_never(chosen)
+            with answer(chosen, output, inputs=profile_files(profile)) as give:
+                from busplan.answers.timeline import timeline_report
+
+                give(timeline_report(shown()))
 
 
 def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
