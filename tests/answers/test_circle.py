@@ -209,7 +209,7 @@ def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float,
     test = small(tolerance__max_contour_error_mm=tolerance_mm)
     legend = chart_of(test).legend
     assert legend is not None
-    assert re.match(r"magnified \d+ times; [\d.]+ um from ring to ring, the nominal", sentence_text(legend))
+    assert re.match(r"Magnified \d+ times; [\d.]+ um from ring to ring, the nominal", sentence_text(legend))
     assert sentence_text(legend).endswith(words)
     report = circle_report(test, with_contributions=False)
     page = render(report, "html")

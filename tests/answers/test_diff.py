@@ -18,7 +18,7 @@ from busplan.answers.diff_headline import regression_words
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.errors import BusplanError
 from busplan.forms import render
-from busplan.forms.blocks import Report, Row, Table
+from busplan.forms.blocks import Report, Table, TableRow
 from busplan.forms.json_document import to_json
 from busplan.forms.terminal import block_lines
 from busplan.profile.shipped import load
@@ -48,7 +48,7 @@ def comment(found: Difference, *, arguments: tuple[str, str] = AB) -> str:
     return render(diff_report(found, arguments=arguments), "markdown")
 
 
-def figures(found: Difference) -> list[Row]:
+def figures(found: Difference) -> list[TableRow]:
     """Rows of the table of figures; none where there is no such table."""
     tables = (block for block in diff_report(found, arguments=AB).blocks() if isinstance(block, Table))
     return [row for table in tables if table.columns[0].heading == "figure" for row in table.rows]
@@ -280,8 +280,8 @@ def test_a_comment_has_the_verdict_first_and_what_differs() -> None:
     assert title == "Changes from main:line.toml to paper-optimal-gap"
     assert verdict.startswith("B is better in 10 figures: margin, utilisation, required N T_cs, most ")
     assert page.rows[1:3] == [
-        ["A", "main:line.toml", "paper-1ms", "1000.000", "paper"],
-        ["B", "paper-optimal-gap", "paper-optimal-gap", "1000.000", "standard"],
+        ["A", "main:line.toml", "paper-1ms", "1000", "paper"],
+        ["B", "paper-optimal-gap", "paper-optimal-gap", "1000", "standard"],
     ]
     assert ["bus.gap_count", "63", '"optimal"'] in page.rows
     assert ["margin", "paper", "us", "294.083", "325.984", "+31.901", "+10.8", "better"] in page.rows

@@ -10,7 +10,7 @@ from busplan.answers.assumptions import assumptions_report, assumptions_table
 from busplan.answers.explain import explain_report
 from busplan.buses import kind_named
 from busplan.forms import render
-from busplan.forms.blocks import Code, Report, Section, Steps, Table, Value, Words, values_in
+from busplan.forms.blocks import Calculation, Chapter, Code, Report, Table, Value, Words, values_in
 from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
@@ -18,11 +18,11 @@ from busplan.profile.toml import override
 FIGURES = [f"{command}.{key}" for command, keys in figures_of(kind_named("ieee1394")).items() for key in keys]
 
 
-def sections(figure: str, **changes: object) -> list[Section]:
+def sections(figure: str, **changes: object) -> list[Chapter]:
     """The derivations of a figure of paper-1ms."""
     profile = override(load("paper-1ms").profile, {key.replace("__", "."): value for key, value in changes.items()})
     found = explain_report(explain(profile, figure)).blocks()
-    return [block for block in found if isinstance(block, Section)]
+    return [block for block in found if isinstance(block, Chapter)]
 
 
 @pytest.mark.parametrize("figure", FIGURES)
@@ -44,7 +44,7 @@ def test_the_title_has_the_result_the_caption_the_least_known_grade() -> None:
     assert (period.value, period.at) == (1000.0, "/derivations/0/period_us")
     assert (result.value, result.at) == (205.9174700520833, "/derivations/0/value")
     about, steps, inputs = section.blocks
-    assert isinstance(steps, Steps)
+    assert isinstance(steps, Calculation)
     assert isinstance(inputs, Table)
     assert inputs.caption is not None
     assert sentence_text(inputs.caption) == "It starts from these; the least well known is assumed."
@@ -55,7 +55,7 @@ def test_the_title_has_the_result_the_caption_the_least_known_grade() -> None:
 def test_a_step_says_nothing_twice() -> None:
     for figure in ("failures", "hops", "required_us", "exceeded", "centre_offset_mm"):
         for section in sections(figure):
-            (steps,) = (block for block in section.blocks if isinstance(block, Steps))
+            (steps,) = (block for block in section.blocks if isinstance(block, Calculation))
             for step in steps.steps:
                 result = step.result.text if isinstance(step.result, Words) else None
                 said = [one for one in (step.formula, step.numbers, result) if one]

@@ -10,7 +10,7 @@ from busplan.answers.paper import paper_document, paper_report
 from busplan.answers.profiles import profiles_report
 from busplan.answers.rules import rule_report, rules_report
 from busplan.forms import render
-from busplan.forms.blocks import Report, Section, Snippet, Table, Value, values_in
+from busplan.forms.blocks import Chapter, Report, Snippet, Table, Value, values_in
 from busplan.profile.shipped import load, shipped_names
 from busplan.rules.registry import NEVER_SUPPRESSED, all_rules
 
@@ -24,7 +24,7 @@ def test_paper_has_every_comparison_once(values_in_their_places: Callable[[Repor
     assert len(places) == len(set(places)) == values_in_their_places(report)
     for key in ("computed", "residual", "relative_residual"):
         assert [f"/figures/{number}/{key}" in places for number in range(len(figures))] == [True] * len(figures)
-    blocks = [block for block in report.blocks() if isinstance(block, Section)]
+    blocks = [block for block in report.blocks() if isinstance(block, Chapter)]
     assert [str(block.title.parts[0]) for block in blocks] == [section.title for section in sections]
     assert [block.blocks[0].parts[0] for block in blocks] == [section.note for section in sections]  # type: ignore[union-attr]
 

@@ -26,7 +26,7 @@ from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.drawings.axes import AxesDrawing, drawn_range
 from busplan.drawings.terms import LEFT, TermsDrawing
 from busplan.forms import render
-from busplan.forms.blocks import Report, Section, Table, Value, values_in
+from busplan.forms.blocks import Chapter, Report, Table, Value, values_in
 from busplan.forms.columns import cell_text
 from busplan.forms.inks import INKS
 from busplan.forms.signed_bar import signed_bar
@@ -156,8 +156,8 @@ def whole() -> tuple[ReportedProfile, Report]:
     return subject, page_report([subject])
 
 
-def parts(report: Report) -> dict[str, Section]:
-    return {block.kind: block for block in report.blocks() if isinstance(block, Section)}
+def parts(report: Report) -> dict[str, Chapter]:
+    return {block.kind: block for block in report.blocks() if isinstance(block, Chapter)}
 
 
 def documents(subject: ReportedProfile) -> dict[str, Any]:

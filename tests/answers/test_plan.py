@@ -8,7 +8,7 @@ import pytest
 from busplan.analysis.planning.options import plan
 from busplan.answers.plan import plan_document, plan_records, plan_report, settings
 from busplan.forms import render
-from busplan.forms.blocks import Report, Row, Table, Value, Words, values_in
+from busplan.forms.blocks import Report, Table, TableRow, Value, Words, values_in
 from busplan.forms.columns import cell_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
@@ -45,7 +45,7 @@ def text(profile: Profile, circle: Circle | None = None, **options: Any) -> str:
     return render(report(profile, circle, **options), "table")
 
 
-def rows(answer: Report) -> Sequence[Row]:
+def rows(answer: Report) -> Sequence[TableRow]:
     (table,) = (block for block in answer.blocks() if isinstance(block, Table))
     return table.rows
 

@@ -37,6 +37,8 @@ from busplan.__main__ import main
 resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))
 main()
 """
+CUT_SHORT = {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+"""Compiled modules would be cut short, too: Python keeps what it wrote of them."""
 NON_BLOCKING = """
 import os
 from busplan.__main__ import main
@@ -56,7 +58,7 @@ node = { axes = 4, execution = { kind = "linear", base_us = 30, per_byte_us = 0.
 @pytest.mark.parametrize("name", WRITERS)
 def test_a_file_that_takes_a_part_ends_with_exit_2_and_a_message(run: Run, tmp_path: Path, name: str) -> None:
     with (tmp_path / "out").open("wb") as file:
-        done = run(*WRITERS[name], python=("-c", LIMITED), env={"PYTHONUNBUFFERED": "1"}, stdout=file)
+        done = run(*WRITERS[name], python=("-c", LIMITED), env=CUT_SHORT, stdout=file)
     assert done.returncode == 2
     assert "cannot be written: File too large\n" in done.stderr
     assert (tmp_path / "out").stat().st_size == 512

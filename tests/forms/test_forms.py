@@ -14,23 +14,23 @@ from busplan.forms import ENDINGS, Form, render
 from busplan.forms.blocks import (
     Bar,
     Block,
+    Calculation,
+    CalculationStep,
+    Chapter,
     Chart,
     Code,
-    Column,
     Command,
     Drawing,
     Facts,
-    Link,
     Question,
     Report,
-    Row,
-    Section,
+    SectionLink,
     Sentence,
     Snippet,
-    Step,
-    Steps,
     Swatch,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     Words,
     sentence,
@@ -70,16 +70,16 @@ def answer(*blocks: Block) -> Report:
 def one_of_each(text: str = "text") -> Sequence[Block]:
     table = Table(
         (
-            Column("name", kind="words"),
-            Column("margin", "us", group="paper"),
-            Column("fits", group="paper"),
-            Column("", kind="drawing"),
+            TableColumn("name", kind="words"),
+            TableColumn("margin", "us", group="paper"),
+            TableColumn("fits", group="paper"),
+            TableColumn("", kind="drawing"),
         ),
         (
-            Row((Code(text), MARGIN, Value(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
-            Row((Link(text, "s", "x.toml"), Value(None), FAILED, ""), level=1),
-            Row((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), sought=True),
-            Row((Command("busplan capacity p", "what", "c"), sentence("{} of {}", MARGIN, Code(text)), "-", "")),
+            TableRow((Code(text), MARGIN, Value(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
+            TableRow((SectionLink(text, "s", "x.toml"), Value(None), FAILED, ""), level=1),
+            TableRow((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), sought=True),
+            TableRow((Command("busplan capacity p", "what", "c"), sentence("{} of {}", MARGIN, Code(text)), "-", "")),
         ),
         sentence("A table of {}", Code(text)),
     )
@@ -89,9 +89,11 @@ def one_of_each(text: str = "text") -> Sequence[Block]:
         table,
         Chart(Picture(), Sentence((text,)), Sentence(("It is read so: ", Code(text)))),
         Snippet(("[bus]", 'speed = "S400"')),
-        Steps((Step("(1)", "T", "a + b", "1 + 2", MARGIN), Step("x", "W", "", "", Words("time")))),
+        Calculation(
+            (CalculationStep("(1)", "T", "a + b", "1 + 2", MARGIN), CalculationStep("x", "W", "", "", Words("time")))
+        ),
         Question(text, Words("FAILED", "fails"), (Sentence((text,)),), Facts((("margin", MARGIN),))),
-        Section(Sentence((Code(text),)), (Sentence((text,)), Command("busplan capacity p")), "kind", "s"),
+        Chapter(Sentence((Code(text),)), (Sentence((text,)), Command("busplan capacity p")), "kind", "s"),
     )
 
 
@@ -127,8 +129,8 @@ def test_figures_are_found_and_changed_wherever_they_stand() -> None:
 
 def test_tables_keep_every_figure_whole_and_end_without_blanks() -> None:
     table = Table(
-        (Column("a", kind="words"), Column("value", "us", group="paper"), Column("", kind="drawing")),
-        (Row(("x", "1", "")), Row(("longer", "123456.789", ""), level=1)),
+        (TableColumn("a", kind="words"), TableColumn("value", "us", group="paper"), TableColumn("", kind="drawing")),
+        (TableRow(("x", "1", "")), TableRow(("longer", "123456.789", ""), level=1)),
     )
     assert [line.text for line in block_lines([table])] == [
         "               paper",
@@ -141,7 +143,10 @@ def test_tables_keep_every_figure_whole_and_end_without_blanks() -> None:
 
 
 def test_a_state_is_marked_where_it_stands() -> None:
-    table = Table((Column("model", kind="words"), Column("fits")), (Row(("paper", FAILED)), Row(("standard", "yes"))))
+    table = Table(
+        (TableColumn("model", kind="words"), TableColumn("fits")),
+        (TableRow(("paper", FAILED)), TableRow(("standard", "yes"))),
+    )
     *_, failed, passed = block_lines([table])
     assert failed.text == "paper       no"
     assert [failed.text[mark.start : mark.end] for mark in failed.marks] == ["no"]
@@ -151,7 +156,7 @@ def test_a_state_is_marked_where_it_stands() -> None:
 
 def test_a_sentence_in_a_cell_keeps_its_units_and_its_state() -> None:
     said = sentence("{} to spare", MARGIN, state="fails")
-    table = Table((Column("set", kind="words"), Column("x")), (Row((said, "1")),))
+    table = Table((TableColumn("set", kind="words"), TableColumn("x")), (TableRow((said, "1")),))
     *_, row = block_lines([table])
     assert row.text == "3.969 us to spare  1"
     assert row.marks == (Mark(0, 17, "fails"),)
@@ -161,7 +166,7 @@ def test_a_sentence_in_a_cell_keeps_its_units_and_its_state() -> None:
 
 def test_how_a_drawing_is_read_stands_where_it_is_drawn_so() -> None:
     chart = Chart(Picture(), Sentence(("A picture",)), Sentence(("rings of 5 um.",)))
-    assert "<figcaption>A picture: rings of 5 um.</figcaption>" in render(answer(chart), "html")
+    assert "<figcaption>A picture. rings of 5 um.</figcaption>" in render(answer(chart), "html")
     assert "rings" not in render(answer(chart), "table")
     assert "rings" not in render(answer(chart), "markdown")
 

@@ -11,20 +11,22 @@ from busplan.analysis.register import Command, figures_of
 from busplan.answers.documents import document
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Cell, Code, Column, Document, Record, Report, Row, Sentence, Table, Value
+from busplan.forms.blocks import Cell, Code, Document, Record, Report, Sentence, Table, TableColumn, TableRow, Value
 from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 
-_MEANING: Final = Column("meaning", kind="words")
+_MEANING: Final = TableColumn("meaning", kind="words")
 INPUT_COLUMNS: Final = (
-    Column("name", kind="words"),
-    Column("value"),
-    Column("unit", kind="words"),
-    Column("grade", kind="words"),
-    Column("source", kind="words"),
+    TableColumn("name", kind="words"),
+    TableColumn("value"),
+    TableColumn("unit", kind="words"),
+    TableColumn("grade", kind="words"),
+    TableColumn("source", kind="words"),
 )
 """What an input is, and how well it is known."""
-_FIGURES: Final = tuple(Column(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is"))
+_FIGURES: Final = tuple(
+    TableColumn(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is")
+)
 
 
 def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
@@ -59,7 +61,7 @@ def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions")
     at
         Place of their list in the JSON document.
     """
-    rows = (Row((*input_cells(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
+    rows = (TableRow((*input_cells(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
     return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
 
 
@@ -113,7 +115,9 @@ def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
 
 
 def _figure_table(bus: Bus) -> Table:
-    rows = (Row((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in _all_figures(bus))
+    rows = (
+        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in _all_figures(bus)
+    )
     return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
 
 

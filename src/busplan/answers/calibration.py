@@ -13,14 +13,14 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    Column,
     Document,
     Record,
     Report,
-    Row,
     Sentence,
     Snippet,
     Table,
+    TableColumn,
+    TableRow,
     count_value,
     joined,
     sentence,
@@ -32,19 +32,19 @@ from busplan.sections.execution import LinearExecution, TableExecution
 
 SECTION: Final = "node.execution"
 _COLUMNS: Final = {
-    "payload_bytes": Column("payload", "bytes"),
-    "measurements": Column("n"),
-    "latency_us": Column("T_lant", "us"),
-    "packets_us": Column("packets", "us"),
-    "execution_us": Column("T_exec", "us"),
-    "deviation_us": Column("std dev", "us"),
-    "fitted_us": Column("fitted", "us"),
-    "residual_us": Column("residual", "us"),
+    "payload_bytes": TableColumn("payload", "bytes"),
+    "measurements": TableColumn("n"),
+    "latency_us": TableColumn("T_lant", "us"),
+    "packets_us": TableColumn("packets", "us"),
+    "execution_us": TableColumn("T_exec", "us"),
+    "deviation_us": TableColumn("std dev", "us"),
+    "fitted_us": TableColumn("fitted", "us"),
+    "residual_us": TableColumn("residual", "us"),
 }
 _MEASURED_COLUMNS: Final = {
-    "request_and_acknowledge_us": Column("measured", "us", group="T1+T2"),
-    "model_request_and_acknowledge_us": Column("model", "us", group="T1+T2"),
-    "unexplained_us": Column("unexplained", "us", group="T1+T2"),
+    "request_and_acknowledge_us": TableColumn("measured", "us", group="T1+T2"),
+    "model_request_and_acknowledge_us": TableColumn("model", "us", group="T1+T2"),
+    "unexplained_us": TableColumn("unexplained", "us", group="T1+T2"),
 }
 """Columns of what was measured beside the latency."""
 
@@ -114,7 +114,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
 def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
     shown = {**_COLUMNS, **(_MEASURED_COLUMNS if measured else {})}
     rows = (
-        Row(tuple(_cell(getattr(fit, key), key, f"/payloads/{number}/{key}") for key in shown))
+        TableRow(tuple(_cell(getattr(fit, key), key, f"/payloads/{number}/{key}") for key in shown))
         for number, fit in enumerate(payloads)
     )
     return Table(tuple(shown.values()), tuple(rows))

@@ -13,7 +13,18 @@ from busplan.answers.verdict import places_of, verdict_sentences, warnings
 from busplan.buses import figure
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Block, Code, Column, Document, Record, Report, Sentence, Table, count_value, sentence
+from busplan.forms.blocks import (
+    Block,
+    Code,
+    Document,
+    Record,
+    Report,
+    Sentence,
+    Table,
+    TableColumn,
+    count_value,
+    sentence,
+)
 from busplan.forms.numbers import nouns
 from busplan.forms.terminal import sentence_text
 from busplan.sections.profile import Profile
@@ -61,7 +72,9 @@ def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, star
         count_value(first.axes, "axes", at=f"/results/{start}/axes"),
         ", ".join(bus.setup_words(network_of(profile))),
     )
-    owners = [Owner(Column(one.timing_model), one, f"/results/{start + number}") for number, one in enumerate(figures)]
+    owners = [
+        Owner(TableColumn(one.timing_model), one, f"/results/{start + number}") for number, one in enumerate(figures)
+    ]
     return figure_table(_rows(bus), owners, caption=caption)
 
 

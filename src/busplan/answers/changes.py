@@ -6,11 +6,11 @@ from operator import eq
 from typing import Any, Final
 
 from busplan.analysis.comparison.difference import KeyDifference
-from busplan.forms.blocks import Code, Column, Document, Row, Table
+from busplan.forms.blocks import Code, Document, Table, TableColumn, TableRow
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
-_COLUMNS: Final = tuple(Column(heading, kind="words") for heading in ("key", "A", "B"))
+_COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("key", "A", "B"))
 _MOST_ITEMS: Final = 8
 """Longest list that is shown in full."""
 _MOST_CHARACTERS: Final = 40
@@ -22,7 +22,7 @@ _CONTEXT: Final = 8
 def change_table(keys: Iterable[KeyDifference]) -> Table:
     """One row a key: its values, and where they come from when that is not the file."""
     rows = ((one.key, _written(one.a, one.b), _written(one.b, one.a)) for one in keys)
-    return Table(_COLUMNS, tuple(Row(tuple(map(Code, row))) for row in rows))
+    return Table(_COLUMNS, tuple(TableRow(tuple(map(Code, row))) for row in rows))
 
 
 def _written(value: KeyValue | None, other: KeyValue | None) -> str:

@@ -17,13 +17,13 @@ from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
-    Column,
     Document,
     Record,
     Report,
-    Row,
     Sentence,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     figure_value,
     joined,
@@ -98,7 +98,7 @@ def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
         Number of the first among the results of the document.
     """
     owners = [
-        Owner(Column(period(result.period_us)), result, f"/results/{start + number}")
+        Owner(TableColumn(period(result.period_us)), result, f"/results/{start + number}")
         for number, result in enumerate(results)
     ]
     rows = ((_FIGURES[key], 0) for key in _SHOWN)
@@ -126,13 +126,13 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
             figure_value(_FIGURES[key], getattr(one, key), at=f"{place}/{key}")
             for key in ("max_contour_error_mm", "circular_deviation_mm")
         )
-        rows.append(Row((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
+        rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (
-        Column("source", kind="words"),
-        Column("", kind="drawing"),
-        Column("takes", "um"),
-        Column("max", "um", group="without it"),
-        Column("G", "um", group="without it"),
+        TableColumn("source", kind="words"),
+        TableColumn("", kind="drawing"),
+        TableColumn("takes", "um"),
+        TableColumn("max", "um", group="without it"),
+        TableColumn("G", "um", group="without it"),
     )
     caption = sentence(
         "Each error source removed in turn at {} and {}; what it takes from the largest contour error",

@@ -12,13 +12,13 @@ from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
     Code,
-    Column,
     Document,
     Record,
     Report,
-    Row,
     Sentence,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     Words,
     count_value,
@@ -33,21 +33,21 @@ Arguments = tuple[str, str]
 """A and B as they were typed."""
 
 _SIDES: Final = (
-    Column("", kind="words"),
-    Column("given as", kind="words"),
-    Column("name", kind="words"),
-    Column(PERIOD.label, PERIOD.unit),
-    Column(TIMING_MODEL.label, kind="words"),
+    TableColumn("", kind="words"),
+    TableColumn("given as", kind="words"),
+    TableColumn("name", kind="words"),
+    TableColumn(PERIOD.label, PERIOD.unit),
+    TableColumn(TIMING_MODEL.label, kind="words"),
 )
 _FIGURES: Final = (
-    Column("figure", kind="words"),
-    Column("of", kind="words"),
-    Column("unit", kind="words"),
-    Column("A"),
-    Column("B"),
-    Column("B - A"),
-    Column("relative", "%"),
-    Column("B is", kind="words"),
+    TableColumn("figure", kind="words"),
+    TableColumn("of", kind="words"),
+    TableColumn("unit", kind="words"),
+    TableColumn("A"),
+    TableColumn("B"),
+    TableColumn("B - A"),
+    TableColumn("relative", "%"),
+    TableColumn("B is", kind="words"),
 )
 _MOST_KEYS: Final = 20
 """Keys that a reader is shown: a comment on a pull request is no listing."""
@@ -132,7 +132,7 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
 def _sides(found: Difference, arguments: Arguments) -> Table:
     period = next(at for at, one in enumerate(found.figures) if one.figure.key == PERIOD.key)
     rows = (
-        Row(
+        TableRow(
             (
                 side,
                 Code(argument),
@@ -168,14 +168,14 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
         yield sentence(f"The {words} {text}.", state="warns" if "assumed" in (a, b) else "neutral")
 
 
-def _row(one: ComparedFigure, at: str) -> Row:
+def _row(one: ComparedFigure, at: str) -> TableRow:
     figure = one.figure
     a, b, difference = (figure_value(figure, getattr(one, key), at=f"{at}/{key}") for key in ("a", "b", "difference"))
     relative = Value(
         one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
     )
     judged = Words(one.judgement, STATES[one.judgement])
-    return Row((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
+    return TableRow((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
 
 
 def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> Document:

@@ -14,17 +14,17 @@ from busplan.answers.documents import document, with_profile
 from busplan.forms import blocks
 from busplan.forms.blocks import (
     Block,
+    Calculation,
+    Chapter,
     Code,
-    Column,
     Document,
     Part,
     Record,
     Report,
-    Row,
-    Section,
     Sentence,
-    Steps,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     Words,
     joined,
@@ -33,7 +33,7 @@ from busplan.forms.numbers import period_value, written
 from busplan.printable import json_text
 
 _NONE: Final = Words("none")
-_SYMBOL: Final = Column("symbol", kind="words")
+_SYMBOL: Final = TableColumn("symbol", kind="words")
 
 
 def explain_report(explanation: Explanation) -> Report:
@@ -115,7 +115,7 @@ def _step_records(one: Derivation) -> Iterator[Record]:
         }
 
 
-def _section(one: Derivation, profile: str, at: str) -> Section:
+def _section(one: Derivation, profile: str, at: str) -> Chapter:
     """The result, what it is, every step to it, and what they start from."""
     figure = one.figure
     kind = f"{one.transaction}, " if one.transaction else ""
@@ -126,9 +126,9 @@ def _section(one: Derivation, profile: str, at: str) -> Section:
         )
     )
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
-    steps = Steps(tuple(_step(step, f"{at}/steps/{number}") for number, step in enumerate(one.steps)))
+    steps = Calculation(tuple(_step(step, f"{at}/steps/{number}") for number, step in enumerate(one.steps)))
     found: tuple[Block, ...] = (about, steps, _inputs(one, f"{at}/inputs"))
-    return Section(title, found)
+    return Chapter(title, found)
 
 
 def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
@@ -158,16 +158,18 @@ def _has_names(value: object) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
 
 
-def _step(step: Step, at: str) -> blocks.Step:
+def _step(step: Step, at: str) -> blocks.CalculationStep:
     """A line in symbols, and one in numbers where it says more than the one before or after it."""
     result = _result(step.value, step.key, step.unit, at=f"{at}/value")
     said = written(result) if isinstance(result, Value) else result.text
     formula = "" if step.formula == step.symbol else step.formula
     numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
-    return blocks.Step(step.reference, step.symbol, formula, numbers, result)
+    return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
 def _inputs(one: Derivation, at: str) -> Table:
-    rows = (Row((Code(given.symbol), *input_cells(given, f"{at}/{number}"))) for number, given in enumerate(one.inputs))
+    rows = (
+        TableRow((Code(given.symbol), *input_cells(given, f"{at}/{number}"))) for number, given in enumerate(one.inputs)
+    )
     caption = Sentence((f"It starts from these; the least well known is {one.weakest_grade}.",))
     return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)

@@ -4,13 +4,13 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Cell, Column, Row, Sentence, State, Table, figure_value
+from busplan.forms.blocks import Cell, Sentence, State, Table, TableColumn, TableRow, figure_value
 
 
 class Owner(NamedTuple):
     """What has figures: one column."""
 
-    column: Column
+    column: TableColumn
     figures: object
     """Figures are its attributes."""
     at: str
@@ -33,14 +33,14 @@ def figure_table(
     unit
         Whether units have a column; otherwise the caption says the unit of all.
     """
-    head = (Column("figure", kind="words"), Column("eq", kind="words"), Column("unit", kind="words"))
+    head = (TableColumn("figure", kind="words"), TableColumn("eq", kind="words"), TableColumn("unit", kind="words"))
     columns = (*head[: 3 if unit else 2], *(owner.column for owner in owners))
     return Table(columns, tuple(_row(figure, level, owners, unit=unit) for figure, level in rows), caption)
 
 
-def _row(figure: Figure, level: int, owners: Sequence[Owner], *, unit: bool) -> Row:
+def _row(figure: Figure, level: int, owners: Sequence[Owner], *, unit: bool) -> TableRow:
     words = (figure.label, figure.reference, figure.column or figure.unit)[: 3 if unit else 2]
-    return Row((*words, *(_cell(figure, owner) for owner in owners)), level)
+    return TableRow((*words, *(_cell(figure, owner) for owner in owners)), level)
 
 
 def _cell(figure: Figure, owner: Owner) -> Cell:

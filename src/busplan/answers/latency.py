@@ -10,7 +10,7 @@ from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
 from busplan.answers.verdict import execution_sentence, warning_sentences
 from busplan.buses.figure import REQUIRED
-from busplan.forms.blocks import Block, Code, Column, Document, Record, Report, Sentence, Table
+from busplan.forms.blocks import Block, Code, Document, Record, Report, Sentence, Table, TableColumn
 from busplan.sections.profile import Profile
 
 
@@ -56,9 +56,9 @@ def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, T
         yield number, place, one
 
 
-def _column(one: Transaction) -> Column:
+def _column(one: Transaction) -> TableColumn:
     payload = "" if one.payload_bytes is None else f" {one.payload_bytes} B"
-    return Column(one.timing_model, group=f"{one.transaction}{payload}")
+    return TableColumn(one.timing_model, group=f"{one.transaction}{payload}")
 
 
 def _over(result: LatencyResult, profile: Profile) -> list[str]:

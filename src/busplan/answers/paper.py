@@ -6,7 +6,7 @@ from typing import Final
 
 from busplan.answers.documents import document
 from busplan.buses.published import Comparison, PaperSection
-from busplan.forms.blocks import Cell, Column, Document, Record, Report, Row, Section, Sentence, Table, Value
+from busplan.forms.blocks import Cell, Chapter, Document, Record, Report, Sentence, Table, TableColumn, TableRow, Value
 
 _DIGITS: Final = 5
 """Significant digits of a published figure, and of a quotient of two."""
@@ -57,11 +57,11 @@ def paper_document(sections: Sequence[PaperSection]) -> Document:
     )
 
 
-def _sections(sections: Sequence[PaperSection]) -> Iterator[Section]:
+def _sections(sections: Sequence[PaperSection]) -> Iterator[Chapter]:
     start = 0
     for section in sections:
         numbered = list(enumerate(section.comparisons, start=start))
-        yield Section(Sentence((section.title,)), (Sentence((section.note,)), _table(numbered)))
+        yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(numbered)))
         start += len(numbered)
 
 
@@ -71,17 +71,21 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
     for at, one in comparisons:
         rows.setdefault(one.quantity, {})[one.method] = at, one
     columns = (
-        *(Column("figure", kind="words"), Column("unit", kind="words"), Column("published")),
-        *(column for method in methods for column in (Column(method), Column("residual"), Column("", "%"))),
+        *(TableColumn("figure", kind="words"), TableColumn("unit", kind="words"), TableColumn("published")),
+        *(
+            column
+            for method in methods
+            for column in (TableColumn(method), TableColumn("residual"), TableColumn("", "%"))
+        ),
     )
     return Table(columns, tuple(_row(by_method, methods) for by_method in rows.values()))
 
 
-def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> Row:
+def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> TableRow:
     at, first = next(iter(by_method.values()))
     published = Value(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
     compared = (cell for method in methods for cell in _compared(by_method.get(method)))
-    return Row((first.quantity, first.unit, published, *compared))
+    return TableRow((first.quantity, first.unit, published, *compared))
 
 
 def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:

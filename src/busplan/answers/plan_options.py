@@ -7,7 +7,19 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.options import Option, Plan
 from busplan.buses import bus
 from busplan.buses.figure import BINDING_TERM, MARGIN, MAX_AXES, MAX_NODES
-from busplan.forms.blocks import Cell, Column, Part, Row, Sentence, Table, Value, Words, figure_value, joined, sentence
+from busplan.forms.blocks import (
+    Cell,
+    Part,
+    Sentence,
+    Table,
+    TableColumn,
+    TableRow,
+    Value,
+    Words,
+    figure_value,
+    joined,
+    sentence,
+)
 from busplan.forms.numbers import MISSING, period_value
 from busplan.sections.profile import Profile
 
@@ -19,16 +31,16 @@ def options_table(plan: Plan) -> Table:
     """What each option sets and what it brings; the recommended one has a mark."""
     first = plan.options[0]
     columns = (
-        Column("option", kind="words"),
-        Column("", kind="words"),
-        *(Column(heading, kind="words") for heading in ("set", "largest term", "held by", "circle")),
-        *(Column(one.timing_model, "us", group="margin") for one in (first.deciding, *first.others)),
-        *(Column(heading, group="most") for heading in ("nodes", "axes")),
+        TableColumn("option", kind="words"),
+        TableColumn("", kind="words"),
+        *(TableColumn(heading, kind="words") for heading in ("set", "largest term", "held by", "circle")),
+        *(TableColumn(one.timing_model, "us", group="margin") for one in (first.deciding, *first.others)),
+        *(TableColumn(heading, group="most") for heading in ("nodes", "axes")),
     )
     return Table(columns, tuple(_row(option, at=f"/options/{number}") for number, option in enumerate(plan.options)))
 
 
-def _row(option: Option, *, at: str) -> Row:
+def _row(option: Option, *, at: str) -> TableRow:
     passed = option.circle_passed
     circle = MISSING if passed is None else Words("passes", "passes") if passed else Words("FAILS", "fails")
     cells: tuple[Cell, ...] = (
@@ -41,7 +53,7 @@ def _row(option: Option, *, at: str) -> Row:
         *option_margins(option, at=at),
         *(figure_value(one, getattr(option.deciding, one.key), at=f"{at}/{one.key}") for one in (MAX_NODES, MAX_AXES)),
     )
-    return Row(cells, sought=option.recommended)
+    return TableRow(cells, sought=option.recommended)
 
 
 def option_margins(option: Option, *, at: str) -> list[Value]:

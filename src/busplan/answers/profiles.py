@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from busplan.answers.documents import document
-from busplan.forms.blocks import Code, Record, Report, Section, Sentence, count_value, sentence
+from busplan.forms.blocks import Chapter, Code, Record, Report, Sentence, count_value, sentence
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
 
@@ -36,11 +36,11 @@ def _record(profile: Profile) -> Record:
     }
 
 
-def _section(record: Record, at: str) -> Section:
+def _section(record: Record, at: str) -> Chapter:
     title = sentence(
         f"{{}}: {{}} {nouns(record['nodes'], 'node')} at {{}}, {record['timing_model']} model decides",
         Code(record["name"]),
         count_value(record["nodes"], "nodes", at=f"{at}/nodes"),
         period_value(record["period_us"], at=f"{at}/period_us"),
     )
-    return Section(title, (Sentence((record["description"],)),))
+    return Chapter(title, (Sentence((record["description"],)),))

@@ -9,18 +9,18 @@ from busplan.buses.rule import Rule
 from busplan.forms.blocks import (
     Block,
     Code,
-    Column,
     Document,
     Record,
     Report,
-    Row,
     Sentence,
     Snippet,
     Table,
+    TableColumn,
+    TableRow,
 )
 from busplan.rules.registry import NEVER_SUPPRESSED
 
-_COLUMNS: Final = tuple(Column(heading, kind="words") for heading in ("code", "rule", "severity", "what is wrong"))
+_COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("code", "rule", "severity", "what is wrong"))
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:
@@ -56,7 +56,7 @@ def rule_report(rule: Rule) -> Report:
 
 
 def _table(rules: Sequence[Rule]) -> Table:
-    rows = (Row((Code(rule.code), rule.name, rule.severity, rule.summary)) for rule in rules)
+    rows = (TableRow((Code(rule.code), rule.name, rule.severity, rule.summary)) for rule in rules)
     return Table(_COLUMNS, tuple(rows))
 
 

@@ -17,14 +17,14 @@ from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
-    Column,
     Document,
     Record,
     Report,
-    Row,
     Sentence,
     Swatch,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     figure_value,
     joined,
@@ -94,20 +94,20 @@ def totals_table(plan: Schedule) -> Table:
     part = whole if plan.is_whole else "the window"
     return Table(
         (
-            *(Column("kind", kind="words"), Column("eq", kind="words")),
-            *(Column(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
+            *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words")),
+            *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(plan, number, one) for number, one in enumerate(totals(plan))),
         sentence(f"What takes {part}, {{}}", Value(plan.to_us - plan.from_us, "duration_us", "us", 3)),
     )
 
 
-def _total_row(plan: Schedule, number: int, one: Total) -> Row:
+def _total_row(plan: Schedule, number: int, one: Total) -> TableRow:
     kind = kind_of(plan.profile, one.kind)
     values = (
         figure_value(figure, getattr(one, figure.key), at=f"/totals/{number}/{figure.key}") for figure in _TOTAL_FIGURES
     )
-    return Row((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
+    return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
 def _placed(one: Sentence, plan: Schedule) -> Sentence:

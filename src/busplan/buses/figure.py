@@ -127,7 +127,7 @@ _CYCLE: Final = by(time_slice.time_slice_us, time_slice.required_time_slice_us)
 TIMING_MODEL: Final = Figure(
     "timing_model", "model", "profile", "timing model of the figures", "timing that decides", sort="word"
 )
-PERIOD: Final = Figure("period_us", "T_s", "profile", "communication period", "period T_s")
+PERIOD: Final = Figure("period_us", "T_s", "profile", "communication period", "period T_s", decimals=None)
 NODES: Final = Figure("nodes", "N", "profile", "distributed nodes, host not counted", "nodes N", "nodes", "count")
 AXES: Final = Figure("axes", "axes", "profile", "axes of all nodes", "axes", "axes", "count")
 AVAILABLE: Final = Figure(

@@ -59,7 +59,7 @@ class Code(NamedTuple):
     text: str
 
 
-class Link(NamedTuple):
+class SectionLink(NamedTuple):
     """A name that leads to a section."""
 
     text: str
@@ -106,10 +106,10 @@ class Sentence(NamedTuple):
     state: State = "neutral"
 
 
-Cell = str | Value | Words | Code | Link | Swatch | Bar | Command | Sentence
+Cell = str | Value | Words | Code | SectionLink | Swatch | Bar | Command | Sentence
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of a table."""
 
     heading: str
@@ -119,7 +119,7 @@ class Column(NamedTuple):
     """What stands above it and its neighbours of the same group."""
 
 
-class Row(NamedTuple):
+class TableRow(NamedTuple):
     """A row of a table."""
 
     cells: tuple[Cell, ...]
@@ -132,8 +132,8 @@ class Row(NamedTuple):
 class Table(NamedTuple):
     """A table."""
 
-    columns: tuple[Column, ...]
-    rows: tuple[Row, ...]
+    columns: tuple[TableColumn, ...]
+    rows: tuple[TableRow, ...]
     caption: Sentence | None = None
     stacks: bool = False
     """Whether its rows are read one by one: nobody compares them down a column."""
@@ -181,7 +181,7 @@ class Snippet(NamedTuple):
     language: str = "toml"
 
 
-class Step(NamedTuple):
+class CalculationStep(NamedTuple):
     """One step of a derivation: symbol = formula = numbers = result."""
 
     reference: str
@@ -191,10 +191,10 @@ class Step(NamedTuple):
     result: Value | Words
 
 
-class Steps(NamedTuple):
+class Calculation(NamedTuple):
     """A derivation."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[CalculationStep, ...]
 
 
 class Question(NamedTuple):
@@ -210,7 +210,7 @@ class Question(NamedTuple):
     """As for `Value`."""
 
 
-class Section(NamedTuple):
+class Chapter(NamedTuple):
     """Blocks under a title."""
 
     title: Sentence
@@ -221,7 +221,7 @@ class Section(NamedTuple):
     """Its name on a page, where a link leads to it."""
 
 
-Block = Sentence | Facts | Table | Chart | Command | Snippet | Steps | Question | Section
+Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Chapter
 
 
 class Report(NamedTuple):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from busplan.forms.blocks import Bar, Cell, Column, Row, Sentence, Swatch, Table, Value, Words
+from busplan.forms.blocks import Bar, Cell, Sentence, Swatch, Table, TableColumn, TableRow, Value, Words
 from busplan.forms.lines import Line, Mark, Tone
 from busplan.forms.numbers import with_unit, written
 from busplan.printable import printable
@@ -56,7 +56,7 @@ def _one_line(cell: Cell) -> str:
     return printable(" ".join(cell_text(cell).split()))
 
 
-def _heads(columns: Sequence[Column]) -> list[tuple[str, ...]]:
+def _heads(columns: Sequence[TableColumn]) -> list[tuple[str, ...]]:
     """Lines of headings, from the top: group, heading and unit, where a column has them."""
     stacks = [[*filter(None, (column.unit, column.heading, column.group))] for column in columns]
     return [tuple(line) for line in zip_longest(*stacks, fillvalue="")][::-1]
@@ -70,7 +70,7 @@ def _laid(cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]) -> 
 
 
 def _marks(
-    row: Row, shown: Sequence[int], cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]
+    row: TableRow, shown: Sequence[int], cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]
 ) -> Iterator[Mark]:
     """Where the cells stand that have a state; the row that is sought is one mark."""
     start = 0

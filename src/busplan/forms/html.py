@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from busplan import __version__
 from busplan.forms import blocks as made_of
-from busplan.forms.blocks import Bar, Block, Chart, Command, Report, Section, Sentence, Table, Value
+from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table, Value
 from busplan.forms.columns import cell_text
 from busplan.forms.inks import DARK, fills
 from busplan.forms.numbers import MISSING, with_unit, written
@@ -17,8 +17,8 @@ from busplan.forms.signed_bar import signed_bar
 from busplan.forms.terminal import sentence_text
 from busplan.printable import json_text, printable_lines
 
-_TYPES: Final = ("Value", "Words", "Code", "Link", "Swatch", "Bar", "Command", "Sentence")
-_BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Steps", "Question", "Section")
+_TYPES: Final = ("Value", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
+_BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Chapter")
 
 
 def page(report: Report) -> str:
@@ -57,7 +57,7 @@ def page(report: Report) -> str:
         "bar": _bar,
         # An SVG of ours is markup: its writer has escaped what it says.
         "svg": Markup,
-        "holds_sections": lambda section: any(isinstance(one, Section) for one in section.blocks),
+        "holds_sections": lambda section: any(isinstance(one, Chapter) for one in section.blocks),
     }
     found = report.blocks()
     light, dark = fills(".chart")
@@ -85,7 +85,7 @@ def _charts(blocks: Sequence[Block]) -> Iterator[Chart]:
     for block in blocks:
         if isinstance(block, Chart):
             yield block
-        elif isinstance(block, Section):
+        elif isinstance(block, Chapter):
             yield from _charts(block.blocks)
 
 
@@ -101,7 +101,7 @@ def _role(block: Block) -> str:
             return "words"
         case Command():
             return "commands"
-        case Section():
+        case Chapter():
             return "sections"
     return "body"
 

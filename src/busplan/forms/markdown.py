@@ -6,19 +6,19 @@ from typing import Final
 
 from busplan.forms.blocks import (
     Block,
+    Calculation,
     Cell,
+    Chapter,
     Chart,
     Code,
     Command,
     Facts,
-    Link,
     Part,
     Question,
     Report,
-    Section,
+    SectionLink,
     Sentence,
     Snippet,
-    Steps,
     Swatch,
     Table,
     Value,
@@ -41,7 +41,7 @@ def text(report: Report) -> str:
         The answer.
     """
     blocks = report.blocks()
-    level = 1 if any(isinstance(block, Section) for block in blocks) else _COMMENT_LEVEL
+    level = 1 if any(isinstance(block, Chapter) for block in blocks) else _COMMENT_LEVEL
     lines = (f"{'#' * level} {_sentence(report.title)}", *_blocks(blocks, level=level + 1))
     return "\n".join(lines) + "\n"
 
@@ -73,14 +73,14 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
                 yield from (*_caption(block.caption), "```mermaid", drawn.rstrip("\n"), "```")
         case Snippet():
             yield from (f"```{block.language}", *block.lines, "```")
-        case Steps():
+        case Calculation():
             yield from _steps(block)
         case Question():
             yield from (f"**{escaped(block.question)} {escaped(block.answer.text)}.**", "")
             yield from (f"- {_sentence(one)}" for one in block.sentences)
             if block.facts.items:
                 yield from ("", f"{_facts(block.facts)}.")
-        case Section():
+        case Chapter():
             yield from (f'<a id="{block.key}"></a>', "") if block.key else ()
             yield f"{'#' * level} {_sentence(block.title)}"
             yield from _blocks(block.blocks, level=level + 1)
@@ -140,7 +140,7 @@ def _cell(cell: Cell) -> str:
         case Value() | Words() | Sentence():
             words = _sentence(cell) if isinstance(cell, Sentence) else escaped(cell_text(cell))
             return f"**{words}**" if cell.state == "fails" and words else words
-        case Link():
+        case SectionLink():
             origin = "" if cell.origin == cell.text else f" {code(cell.origin)}"
             return f"[{code(cell.text)}](#{cell.key}){origin}"
         case Command() | Code():
@@ -151,7 +151,7 @@ def _cell(cell: Cell) -> str:
     return escaped(cell_text(cell))
 
 
-def _steps(steps: Steps) -> list[str]:
+def _steps(steps: Calculation) -> list[str]:
     rows = (
         [
             str(number),

@@ -5,17 +5,17 @@ from typing import Final
 
 from busplan.forms.blocks import (
     Block,
+    Calculation,
+    CalculationStep,
+    Chapter,
     Chart,
     Command,
     Facts,
     Part,
     Question,
     Report,
-    Section,
     Sentence,
     Snippet,
-    Step,
-    Steps,
     Table,
     Value,
 )
@@ -89,12 +89,12 @@ def _lines(block: Block, width: int) -> Sequence[Line]:
             return [Line(f"$ {block.line}", "drawn")]
         case Snippet():
             return [Line(line, "drawn") for line in block.lines]
-        case Steps():
+        case Calculation():
             return [line for number, step in enumerate(block.steps, start=1) for line in _step(number, step)]
         case Question():
             head = Line(f"{block.question} {block.answer.text}", block.answer.state)
             return [head, *block_lines((*block.sentences, block.facts), width=width)]
-        case Section():
+        case Chapter():
             return [Line(sentence_text(block.title), "heading"), *block_lines(block.blocks, width=width)]
 
 
@@ -106,7 +106,7 @@ def _part(part: Part) -> str:
     return with_unit(part) if isinstance(part, Value) else cell_text(part)
 
 
-def _step(number: int, step: Step) -> Iterator[Line]:
+def _step(number: int, step: CalculationStep) -> Iterator[Line]:
     """A line in symbols, one in numbers and the result, each where it says more than the one before."""
     head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
     result = with_unit(step.result) if isinstance(step.result, Value) else step.result.text

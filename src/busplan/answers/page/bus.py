@@ -24,15 +24,15 @@ from busplan.drawings.axes import AxesDrawing
 from busplan.drawings.terms import LEFT, TermsDrawing
 from busplan.forms.blocks import (
     Block,
+    Chapter,
     Chart,
-    Column,
     Facts,
     Question,
-    Row,
-    Section,
     Sentence,
     Swatch,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     Words,
     count_value,
@@ -76,11 +76,11 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     return sources["capacity"].gives(question)
 
 
-def models_part(answer: AllAnswers, sources: Sources) -> Section:
+def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """The timing models side by side: the whole cycle, and the latencies."""
     capacity, latency = sources["capacity"], sources["latency"]
     several = len(bus_of(answer.profile).timing_models) > 1
-    return Section(
+    return Chapter(
         Sentence(("The timing models, side by side" if several else "The timing model",)),
         (
             capacity.gives(capacity_table(answer.profile, answer.capacity.results)),
@@ -92,9 +92,9 @@ def models_part(answer: AllAnswers, sources: Sources) -> Section:
     )
 
 
-def timeline_part(answer: AllAnswers, sources: Sources) -> Section:
+def timeline_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """The cycle to scale."""
-    return Section(Sentence(("The cycle to scale",)), tuple(_timeline(answer, sources)), "timeline")
+    return Chapter(Sentence(("The cycle to scale",)), tuple(_timeline(answer, sources)), "timeline")
 
 
 def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
@@ -112,19 +112,21 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     yield source.line
 
 
-def terms_part(answer: AllAnswers, sources: Sources) -> Section:
+def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """Where the microseconds go."""
     results, source = answer.capacity.results, sources["capacity"]
     terms = (*bus_of(answer.profile).term_figures, LEFT)
-    words = (Column("term", kind="words"), Column("eq", kind="words"))
+    words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
     table = Table(
-        (*words, *(Column(one.timing_model) for one in results)),
-        tuple(Row((Swatch(term.ink, term.letter, term.label), term.reference, *_of(term, answer))) for term in terms),
+        (*words, *(TableColumn(one.timing_model) for one in results)),
+        tuple(
+            TableRow((Swatch(term.ink, term.letter, term.label), term.reference, *_of(term, answer))) for term in terms
+        ),
         Sentence(("Terms of the cycle, us",)),
     )
     caption = Sentence(("The terms of the cycle, in the order of the table, and what they leave.",))
     chart = Chart(TermsDrawing(results), caption)
-    return Section(Sentence(("Where the microseconds go",)), (chart, source.gives(table), source.line), "terms")
+    return Chapter(Sentence(("Where the microseconds go",)), (chart, source.gives(table), source.line), "terms")
 
 
 def _of(term: Figure, answer: AllAnswers) -> Iterator[Value]:
@@ -133,7 +135,7 @@ def _of(term: Figure, answer: AllAnswers) -> Iterator[Value]:
         yield figure_value(term, getattr(one, term.key), at=f"/results/{number}/{term.key}")
 
 
-def axes_part(answer: AllAnswers, sources: Sources) -> Section:
+def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """Axes against period."""
     source, steps = sources["axes"], answer.steps
     nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
@@ -145,9 +147,9 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Section:
     )
     table = Table(
         (
-            Column("period", "us"),
+            TableColumn("period", "us"),
             *(
-                Column(figure.label, kind="words" if figure.sort == "word" else "figures", group=one.timing_model)
+                TableColumn(figure.label, kind="words" if figure.sort == "word" else "figures", group=one.timing_model)
                 for one in steps
                 for figure in _OVER_PERIOD
             ),
@@ -156,10 +158,10 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Section:
         Sentence(("Most nodes and axes at the profile's own period and about it",)),
     )
     chart = Chart(AxesDrawing(answer.profile, steps), caption)
-    return Section(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
+    return Chapter(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
 
 
-def _over_period(answer: AllAnswers) -> Iterator[Row]:
+def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
     """A row a period, the timing models behind one another."""
     number = 0
     for results in answer.periods.periods:
@@ -171,7 +173,7 @@ def _over_period(answer: AllAnswers) -> Iterator[Row]:
                 figure_value(figure, getattr(one, figure.key), at=f"{at}/{figure.key}") for figure in _OVER_PERIOD
             )
             number += 1
-        yield Row(tuple(cells), sought=period_us == answer.profile.cycle.period_us)
+        yield TableRow(tuple(cells), sought=period_us == answer.profile.cycle.period_us)
 
 
 def _curves(answer: AllAnswers) -> str:

@@ -10,7 +10,7 @@ from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_chart, circl
 from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence
 from busplan.answers.page.commands import Source
 from busplan.buses.figure import by_key
-from busplan.forms.blocks import Block, Facts, Question, Section, Sentence, Words, figure_value
+from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, figure_value
 
 _QUESTION: Final = "Is the circle still round?"
 _KEYS: Final = (
@@ -52,9 +52,9 @@ def _why_not(answer: AllAnswers) -> tuple[str, ...]:
     return ("The profile has no section for a circle test, so none was run.",)
 
 
-def circle_part(answer: AllAnswers, sources: Sources) -> Section:
+def circle_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """The magnified circle and its figures."""
-    return Section(Sentence(("The circle",)), tuple(_circle(answer, sources)), "circle")
+    return Chapter(Sentence(("The circle",)), tuple(_circle(answer, sources)), "circle")
 
 
 def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
@@ -74,13 +74,13 @@ def _not_drawn(answer: AllAnswers, result: CircleFigures) -> Sentence:
     return Sentence(("Not drawn: ", *failure_words(result, at="/results/0").parts, "."))
 
 
-def sources_part(answer: AllAnswers, sources: Sources) -> Section | None:
+def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
     """What makes the circle less round, ranked; nothing without a simulation."""
     result = answer.circle_figures
     if result is None or result.contributions is None:
         return None
     title, source = Sentence(("What to attack",)), sources["circle"]
     if not result.contributions:
-        return Section(title, (NO_SOURCES,), "sources")
+        return Chapter(title, (NO_SOURCES,), "sources")
     table = contributions_table(result, at="/results/0")
-    return Section(title, (ACT_TOGETHER, source.gives(table), source.line), "sources")
+    return Chapter(title, (ACT_TOGETHER, source.gives(table), source.line), "sources")

@@ -28,16 +28,16 @@ from busplan.buses.figure import (
 from busplan.forms.blocks import (
     Block,
     Cell,
+    Chapter,
     Code,
-    Column,
     Document,
     Facts,
-    Link,
     Report,
-    Row,
-    Section,
+    SectionLink,
     Sentence,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     figure_value,
 )
@@ -110,9 +110,9 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
     if len(subjects) == 1:
         yield from _chapter(subjects[0])
         return
-    yield Section(Sentence(("Comparison",)), (_comparison(subjects),), "comparison", "comparison")
+    yield Chapter(Sentence(("Comparison",)), (_comparison(subjects),), "comparison", "comparison")
     for one in subjects:
-        yield Section(Sentence((Code(one.name),)), tuple(_chapter(one)), key=one.key)
+        yield Chapter(Sentence((Code(one.name),)), tuple(_chapter(one)), key=one.key)
 
 
 def _chapter(subject: _Subject) -> Iterator[Block]:
@@ -123,7 +123,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     yield _facts(subject)
     questions = (bus_question(answer, found), circle_question(answer, found))
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
-    yield Section(Sentence(("Verdict",)), (*questions, *lines), "verdict")
+    yield Chapter(Sentence(("Verdict",)), (*questions, *lines), "verdict")
     yield models_part(answer, found)
     yield timeline_part(answer, found)
     yield terms_part(answer, found)
@@ -133,7 +133,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if ranked is not None:
         yield ranked
     assumptions = found["explain"].gives(assumptions_table(answer.assumptions))
-    yield Section(Sentence(("What it rests on",)), (assumptions, found["explain"].line), "assumptions")
+    yield Chapter(Sentence(("What it rests on",)), (assumptions, found["explain"].line), "assumptions")
     yield _commands(found)
 
 
@@ -158,30 +158,30 @@ def _facts(subject: _Subject) -> Facts:
     return Facts((*subject.sources["capacity"].gives(items), ("profile", Code(subject.origin))))
 
 
-def _commands(found: Mapping[str, Source]) -> Section:
-    columns = (Column("what", kind="words"), Column("command", kind="words"))
-    rows = tuple(Row((source.command.purpose, source.command)) for source in found.values())
+def _commands(found: Mapping[str, Source]) -> Chapter:
+    columns = (TableColumn("what", kind="words"), TableColumn("command", kind="words"))
+    rows = tuple(TableRow((source.command.purpose, source.command)) for source in found.values())
     line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
     table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
-    return Section(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
+    return Chapter(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
 
 
 def _comparison(subjects: Sequence[_Subject]) -> Table:
     models = tuple(dict.fromkeys(one.timing_model for each in subjects for one in each.answer.capacity.results))
     columns = (
-        Column("profile", kind="words"),
-        Column("fits", kind="words"),
-        Column("models agree", kind="words"),
-        Column("period", "us"),
-        Column("nodes"),
-        Column("axes"),
-        Column("used", "%"),
-        *(Column(model, group="margin, us") for model in models),
-        Column("most axes"),
-        *(Column(word, group="contour error, um") for word, _ in _MEASURES),
-        Column("circle passed", kind="words"),
+        TableColumn("profile", kind="words"),
+        TableColumn("fits", kind="words"),
+        TableColumn("models agree", kind="words"),
+        TableColumn("period", "us"),
+        TableColumn("nodes"),
+        TableColumn("axes"),
+        TableColumn("used", "%"),
+        *(TableColumn(model, group="margin, us") for model in models),
+        TableColumn("most axes"),
+        *(TableColumn(word, group="contour error, um") for word, _ in _MEASURES),
+        TableColumn("circle passed", kind="words"),
     )
-    rows = tuple(Row(_compared(one, models)) for one in subjects)
+    rows = tuple(TableRow(_compared(one, models)) for one in subjects)
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
 
 
@@ -210,7 +210,7 @@ def _compared(subject: _Subject, models: Sequence[str]) -> tuple[Cell, ...]:
         *margins,
         cell(MAX_AXES),
     )
-    link = Link(subject.name, subject.key, subject.origin)
+    link = SectionLink(subject.name, subject.key, subject.origin)
     return link, *found["capacity"].gives(bus), *_compared_circle(subject)
 
 

@@ -13,13 +13,13 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.forms.blocks import (
     Code,
-    Column,
     Document,
     Record,
     Report,
-    Row,
     Sentence,
     Table,
+    TableColumn,
+    TableRow,
     Value,
     count_value,
     figure_value,
@@ -218,16 +218,16 @@ def top_table(top: TopRows, bus: Bus) -> Table:
     figures = by_key((*CIRCLE_FIGURES, *bus.capacity_figures))
     return Table(
         tuple(_column(name, figures.get(name)) for name in top.columns),
-        tuple(Row(tuple(_cells(row, figures))) for row in top.kept),
+        tuple(TableRow(tuple(_cells(row, figures))) for row in top.kept),
     )
 
 
-def _column(name: str, figure: Figure | None) -> Column:
+def _column(name: str, figure: Figure | None) -> TableColumn:
     if figure is None:
-        return Column(name)
+        return TableColumn(name)
     # All other units are said by the names.
     unit = "%" if figure.column == "%" else ""
-    return Column(name, unit, kind="words" if figure.sort in ("word", "words") else "figures")
+    return TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures")
 
 
 def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
