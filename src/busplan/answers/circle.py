@@ -25,9 +25,9 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     Value,
-    figure_value,
     joined,
     sentence,
+    value_of,
 )
 from busplan.forms.numbers import period
 from busplan.sections.profile import Profile
@@ -122,10 +122,7 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
     for number, one in enumerate(ranked):
         place = f"{at}/contributions/{number}"
         takes = Value(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
-        left = (
-            figure_value(_FIGURES[key], getattr(one, key), at=f"{place}/{key}")
-            for key in ("max_contour_error_mm", "circular_deviation_mm")
-        )
+        left = (value_of(_FIGURES[key], one, at=place) for key in ("max_contour_error_mm", "circular_deviation_mm"))
         rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (
         TableColumn("source", kind="words"),

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Cell, Sentence, State, Table, TableColumn, TableRow, figure_value
+from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, value_of
 
 
 class Owner(NamedTuple):
@@ -40,14 +40,4 @@ def figure_table(
 
 def _row(figure: Figure, level: int, owners: Sequence[Owner], *, unit: bool) -> TableRow:
     words = (figure.label, figure.reference, figure.column or figure.unit)[: 3 if unit else 2]
-    return TableRow((*words, *(_cell(figure, owner) for owner in owners)), level)
-
-
-def _cell(figure: Figure, owner: Owner) -> Cell:
-    value = getattr(owner.figures, figure.key)
-    return figure_value(figure, value, at=f"{owner.at}/{figure.key}", state=cell_state(figure, value))
-
-
-def cell_state(figure: Figure, value: object) -> State:
-    """What a value says of the plan where it stands alone: a truth that should be and is not fails."""
-    return "fails" if figure.sort == "truth" and figure.better == "more" and value is False else "neutral"
+    return TableRow((*words, *(value_of(figure, owner.figures, at=owner.at) for owner in owners)), level)

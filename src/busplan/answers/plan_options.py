@@ -19,6 +19,7 @@ from busplan.forms.blocks import (
     figure_value,
     joined,
     sentence,
+    value_of,
 )
 from busplan.forms.numbers import MISSING, period_value
 from busplan.sections.profile import Profile
@@ -51,7 +52,7 @@ def _row(option: Option, *, at: str) -> TableRow:
         Value(option.bounded_by, "bounded_by", at=f"{at}/bounded_by"),
         circle,
         *option_margins(option, at=at),
-        *(figure_value(one, getattr(option.deciding, one.key), at=f"{at}/{one.key}") for one in (MAX_NODES, MAX_AXES)),
+        *(value_of(one, option.deciding, at=at) for one in (MAX_NODES, MAX_AXES)),
     )
     return TableRow(cells, sought=option.recommended)
 
@@ -71,8 +72,8 @@ def option_margins(option: Option, *, at: str) -> list[Value]:
     for one in (option.deciding, *option.others):
         key = MARGIN.key if one is option.deciding else "margin_other_model_us"
         known = one is option.deciding or one.margin_us == least_us
-        value = figure_value(MARGIN, one.margin_us, state="neutral" if one.fits else "fails")
-        found.append(value._replace(key=key, at=f"{at}/{key}" if known else ""))
+        value = figure_value(MARGIN, one.margin_us, at=f"{at}/{key}" if known else "")
+        found.append(value._replace(key=key, state="neutral" if one.fits else "fails"))
     return found
 
 

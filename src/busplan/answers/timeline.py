@@ -26,10 +26,10 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     Value,
-    figure_value,
     joined,
     sentence,
     state_of,
+    value_of,
     with_values,
 )
 from busplan.forms.numbers import period_value
@@ -104,9 +104,7 @@ def totals_table(plan: Schedule) -> Table:
 
 def _total_row(plan: Schedule, number: int, one: Total) -> TableRow:
     kind = kind_of(plan.profile, one.kind)
-    values = (
-        figure_value(figure, getattr(one, figure.key), at=f"/totals/{number}/{figure.key}") for figure in _TOTAL_FIGURES
-    )
+    values = (value_of(figure, one, at=f"/totals/{number}") for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 

@@ -160,7 +160,7 @@ REQUIRED_TIME_SLICE: Final = Figure(
     "required_time_slice_us", "T_cs,needed", _SLICE, "time slice that each node needs", "time slice T_cs, needed"
 )
 BINDING_TERM: Final = Figure(
-    "binding_term", "binding term", _SLICE, "the largest part of what the cycle needs", sort="word"
+    "binding_term", "binding term", _SLICE, "the largest part of what the cycle needs", "largest term", sort="word"
 )
 UTILISATION: Final = Figure(
     "utilisation", "U", _CYCLE, "share of the slice that is used, 0..1", "utilisation", "%", decimals=2, better="less"

@@ -274,10 +274,28 @@ def joined(*sentences: Sentence, by: str = " ") -> Sentence:
     return Sentence(tuple(parts), sentences[0].state)
 
 
-def figure_value(figure: Figure, value: Any, *, at: str = "", state: State = "neutral") -> Value:
-    """A value of a registered figure, as tables write it."""
+def figure_value(figure: Figure, value: Any, *, at: str = "") -> Value:
+    """A value of a registered figure, as tables write it; a truth that should be and is not fails."""
+    fails = figure.sort == "truth" and figure.better == "more" and value is False
     decimals = figure.decimals if figure.sort == "number" else None
-    return Value(value, figure.key, figure.column or figure.unit, decimals, at=at, state=state)
+    return Value(
+        value, figure.key, figure.column or figure.unit, decimals, at=at, state="fails" if fails else "neutral"
+    )
+
+
+def value_of(figure: Figure, owner: object, *, at: str) -> Value:
+    """The value that an owner has of a registered figure, under its key.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    owner
+        What has it as an attribute.
+    at
+        Place of the owner in the JSON document.
+    """
+    return figure_value(figure, getattr(owner, figure.key), at=f"{at}/{figure.key}")
 
 
 def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> Value:

@@ -77,7 +77,7 @@ def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
         *terms.values(),
         *(known.MAX_NODES, known.MAX_AXES, known.LIMITED_BY, known.MIN_PERIOD),
         *own.values(),
-        known.BINDING_TERM._replace(label="largest term"),
+        known.BINDING_TERM,
     )
 
 

@@ -36,8 +36,8 @@ from busplan.forms.blocks import (
     Value,
     Words,
     count_value,
-    figure_value,
     sentence,
+    value_of,
 )
 from busplan.forms.numbers import nouns
 
@@ -54,15 +54,14 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     elif verdict.deciding.fits and not verdict.deciding.safe:
         word = f"UNSAFE {bus_of(answer.profile).safety.upper()}"
     places = places_of(results, start=0, change=0)
-    own = places[verdict.deciding.timing_model]
     facts = (
         *(
-            (f"margin, {one.timing_model}", figure_value(MARGIN, one.margin_us, at=f"/results/{number}/margin_us"))
-            for number, one in enumerate(results)
+            (f"{MARGIN.label}, {one.timing_model}", value_of(MARGIN, one, at=places[one.timing_model]))
+            for one in results
         ),
         *(
-            (name, figure_value(figure, getattr(verdict.deciding, figure.key), at=f"{own}/{figure.key}"))
-            for name, figure in (("utilisation", UTILISATION), ("largest term", BINDING_TERM), ("most axes", MAX_AXES))
+            (figure.label, value_of(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
+            for figure in (UTILISATION, BINDING_TERM, MAX_AXES)
         ),
     )
     question = Question(
@@ -132,7 +131,7 @@ def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
 def _of(term: Figure, answer: AllAnswers) -> Iterator[Value]:
     """A term under each timing model."""
     for number, one in enumerate(answer.capacity.results):
-        yield figure_value(term, getattr(one, term.key), at=f"/results/{number}/{term.key}")
+        yield value_of(term, one, at=f"/results/{number}")
 
 
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
@@ -166,12 +165,9 @@ def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
     number = 0
     for results in answer.periods.periods:
         period_us = results[0].period_us
-        cells = [Value(period_us, PERIOD.key, "us", at=f"/results/{number}/{PERIOD.key}")]
+        cells = [value_of(PERIOD, results[0], at=f"/results/{number}")]
         for one in results:
-            at = f"/results/{number}"
-            cells += (
-                figure_value(figure, getattr(one, figure.key), at=f"{at}/{figure.key}") for figure in _OVER_PERIOD
-            )
+            cells += (value_of(figure, one, at=f"/results/{number}") for figure in _OVER_PERIOD)
             number += 1
         yield TableRow(tuple(cells), sought=period_us == answer.profile.cycle.period_us)
 

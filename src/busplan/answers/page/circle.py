@@ -10,15 +10,12 @@ from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_chart, circl
 from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence
 from busplan.answers.page.commands import Source
 from busplan.buses.figure import by_key
-from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, figure_value
+from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, value_of
 
 _QUESTION: Final = "Is the circle still round?"
 _KEYS: Final = (
-    ("mean error", "mean_contour_error_mm"),
-    ("largest error", "max_contour_error_mm"),
-    ("deviation G", "circular_deviation_mm"),
-    ("phase margin", "phase_margin_deg"),
-    ("gain margin", "gain_margin_db"),
+    *("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm"),
+    *("phase_margin_deg", "gain_margin_db"),
 )
 Sources = Mapping[str, Source]
 
@@ -34,7 +31,7 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
             Facts(()),
         )
     figures = by_key(CIRCLE_FIGURES)
-    facts = ((name, figure_value(figures[key], getattr(result, key), at=f"/results/0/{key}")) for name, key in _KEYS)
+    facts = ((figures[key].label, value_of(figures[key], result, at="/results/0")) for key in _KEYS)
     question = Question(
         _QUESTION,
         Words("PASSED", "passes") if result.passed else Words("FAILED", "fails"),

@@ -8,7 +8,6 @@ from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of
 from busplan.answers.assumptions import assumptions_table
 from busplan.answers.documents import document
-from busplan.answers.figure_tables import cell_state
 from busplan.answers.page.bus import axes_part, bus_question, models_part, terms_part, timeline_part
 from busplan.answers.page.circle import circle_part, circle_question, sources_part
 from busplan.answers.page.commands import Source, shell_word, sources
@@ -40,11 +39,12 @@ from busplan.forms.blocks import (
     TableRow,
     Value,
     figure_value,
+    value_of,
 )
 from busplan.forms.numbers import MISSING, plural
 
 _CIRCLE: Final = by_key(CIRCLE_FIGURES)
-_MEASURES: Final = (("mean", "mean_contour_error_mm"), ("max", "max_contour_error_mm"), ("G", "circular_deviation_mm"))
+_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 
 
 class ReportedProfile(NamedTuple):
@@ -178,7 +178,7 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         TableColumn("used", "%"),
         *(TableColumn(model, group="margin, us") for model in models),
         TableColumn("most axes"),
-        *(TableColumn(word, group="contour error, um") for word, _ in _MEASURES),
+        *(TableColumn(_CIRCLE[key].symbol, group="contour error, um") for key in _MEASURES),
         TableColumn("circle passed", kind="words"),
     )
     rows = tuple(TableRow(_compared(one, models)) for one in subjects)
@@ -190,25 +190,17 @@ def _compared(subject: _Subject, models: Sequence[str]) -> tuple[Cell, ...]:
     numbers = {one.timing_model: number for number, one in enumerate(results)}
     own, figures = f"/results/{numbers[verdict.deciding.timing_model]}", verdict.deciding
 
-    def cell(figure: Figure) -> Value:
-        return figure_value(figure, getattr(figures, figure.key), at=f"{own}/{figure.key}")
-
-    def truth(value: bool, key: str) -> Value:
-        return Value(value, key, at=f"/verdicts/0/{key}", state=cell_state(FITS, value))
-
     margins = (
-        figure_value(MARGIN, results[numbers[one]].margin_us, at=f"/results/{numbers[one]}/{MARGIN.key}")
-        if one in numbers
-        else MISSING
+        value_of(MARGIN, results[numbers[one]], at=f"/results/{numbers[one]}") if one in numbers else MISSING
         for one in models
     )
+    agree = figure_value(FITS, verdict.models_agree, at="/verdicts/0/models_agree")._replace(key="models_agree")
     bus = (
-        truth(figures.fits, "fits"),
-        truth(verdict.models_agree, "models_agree"),
-        Value(figures.period_us, PERIOD.key, "us", at=f"{own}/{PERIOD.key}"),
-        *map(cell, (NODES, AXES, UTILISATION)),
+        value_of(FITS, figures, at="/verdicts/0"),
+        agree,
+        *(value_of(figure, figures, at=own) for figure in (PERIOD, NODES, AXES, UTILISATION)),
         *margins,
-        cell(MAX_AXES),
+        value_of(MAX_AXES, figures, at=own),
     )
     link = SectionLink(subject.name, subject.key, subject.origin)
     return link, *found["capacity"].gives(bus), *_compared_circle(subject)
@@ -218,8 +210,5 @@ def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
     result = subject.answer.circle_figures
     if result is None:
         return MISSING, MISSING, MISSING, "not run"
-    passed = figure_value(
-        _CIRCLE["passed"], result.passed, at="/results/0/passed", state="neutral" if result.passed else "fails"
-    )
-    measures = (figure_value(_CIRCLE[key], getattr(result, key), at=f"/results/0/{key}") for _, key in _MEASURES)
-    return subject.sources["circle"].gives((*measures, passed))
+    figures = (*_MEASURES, "passed")
+    return subject.sources["circle"].gives(tuple(value_of(_CIRCLE[key], result, at="/results/0") for key in figures))

@@ -8,7 +8,6 @@ import numpy as np
 
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.sweep.blocks import Block
-from busplan.answers.figure_tables import cell_state
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.forms.blocks import (
@@ -238,7 +237,7 @@ def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
         if figure is None:
             yield Value(value, name, at=at)
         else:
-            shown = figure_value(figure, value, at=at, state=cell_state(figure, value))
+            shown = figure_value(figure, value, at=at)
             # In the unit that the column's name says; a length in mm has the digits of one in um.
             finer = 3 if figure.unit == "mm" and figure.column == "um" else 0
             yield shown._replace(unit=figure.unit or shown.unit, decimals=shown.decimals and shown.decimals + finer)
