@@ -15,9 +15,9 @@ from busplan.answers.latency import latency_document, latency_report
 from busplan.answers.verdict import verdict_sentences
 from busplan.forms import render
 from busplan.forms.blocks import Report
+from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
-from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

@@ -14,9 +14,9 @@ from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
 from busplan.answers.circle_verdict import circle_sentences, servo_sentence
 from busplan.forms import render
 from busplan.forms.blocks import Bar, Chart, Report, Sentence, Table, Value, values_in
+from busplan.forms.columns import sentence_text
 from busplan.forms.json_document import to_json
 from busplan.forms.numbers import written
-from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 

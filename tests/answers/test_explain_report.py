@@ -11,7 +11,7 @@ from busplan.answers.explain import explain_report
 from busplan.buses import kind_named
 from busplan.forms import render
 from busplan.forms.blocks import Calculation, Chapter, Code, Report, Table, Value, Words, values_in
-from busplan.forms.terminal import sentence_text
+from busplan.forms.columns import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 

@@ -27,10 +27,9 @@ from busplan.drawings.axes import AxesDrawing, drawn_range
 from busplan.drawings.terms import LEFT, TermsDrawing
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, Table, Value, values_in
-from busplan.forms.columns import cell_text
+from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.inks import INKS
 from busplan.forms.signed_bar import signed_bar
-from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

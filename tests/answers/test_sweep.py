@@ -18,9 +18,9 @@ from busplan.buses import kind_named
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.forms import html, markdown, terminal
 from busplan.forms.blocks import Report, Table, Value, values_in
+from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
-from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

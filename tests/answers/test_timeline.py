@@ -23,8 +23,8 @@ from busplan.drawings.timeline import mermaid, png, svg
 from busplan.drawings.timeline.lanes import node_lanes, stretches
 from busplan.forms import html, markdown, terminal
 from busplan.forms.blocks import Report, values_in
+from busplan.forms.columns import sentence_text
 from busplan.forms.scale import ticks
-from busplan.forms.terminal import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 

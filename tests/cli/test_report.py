@@ -78,7 +78,7 @@ class Page(HTMLParser):
     def handle_endtag(self, tag: str) -> None:
         if tag == "data" and self._data is not None:
             one = self._data
-            shown = Shown(self._text, one["value"], one.get("data-unit", ""), one["data-from"], one["data-at"])
+            shown = Shown(self._text, one["value"], one.get("data-shown-in", ""), one["data-from"], one["data-at"])
             self.figures.append(shown)
             self._data = None
         elif tag == "code":

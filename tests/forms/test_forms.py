@@ -27,6 +27,7 @@ from busplan.forms.blocks import (
     SectionLink,
     Sentence,
     Snippet,
+    State,
     Swatch,
     Table,
     TableColumn,
@@ -244,6 +245,46 @@ def test_markdown_has_mermaid_where_a_drawing_has_it() -> None:
     assert "```mermaid\ngantt\n```" in text
     assert text.startswith("# An answer for `p`\n")
     assert render(answer(Sentence(("Alone.",))), "markdown") == "### An answer for `p`\n\nAlone.\n"
+
+
+@pytest.mark.parametrize("state", ["passes", "fails", "warns", "neutral"])
+def test_a_page_and_a_comment_say_the_state_of_a_sentence_and_of_a_cell(state: State) -> None:
+    table = Table((TableColumn("is"),), (TableRow((Words("so", state),)),))
+    report = answer(Sentence(("It is so.",), state), table)
+    html, text = render(report, "html"), render(report, "markdown")
+    assert f'<p class="note {state}">It is so.</p>' in html
+    assert f'<span class="{state}">so</span>' in html
+    assert ("**It is so.**" in text) == (state in ("passes", "fails"))
+    assert ("| **so** |" in text) == (state == "fails")
+
+
+def test_the_row_that_is_sought_is_set_off_in_every_form_that_can() -> None:
+    table = Table((TableColumn("us"),), (TableRow((MARGIN,), sought=True), TableRow((MARGIN,))))
+    *_, sought, other = block_lines([table])
+    assert [mark.tone for mark in sought.marks] == ["heading"]
+    assert other.marks == ()
+    assert render(answer(table), "markdown").count("**3.969**") == 1
+    assert render(answer(table), "html").count('<tr class="sought">') == 1
+
+
+def test_columns_of_words_stand_to_the_left_wherever_they_are() -> None:
+    columns = (TableColumn("a", kind="words"), TableColumn("b"), TableColumn("c", kind="words"))
+    assert "| :--- | ---: | :--- |" in render(answer(Table(columns, (TableRow(("x", MARGIN, "y")),))), "markdown")
+
+
+def test_html_says_the_unit_of_the_exact_value_and_of_the_one_that_is_shown() -> None:
+    html = render(answer(Sentence((Value(0.0036, "mean_mm", "um", 3),))), "html")
+    assert 'value="0.0036" data-unit="mm" data-shown-in="um">3.600</data> um' in html
+
+
+def test_facts_without_a_fact_are_no_line() -> None:
+    assert list(block_lines([Facts(())])) == []
+
+
+@pytest.mark.parametrize("parts", [(), (MARGIN, MARGIN)])
+def test_a_sentence_takes_as_many_parts_as_it_has_places(parts: tuple[Value, ...]) -> None:
+    with pytest.raises(ValueError, match="zip"):
+        sentence("{} to spare", *parts)
 
 
 # --- JSON and CSV -------------------------------------------------------------------------------------------------

@@ -25,8 +25,8 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
+from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns, plural, with_unit
-from busplan.forms.terminal import sentence_text
 from busplan.profile.layout import written
 from busplan.sections.execution import LinearExecution, TableExecution
 

@@ -25,8 +25,8 @@ from busplan.forms.blocks import (
     count_value,
     sentence,
 )
+from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns
-from busplan.forms.terminal import sentence_text
 from busplan.sections.profile import Profile
 
 

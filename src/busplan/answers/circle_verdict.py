@@ -7,7 +7,7 @@ from busplan.analysis.circle.failures import Stated
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
 from busplan.buses.figure import by_key
-from busplan.forms.blocks import Part, Sentence, Value, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, Value, figure_value, joined, sentence
 from busplan.forms.numbers import period_value
 
 _FIGURES: Final = by_key(CIRCLE_FIGURES)
@@ -30,7 +30,7 @@ def circle_sentences(
         Whether the document ranks the error sources, too.
     """
     period, feed = setup_values(result, at=at)
-    subject = (f"{name} at ", period, " and ", feed)
+    subject = (Code(name), " at ", period, " and ", feed)
     if result.passed:
         yield Sentence((*subject, ": the circle holds every tolerance."), "passes")
         return

@@ -28,7 +28,12 @@ def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
     """Phases of each transaction, the models side by side; one table for each payload."""
     network = network_of(profile)
     yield from latency_tables(result, profile)
-    yield Sentence((f"{result.profile}: {bus_of(profile).latency_subject(network)}.",))
+    yield Sentence(
+        (
+            Code(result.profile),
+            f": {bus_of(profile).latency_subject(network)}.",
+        )
+    )
     yield from execution_sentence(profile)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
     yield from warning_sentences(profile, nodes=network.nodes, most=0)

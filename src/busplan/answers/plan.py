@@ -24,8 +24,8 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
+from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns, period_value
-from busplan.forms.terminal import sentence_text
 from busplan.sections.profile import Profile
 
 
@@ -124,7 +124,7 @@ def _goal(plan: Plan) -> tuple[Part, ...]:
     goal = plan.goal
     nodes, axes = goal.bus.nodes, goal.bus.nodes * goal.node.axes
     return (
-        f"{goal.name} with ",
+        *(Code(goal.name), " with "),
         *(figure_value(NODES, nodes, at="/goal/nodes"), f" {nouns(nodes, 'node')} ("),
         *(figure_value(AXES, axes, at="/goal/axes"), f" {nouns(axes, 'axis')}) at "),
         # The first option is the goal as it is.

@@ -32,8 +32,8 @@ from busplan.forms.blocks import (
     value_of,
     with_values,
 )
+from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import period_value
-from busplan.forms.terminal import sentence_text
 
 _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
@@ -60,7 +60,7 @@ def headline(plan: Schedule) -> Sentence:
     """Say whether the cycle fits, and under which model."""
     figures = plan.figures
     parts = (
-        *(plan.profile.name, " at ", period_value(figures.period_us), ": "),
+        *(Code(plan.profile.name), " at ", period_value(figures.period_us), ": "),
         *story(figures, plan.profile),
         f" ({figures.timing_model} model).",
     )

@@ -8,7 +8,7 @@ from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.buses.figure import AVAILABLE, MARGIN, MAX_AXES, MAX_NODES, REQUIRED, UTILISATION
-from busplan.forms.blocks import Part, Sentence, Value, count_value, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, Value, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
 
@@ -81,7 +81,7 @@ def _place(at: str, key: str) -> str:
 def _headline(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
     figures = verdict.deciding
     at = _place(places.get(figures.timing_model, ""), "period_us")
-    subject = (profile.name, " at ", period_value(verdict.period_us, at=at))
+    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=at))
     same = all(other.exceeded == figures.exceeded for other in verdict.others)
     parts: list[Part] = []
     if verdict.models_agree and same:

@@ -111,7 +111,7 @@ def check_command(
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
         from busplan.answers.check import summary_sentence
-        from busplan.forms.terminal import sentence_text
+        from busplan.forms.columns import sentence_text
 
         say(sentence_text(summary_sentence(report)))
     if report.failed:

@@ -39,7 +39,7 @@ def run_sweep(job: "SweepJob") -> None:
     """
     from busplan.analysis.network import bus_of
     from busplan.answers.sweep.top import Tally
-    from busplan.forms.terminal import sentence_text
+    from busplan.forms.columns import sentence_text
 
     drawing = _drawing(job)
     if job.jobs is not None:

@@ -174,7 +174,7 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
 def _picture(shown: "Schedule", form: Picture) -> str | bytes:
     """The drawing alone, as a file of its own."""
     from busplan.answers.timeline import headline
-    from busplan.forms.terminal import sentence_text
+    from busplan.forms.columns import sentence_text
 
     title = sentence_text(headline(shown))
     match form:

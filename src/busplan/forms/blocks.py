@@ -254,16 +254,14 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
     >>> sentence("Set {} first.", Code("bus.nodes")).parts
     ('Set ', Code(text='bus.nodes'), ' first.')
     """
-    given = iter(parts)
-
-    def pieces() -> Iterator[Part]:
-        for words, field, _, _ in Formatter().parse(template):
-            if words:
-                yield words
-            if field is not None:
-                yield next(given)
-
-    return Sentence(tuple(pieces()), state)
+    pieces = list(Formatter().parse(template))
+    words = [piece[0] for piece in pieces]
+    # Behind the last part there may be no words.
+    words += [""] * (pieces[-1][1] is not None)
+    found: list[Part] = [words[0]]
+    for part, behind in zip(parts, words[1:], strict=True):
+        found += [part, behind]
+    return Sentence(tuple(one for one in found if one != ""), state)
 
 
 def joined(*sentences: Sentence, by: str = " ") -> Sentence:

@@ -21,9 +21,14 @@ def cell_text(cell: Cell) -> str:
         case Bar():
             return ""
         case Sentence():
-            return "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in cell.parts)
+            return sentence_text(cell)
         case _:
             return cell[0]
+
+
+def sentence_text(sentence: Sentence) -> str:
+    """Write a sentence in plain characters."""
+    return "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in sentence.parts)
 
 
 def table_lines(table: Table) -> list[Line]:

@@ -8,13 +8,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from busplan import __version__
+from busplan.buses.figure import unit_of
 from busplan.forms import blocks as made_of
-from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table, Value
-from busplan.forms.columns import cell_text
+from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
+from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.inks import DARK, fills
-from busplan.forms.numbers import MISSING, with_unit, written
+from busplan.forms.numbers import unit_text, written
 from busplan.forms.signed_bar import signed_bar
-from busplan.forms.terminal import sentence_text
 from busplan.printable import json_text, printable_lines
 
 _TYPES: Final = ("Value", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
@@ -48,8 +48,9 @@ def page(report: Report) -> str:
         environment.tests[name.lower()] = lambda one, kind=kind: isinstance(one, kind)
     environment.filters |= {
         "exact": lambda value: json_text(value.value),
+        "exact_unit": lambda value: unit_of(value.key),
         "written": written,
-        "unit": _unit,
+        "unit": unit_text,
         "plain": sentence_text,
         "runs": lambda found: list(_runs(found)),
         "groups": _groups,
@@ -74,11 +75,6 @@ def page(report: Report) -> str:
 def _shown(piece: object) -> object:
     """What a template writes: nothing in it commands a terminal that shows the file."""
     return printable_lines(piece) if isinstance(piece, str) and not isinstance(piece, Markup) else piece
-
-
-def _unit(value: Value) -> str:
-    """What stands behind a figure in a sentence."""
-    return with_unit(value).removeprefix(written(value)) if written(value) != MISSING else ""
 
 
 def _charts(blocks: Sequence[Block]) -> Iterator[Chart]:

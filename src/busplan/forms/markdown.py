@@ -127,8 +127,7 @@ def _table(one: Table) -> list[str]:
         for column in columns
     ]
     rows = ([_in_row(_cell(row.cells[number]), sought=row.sought) for number in shown] for row in one.rows)
-    figures = (place for place, column in enumerate(columns) if column.kind == "figures" and not one.stacks)
-    return table(headings, rows, left=next(figures, len(columns)))
+    return table(headings, rows, left=[column.kind == "words" for column in columns])
 
 
 def _in_row(words: str, *, sought: bool) -> str:

@@ -47,7 +47,7 @@ def code(text: str) -> str:
     return f"{fence}{space}{line}{space}{fence}" if line else "` `"
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) -> list[str]:
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int | Sequence[bool]) -> list[str]:
     r"""Lay out a table.
 
     Parameters
@@ -57,7 +57,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) 
     rows
         Cells, as many as headings; Markdown already, but for the bars that would part them.
     left
-        How many of the first columns are words, set to the left; the others are figures, set to the right.
+        Which columns are words, set to the left, or how many of the first; figures are set to the right.
 
     Returns
     -------
@@ -69,5 +69,6 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int) 
     >>> table(["name", "us"], [["`a | b`", "1"]], left=1)[-1]
     '| `a \\| b` | 1 |'
     """
-    rule = [":---" if number < left else "---:" for number in range(len(headings))]
+    words = [number < left for number in range(len(headings))] if isinstance(left, int) else left
+    rule = [":---" if is_words else "---:" for is_words in words]
     return [f"| {' | '.join(cell.replace('|', BAR) for cell in row)} |" for row in (headings, rule, *rows)]

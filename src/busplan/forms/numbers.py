@@ -53,10 +53,14 @@ def with_unit(value: Value) -> str:
     >>> with_unit(Value(3.9691, "margin_us", "us", 3)), with_unit(Value(0.5, "utilisation", "%", 1))
     ('3.969 us', '50.0%')
     """
-    text = written(value)
-    if value.unit in _SILENT or text == MISSING:
-        return text
-    return f"{text}%" if value.unit == "%" else f"{text} {value.unit}"
+    return f"{written(value)}{unit_text(value)}"
+
+
+def unit_text(value: Value) -> str:
+    """Write what stands behind a figure in a sentence."""
+    if value.unit in _SILENT or written(value) == MISSING:
+        return ""
+    return "%" if value.unit == "%" else f" {value.unit}"
 
 
 def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:

@@ -19,7 +19,7 @@ from busplan.forms.blocks import (
     Table,
     Value,
 )
-from busplan.forms.columns import cell_text, table_lines
+from busplan.forms.columns import cell_text, sentence_text, table_lines
 from busplan.forms.lines import BLANK, Line, plain_text, styled_text
 from busplan.forms.numbers import with_unit
 
@@ -41,11 +41,6 @@ def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
     """
     lines = block_lines(report.blocks(), width=width)
     return styled_text(lines) if styled else plain_text(lines)
-
-
-def sentence_text(sentence: Sentence) -> str:
-    """Write a sentence in plain characters."""
-    return cell_text(sentence)
 
 
 def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line]:
@@ -79,7 +74,8 @@ def _lines(block: Block, width: int) -> Sequence[Line]:
         case Sentence():
             return [Line(sentence_text(block), block.state)]
         case Facts():
-            return [Line(f"{', '.join(f'{name} {_part(value)}' for name, value in block.items)}.")]
+            facts = ", ".join(f"{name} {_part(value)}" for name, value in block.items)
+            return [Line(f"{facts}.")] if facts else []
         case Table():
             return [*_caption(block.caption), *table_lines(block)]
         case Chart():

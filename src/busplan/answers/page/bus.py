@@ -56,7 +56,7 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     places = places_of(results, start=0, change=0)
     facts = (
         *(
-            (f"{MARGIN.label}, {one.timing_model}", value_of(MARGIN, one, at=places[one.timing_model]))
+            (f"{MARGIN.label} ({one.timing_model})", value_of(MARGIN, one, at=places[one.timing_model]))
             for one in results
         ),
         *(

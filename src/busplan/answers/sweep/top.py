@@ -94,7 +94,7 @@ class Tally:
         whole = count_value(expected, "points", at="/points", grouped=True)
         found = whole if self.points == expected else count_value(self.points, grouped=True)
         cut = Sentence(()) if self.points == expected else sentence(" of {} (interrupted)", whole)
-        head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", name, found)
+        head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(name), found)
         yield joined(head, cut, Sentence(("; ",)), self._by_model(self._fits), Sentence((" fit.",)), by="")
         if self._passed is not None:
             yield joined(

@@ -25,9 +25,9 @@ from busplan.drawings.timeline.lanes import (
     time_text,
 )
 from busplan.forms.blocks import figure_value
+from busplan.forms.columns import sentence_text
 from busplan.forms.inks import INKS
 from busplan.forms.numbers import with_unit
-from busplan.forms.terminal import sentence_text
 
 _OVER: Final = "#b3261e"
 _TITLE_CHARACTERS: Final = 110

@@ -24,9 +24,9 @@ from busplan.drawings.timeline.lanes import (
 )
 from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
+from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import written
 from busplan.forms.svg import LINE, Scale, drawing, inside, markup, text_at
-from busplan.forms.terminal import sentence_text
 
 _LINE_CHARACTERS: Final = 44
 """Characters of a line of words: what a phone shows at this size."""
