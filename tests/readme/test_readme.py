@@ -1,5 +1,6 @@
 """The README and the manual say what the program does: output blocks, tables, keys and links are checked."""
 
+import json
 import os
 import re
 import subprocess
@@ -12,20 +13,18 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
+from typer.testing import CliRunner
 
-from busplan.analysis.capacity.figures import capacity
-from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
-from busplan.analysis.latency import latency
 from busplan.analysis.register import figures_of
 from busplan.answers.assumptions import constant_rows, equation_rows
-from busplan.answers.capacity import capacity_records
-from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
+from busplan.cli import app
+from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown_words import code, table
 from busplan.manual import FOLDER, topics
-from busplan.profile.shipped import load, shipped_names
+from busplan.profile.shipped import shipped_names
 from busplan.sections.machine import AxisOverride
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -146,10 +145,53 @@ def test_the_example_profile_is_the_shipped_one() -> None:
     assert blocks == [(ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")]
 
 
-def test_every_json_key_is_listed() -> None:
-    profile = load("paper-4ms").profile
-    keys = {*latency_records(latency(profile))[0], *capacity_records(capacity(profile))[0], *CircleFigures._fields}
-    assert [key for key in sorted(keys) if f"\n| `{key}` |" not in "\n".join(PAGES.values())] == []
+DOCUMENTS = {
+    "latency": "paper-4ms",
+    "capacity": "paper-1ms --period 600us",
+    "circle-test": "paper-4ms --period 4ms --period 100us --contributions",
+    "explain": "paper-4ms required_us",
+    "report": "paper-4ms --no-circle",
+    "check": "paper-optimal-gap nowhere.toml --no-circle",
+    "rule": "BP101",
+    "diff": "paper-1ms paper-optimal-gap",
+    "plan": "paper-1ms --axes 400 --no-circle",
+    "sweep": "paper-4ms --vary bus.nodes=1:2 --circle",
+    "calibrate": "paper-two-node table-1.csv",
+    "timeline": "paper-4ms",
+    "paper": "",
+    "profiles": "",
+}
+FREE = {"changes", "recommended_changes", "varied", "execution", "notes", "answers"}
+"""What holds keys of a profile, or others that are not the document's own."""
+
+
+def keys_of(document: object) -> Iterator[str]:
+    """Every key of a document but those of what is free."""
+    if isinstance(document, list):
+        for one in document:
+            yield from keys_of(one)
+    elif isinstance(document, dict):
+        for key, value in document.items():
+            yield key
+            if key not in FREE or isinstance(value, list):
+                yield from keys_of(value)
+
+
+@pytest.mark.parametrize("command", DOCUMENTS)
+def test_every_json_key_is_listed(command: str) -> None:
+    done = CliRunner().invoke(app, [command, *DOCUMENTS[command].split(), "--format", "json"])
+    said = PAGES[FOLDER / "json.md"].partition(f"\n### {command}\n")[2].partition("\n### ")[0]
+    if command in {"latency", "capacity", "circle-test", "sweep"}:
+        said += PAGES[FOLDER / "models.md"] + PAGES[FOLDER / "circle.md"]
+    keys = set(keys_of(json.loads(done.stdout))) - {"schema", "command", "bus.nodes"}
+    assert len(keys) >= 2 - (command in {"rule", "report"})
+    assert [key for key in sorted(keys) if f"`{key}`" not in said] == []
+
+
+def test_every_command_with_a_document_is_listed() -> None:
+    listed = re.findall(r"^### (.*)$", PAGES[FOLDER / "json.md"], re.MULTILINE)
+    assert listed == list(DOCUMENTS)
+    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init"}
 
 
 def test_every_shipped_profile_is_named() -> None:
