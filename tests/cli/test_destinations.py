@@ -49,7 +49,7 @@ INTO_A_PROFILE = {
     "--output p.csv": ("timeline", "x.csv", "-o", "p.csv"),
     "--trace new.toml": ("circle-test", "x.csv", "--trace", "new.toml"),
     "--output new.toml ": ("report", "x.csv", "-o", "new.toml", "--format", "html"),
-    "--output new.toml  ": ("manual", "-o", "new.toml", "--format", "man"),
+    "--output new.toml  ": ("manual", "profile", "-o", "new.toml"),
     "--baseline new.toml": ("check", "x.csv", "--baseline", "new.toml", "--update-baseline"),
 }
 TWICE = {

@@ -22,7 +22,7 @@ WRITERS = {
     "columns": ("sweep", "paper-1ms", "--vary", "bus.nodes=1:60", "--format", "npz"),
     "events": ("timeline", "paper-4ms", "--format", "svg"),
     "the gate": ("check", "paper-4ms", "--no-circle", "--format", "sarif"),
-    "the manual": ("manual",),
+    "the manual": ("manual", "models"),
     "a schema": ("schema",),
     "a profile": ("plan", "paper-1ms", "--no-circle", "-o", "-"),
     "a derivation": ("explain", "paper-4ms", "required_us"),
@@ -144,7 +144,7 @@ def test_a_path_that_is_no_utf_8_is_escaped_in_every_document(run: Run, tmp_path
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("manual", "--format", "man"),
+        ("manual", "limits"),
         ("report", "paper-4ms", "--no-circle"),
         ("check", "paper-4ms", "--no-circle", "--format", "json"),
         ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "--format", "csv"),

@@ -1,8 +1,8 @@
-"""Write what the program prints today into the README: output blocks, references, the example profile.
+"""Write what the program prints today into the README and the manual: output blocks, tables, the example profile.
 
     python tests/readme/refresh.py
 
-Looks at nothing but the README's own commands; whoever runs it reads the difference before committing it.
+Looks at nothing but the pages' own commands; whoever runs it reads the difference before committing it.
 """
 
 import importlib.util
@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def checks() -> ModuleType:
-    """The tests of the README, which know what belongs into it."""
+    """The tests of the pages, which know what belongs into them."""
     spec = importlib.util.spec_from_file_location("test_readme", Path(__file__).with_name("test_readme.py"))
     assert spec is not None
     assert spec.loader is not None
@@ -38,28 +38,23 @@ def output_of(command: str) -> str:
     return run.stdout + run.stderr
 
 
-def refreshed(readme: str) -> str:
-    """The README with everything that is checked brought up to date."""
-    tests = checks()
+def refreshed(page: str, tests: ModuleType) -> str:
+    """A page with everything that is checked brought up to date."""
 
     def block(match: re.Match[str]) -> str:
         commands = re.findall(r"^\$ (.*)$", match[1], re.MULTILINE)
         return "```console\n" + "".join(f"$ {command}\n{output_of(command)}" for command in commands) + "```"
 
-    readme = re.sub(r"^```console\n(.*?)^```$", block, readme, flags=re.MULTILINE | re.DOTALL)
-    rows = "\n".join(dict.fromkeys(tests.reference(tests.Ieee1394Profile)))
-    head = "| key | values | default | meaning |\n|---|---|---|---|\n"
-    readme = re.sub(re.escape(head) + r"(?:\|.*\n)*", lambda _: f"{head}{rows}\n", readme)
-    for lines in tests.registry_tables():
-        new = "".join(f"{line}\n" for line in lines)
-        old = re.search(re.escape(lines[0]) + r"\n(?:\|.*\n)*", readme)
-        assert old is not None
-        readme = readme.replace(old[0], new)
+    page = re.sub(r"^```console\n(.*?)^```$", block, page, flags=re.MULTILINE | re.DOTALL)
+    for lines in tests.tables():
+        old = tests.shown_table(lines[0], page)
+        page = page.replace(old, "".join(f"{line}\n" for line in lines)) if old else page
     example = (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
     first = re.compile(r"(`paper-4ms`, as it ships:\n\n```toml\n).*?(^```$)", re.MULTILINE | re.DOTALL)
-    return str(first.sub(lambda match: f"{match[1]}{example}{match[2]}", readme))
+    return str(first.sub(lambda match: f"{match[1]}{example}{match[2]}", page))
 
 
 if __name__ == "__main__":
-    path = ROOT / "README.md"
-    path.write_text(refreshed(path.read_text(encoding="utf-8")), encoding="utf-8")
+    tests = checks()
+    for path, page in tests.PAGES.items():
+        path.write_text(refreshed(page, tests), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The README's Python blocks run as they stand, and draw the true numbers."""
+"""The Python blocks of the manual run as they stand, and draw the true numbers."""
 
 import doctest
 import re
@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 
 import busplan
+from busplan.manual import page
 
-README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
-SECTION = README.partition("\n## From Python\n")[2].partition("\n## ")[0]
+PAGE = page("python")
 
 
 def block(language: str) -> str:
-    (found,) = re.findall(rf"^```{language}\n(.*?)^```$", SECTION, re.MULTILINE | re.DOTALL)
+    (found,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     assert isinstance(found, str)
     return found
 
@@ -29,7 +29,7 @@ def test_the_plot_of_axes_against_period_is_five_lines_and_true(
     assert len(script.split("\n\n")) == 2
     assert sum(map(bool, script.splitlines())) == 5
     names: dict[str, Any] = {}
-    exec(compile(script, "README.md", "exec"), names)
+    exec(compile(script, "python.md", "exec"), names)
     figure = names["plt"].gcf()
     try:
         (line,) = figure.axes[0].lines
@@ -44,11 +44,11 @@ def test_the_plot_of_axes_against_period_is_five_lines_and_true(
 
 
 def test_the_example_of_an_answer_is_the_programs_own() -> None:
-    example = doctest.DocTestParser().get_doctest(block("pycon"), {}, "README.md", "README.md", 0)
+    example = doctest.DocTestParser().get_doctest(block("pycon"), {}, "python.md", "python.md", 0)
     assert len(example.examples) >= 5
     assert doctest.DocTestRunner().run(example).failed == 0
 
 
 def test_every_function_is_named() -> None:
     functions = [name for name in busplan.__all__ if name.islower() and not name.startswith("_")]
-    assert [name for name in functions if not re.search(rf"`{name}`|busplan\.{name}\(", SECTION)] == []
+    assert [name for name in functions if not re.search(rf"`{name}`|busplan\.{name}\(", PAGE)] == []

@@ -1,5 +1,6 @@
-"""The README says what the program does: its output blocks, its reference and its equations are checked."""
+"""The README and the manual say what the program does: output blocks, tables, keys and links are checked."""
 
+import json
 import os
 import re
 import subprocess
@@ -12,28 +13,31 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import pytest
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
+from typer.testing import CliRunner
 
-from busplan.analysis.capacity.figures import capacity
-from busplan.analysis.circle.roundness import CircleFigures
 from busplan.analysis.derivation.trace import short
-from busplan.analysis.latency import latency
+from busplan.analysis.register import figures_of
 from busplan.answers.assumptions import constant_rows, equation_rows
-from busplan.answers.capacity import capacity_records
-from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
+from busplan.cli import app
+from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown_words import code, table
-from busplan.profile.shipped import load, shipped_names
+from busplan.manual import FOLDER, topics
+from busplan.profile.shipped import shipped_names
 from busplan.sections.machine import AxisOverride
 
 ROOT = Path(__file__).resolve().parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README = ROOT / "README.md"
+PAGES = {path: path.read_text(encoding="utf-8") for path in (README, *sorted(FOLDER.glob("*.md")))}
 CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+MAX_WIDTH = 130
 
 
 def shown_runs() -> Iterator[tuple[str, str]]:
-    """Each `$ busplan ...` of the README with the output printed below it."""
-    for block in CONSOLE.findall(README):
+    """Each `$ busplan ...` of all pages with the output printed below it."""
+    for block in (one for text in PAGES.values() for one in CONSOLE.findall(text)):
         for run in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
             command, _, output = run.partition("\n")
             if command.startswith("busplan"):
@@ -52,7 +56,7 @@ def test_output_blocks_are_the_programs_own(command: str, output: str, tmp_path:
 
 def test_there_are_blocks_to_check() -> None:
     commands = {command.split()[1] for command, _ in shown_runs()}
-    assert commands >= {"capacity", "latency", "circle-test", "paper", "profiles", "init"}
+    assert commands >= {"capacity", "latency", "circle-test", "paper", "profiles", "init", "rule"}
 
 
 def sections(annotation: Any) -> list[type[BaseModel]]:
@@ -65,7 +69,7 @@ def sections(annotation: Any) -> list[type[BaseModel]]:
 
 
 def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """The README's row of every key of the profile, from the schema itself."""
+    """A row for every key of the profile, from the schema itself."""
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         inner = sections(field.annotation)
@@ -101,27 +105,9 @@ def allowed(schema: dict[str, Any]) -> str:
     return f"{kind}{low} to {schema['maximum']:g}"
 
 
-@pytest.mark.parametrize("row", list(dict.fromkeys(reference(Ieee1394Profile))))
-def test_profile_reference_lists_every_key_as_the_schema_has_it(row: str) -> None:
-    assert row in README.splitlines()
-
-
-def test_profile_reference_lists_no_key_that_is_not_there() -> None:
-    rows = [
-        line
-        for line in README.splitlines()
-        if re.match(r"\| `[a-z0-9_.]+` \| [^|]+ \| (required|none|\"[a-z]*\"|[\d.]+) \|", line)
-    ]
-    assert sorted(rows) == sorted(dict.fromkeys(reference(Ieee1394Profile)))
-
-
-def test_the_example_profile_is_the_shipped_one() -> None:
-    blocks = re.findall(r"^```toml\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
-    assert (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8") in blocks
-
-
-def registry_tables() -> Iterator[list[str]]:
-    """The README's tables of equations and constants, from the registry that `explain` shows."""
+def tables() -> Iterator[list[str]]:
+    """Every table of the program's own data, by its lines; the first of them is in one page alone."""
+    yield ["| key | values | default | meaning |", "|---|---|---|---|", *dict.fromkeys(reference(Ieee1394Profile))]
     rows = equation_rows()
     yield table(
         list(rows[0]),
@@ -134,21 +120,110 @@ def registry_tables() -> Iterator[list[str]]:
         for row in constants
     ]
     yield table(list(constants[0]), cells, left=6)
+    for command, figures in figures_of(kind_named("ieee1394")).items():
+        described = (
+            [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
+            for one in figures.values()
+        )
+        yield table([code(command), "symbol", "unit", "meaning", "reference", "better"], described, left=6)
 
 
-@pytest.mark.parametrize("lines", list(registry_tables()), ids=["equations", "constants"])
-def test_equations_and_constants_are_those_of_the_registry(lines: list[str]) -> None:
-    assert "".join(f"{line}\n" for line in lines) in README
+def shown_table(head: str, page: str) -> str:
+    """A page's table with this first line; empty where it has none."""
+    found = re.search(f"^{re.escape(head)}\n(?:\\|.*\n)*", page, re.MULTILINE)
+    return found[0] if found else ""
 
 
-def test_every_json_key_is_listed() -> None:
-    profile = load("paper-4ms").profile
-    keys = {*latency_records(latency(profile))[0], *capacity_records(capacity(profile))[0], *CircleFigures._fields}
-    bus = kind_named("ieee1394")
-    assert keys >= {figure.key for figure in (*bus.capacity_figures, *bus.latency_figures)}
-    missing = [key for key in sorted(keys) if f"`{key}`" not in README]
-    assert missing == []
+@pytest.mark.parametrize("lines", list(tables()), ids=lambda lines: lines[0])
+def test_tables_are_those_of_the_program(lines: list[str]) -> None:
+    (found,) = filter(None, (shown_table(lines[0], text) for text in PAGES.values()))
+    assert found.splitlines() == lines
+
+
+def test_the_example_profile_is_the_shipped_one() -> None:
+    blocks = re.findall(r"^```toml\n(.*?)^```$", PAGES[FOLDER / "profile.md"], re.MULTILINE | re.DOTALL)
+    assert blocks == [(ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")]
+
+
+DOCUMENTS = {
+    "latency": "paper-4ms",
+    "capacity": "paper-1ms --period 600us",
+    "circle-test": "paper-4ms --period 4ms --period 100us --contributions",
+    "explain": "paper-4ms required_us",
+    "report": "paper-4ms --no-circle",
+    "check": "paper-optimal-gap nowhere.toml --no-circle",
+    "rule": "BP101",
+    "diff": "paper-1ms paper-optimal-gap",
+    "plan": "paper-1ms --axes 400 --no-circle",
+    "sweep": "paper-4ms --vary bus.nodes=1:2 --circle",
+    "calibrate": "paper-two-node table-1.csv",
+    "timeline": "paper-4ms",
+    "paper": "",
+    "profiles": "",
+}
+FREE = {"changes", "recommended_changes", "varied", "execution", "notes", "answers"}
+"""What holds keys of a profile, or others that are not the document's own."""
+
+
+def keys_of(document: object) -> Iterator[str]:
+    """Every key of a document but those of what is free."""
+    if isinstance(document, list):
+        for one in document:
+            yield from keys_of(one)
+    elif isinstance(document, dict):
+        for key, value in document.items():
+            yield key
+            if key not in FREE or isinstance(value, list):
+                yield from keys_of(value)
+
+
+@pytest.mark.parametrize("command", DOCUMENTS)
+def test_every_json_key_is_listed(command: str) -> None:
+    done = CliRunner().invoke(app, [command, *DOCUMENTS[command].split(), "--format", "json"])
+    said = PAGES[FOLDER / "json.md"].partition(f"\n### {command}\n")[2].partition("\n### ")[0]
+    if command in {"latency", "capacity", "circle-test", "sweep"}:
+        said += PAGES[FOLDER / "models.md"] + PAGES[FOLDER / "circle.md"]
+    keys = set(keys_of(json.loads(done.stdout))) - {"schema", "command", "bus.nodes"}
+    assert len(keys) >= 2 - (command in {"rule", "report"})
+    assert [key for key in sorted(keys) if f"`{key}`" not in said] == []
+
+
+def test_every_command_with_a_document_is_listed() -> None:
+    listed = re.findall(r"^### (.*)$", PAGES[FOLDER / "json.md"], re.MULTILINE)
+    assert listed == list(DOCUMENTS)
+    assert set(COMMANDS) - set(listed) == {"schema", "manual", "init"}
 
 
 def test_every_shipped_profile_is_named() -> None:
-    assert [name for name in shipped_names() if f"`{name}`" not in README] == []
+    assert [name for name in shipped_names() if f"`{name}`" not in PAGES[README]] == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_every_link_resolves(path: Path) -> None:
+    for link in LINK.findall(PAGES[path]):
+        if link.startswith("https://"):
+            continue
+        name, _, anchor = link.partition("#")
+        target = (path.parent / name).resolve() if name else path
+        assert target.is_file(), link
+        assert not anchor or anchor in anchors(target.read_text(encoding="utf-8")), link
+
+
+def anchors(text: str) -> set[str]:
+    """Anchors that GitHub gives the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("topic", topics())
+def test_the_readme_links_to_every_topic(topic: str) -> None:
+    assert f"(src/busplan/manual/{topic}.md" in PAGES[README]
+
+
+@pytest.mark.parametrize("topic", topics())
+def test_a_page_is_plain_ascii_with_one_title_and_short_lines(topic: str) -> None:
+    text = PAGES[FOLDER / f"{topic}.md"]
+    assert text.isascii()
+    prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    assert re.findall(r"^# .*$", prose, re.MULTILINE) == [text.splitlines()[0]]
+    assert [line for line in prose.splitlines() if len(line) > MAX_WIDTH and not line.startswith("|")] == []

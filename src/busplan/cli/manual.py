@@ -1,45 +1,50 @@
 """`busplan manual`."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from busplan.cli.destinations import require_apart
-from busplan.cli.options import form_of_file, output_option
+from busplan.cli.options import output_option
 from busplan.cli.output import write_document
+from busplan.errors import BusplanError
+
+
+def complete_topic(incomplete: str) -> list[str]:
+    """Topics that begin as typed, for the shell's completion."""
+    from busplan.manual import topics
+
+    return [topic for topic in topics() if topic.startswith(incomplete)]
 
 
 def manual_command(
-    context: typer.Context,
-    format_: Annotated[
-        Literal["markdown", "man"] | None,
-        typer.Option(
-            "--format",
-            help="Form of the manual: GitHub's Markdown, or a man page in roff.  "
-            "[default: what the name of --output says, else markdown]",
+    topic: Annotated[
+        str | None,
+        typer.Argument(
+            help="Topic of a page, as profile.  [default: a list of all of them]", autocompletion=complete_topic
         ),
     ] = None,
-    output: Annotated[Path | None, output_option("Write it to FILE: .1 (man) or .md (Markdown)")] = None,
+    output: Annotated[Path | None, output_option("Write the page to FILE, as Markdown whatever its name")] = None,
 ) -> None:
-    """Write the whole manual: every command with its arguments, options and example, exit codes, variables and files.
+    """Show a reference page: profile keys, timing models, the circle test, the gate, JSON, Python or limits.
 
-    It is made of what `busplan COMMAND --help` says, and is installed with busplan as a man page, which `man busplan`
-    shows, and as Markdown. It exits 0 when the manual is written.
+    Pages are Markdown, and come as they are. Without a topic it lists the topics. What a command and its options do is
+    in `busplan COMMAND --help`. It exits 0 when the page is written.
 
-    Example: busplan manual --format man -o busplan.1
+    Example: busplan manual profile
     """
+    from busplan.manual import page, topics
+
+    known = topics()
+    if topic is not None and topic not in known:
+        raise BusplanError(f"{topic or repr(topic)}: no such topic; there are {', '.join(known)}")
     require_apart({"--output": output})
-    from busplan.cli.tree import manual_of
+    write_document(_contents(known) if topic is None else page(topic), output)
 
-    chosen = form_of_file(format_, output, forms={".1": "man", ".md": "markdown"}, default="markdown")
-    manual = manual_of(context.find_root().command)
-    if chosen == "man":
-        from busplan.answers.manual.man import man_page
 
-        text = man_page(manual)
-    else:
-        from busplan.answers.manual.markdown import markdown_page
-
-        text = markdown_page(manual)
-    write_document(text, output)
+def _contents(headings: dict[str, str]) -> str:
+    """One line a topic."""
+    width = max(map(len, headings))
+    lines = (f"{topic:{width}}  {heading}\n" for topic, heading in headings.items())
+    return f"Topics of the manual; `busplan manual TOPIC` shows one:\n\n{''.join(lines)}"

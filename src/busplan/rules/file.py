@@ -45,7 +45,7 @@ BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
         "out-of-range",
         "error",
         "the value is outside its range",
-        "Every quantity has a range in which it means something; the README's reference and `busplan schema` list "
+        "Every quantity has a range in which it means something; `busplan manual profile` and `busplan schema` list "
         "them. What only the bus standard forbids has rules of its own.",
     ),
     "inconsistent": Rule(
