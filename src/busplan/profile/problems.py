@@ -13,6 +13,7 @@ from busplan.printable import printable
 from busplan.profile.document import Document
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_model
 from busplan.profile.positions import KeyPath, Place
+from busplan.profile.write import value_text
 
 _TAG: Final = "kind"
 """The key that chooses the member of every union of tables."""
@@ -60,10 +61,7 @@ class KeyFinding(NamedTuple):
 
 def _quoted(part: str) -> str:
     bare = part.isascii() and part.replace("-", "").replace("_", "").isalnum()
-    if bare:
-        return part
-    escaped = part.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + printable(escaped, write=lambda one: f"\\U{ord(one):08x}") + '"'
+    return part if bare else value_text(part)
 
 
 def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.profile.document import Document, Lines
+from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
 
@@ -143,12 +144,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
         return profile
     data = profile.model_dump(exclude_unset=True)
     for key, value in changes.items():
-        *tables, last = key.split(".")
-        table = data
-        for name in tables:
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
-                raise BusplanError(f"{key}: no such key; {name} is a value, not a section")
+        table, last = holder(data, key)
         table[last] = value
     kind, problem = kind_of(data), None
     try:
