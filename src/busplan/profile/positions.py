@@ -88,8 +88,7 @@ class _Scanner:
         table: KeyPath = ()
         while self.at < len(self.text):
             match = _PLAIN_LINE.match(self.text, self.at)
-            # With arrays of tables in the file, headers need the scanner, which knows what they belong to.
-            if match is not None and not (match["header"] and self.last_element):
+            if match is not None:
                 table = self.plain_line(match, table)
                 continue
             self.skip_lines()
@@ -108,7 +107,7 @@ class _Scanner:
         if comment is not None:
             self.comments.append(match.start("comment"))
         if header is not None:
-            return self.plain_header(header, match.start("header"))
+            return self.enter([(one[0], *one.span()) for one in _KEY_PART.finditer(self.text, *match.span("header"))])
         if key is not None:
             path = (*table, key)
             self.places[path] = Place(*match.span("key"), *match.span("value"))
@@ -117,23 +116,17 @@ class _Scanner:
                     self.places[*path, index] = Place(*one.span(), *one.span())
         return table
 
-    def plain_header(self, name: str, start: int) -> KeyPath:
-        path: KeyPath = ()
-        for part in name.split("."):
-            path = (*path, part)
-            place = Place(start, start + len(part), start, start + len(part))
-            self.places.setdefault(path, place)
-            start += len(part) + 1
-        # A table's own header says more than the [a.b] that first implied it.
-        self.places[path] = place
-        return path
-
     def header(self) -> KeyPath:
         """Read [a.b] or [[a.b]] and give the path its keys belong to."""
         is_array = self.text.startswith("[[", self.at)
-        self.at += 2 if is_array else 1
-        path: KeyPath = ()
+        self.at += 1 + is_array
         parts = self.dotted_key()
+        self.at += 1 + is_array
+        return self.enter(parts, is_array=is_array)
+
+    def enter(self, parts: list[tuple[str, int, int]], *, is_array: bool = False) -> KeyPath:
+        """Take in the name of a header, and give the path its keys belong to."""
+        path: KeyPath = ()
         for number, (part, start, end) in enumerate(parts, start=1):
             path = (*path, part)
             self.places.setdefault(path, Place(start, end, start, end))
@@ -142,8 +135,6 @@ class _Scanner:
                 self.places[*path, index] = Place(start, end, start, end)
             if path in self.last_element:
                 path = (*path, self.last_element[path])
-        self.skip(_SPACE)
-        self.at += 2 if is_array else 1
         if not is_array:
             # A table's own header says more than the [a.b] that first implied it.
             _, start, end = parts[-1]
