@@ -31,12 +31,12 @@ _SPACE: Final = re.compile(r"[ \t]*")
 _SPACE_AND_LINES: Final = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
 _COMMENT: Final = re.compile(r"#[^\n]*")
 _KEY_PART: Final = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'""")
-# A multi-line string may end in one or two quotes of its own before the closing three.
-_STRING: Final = re.compile(
-    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\'''',
+# A multi-line string may end in one or two quotes of its own before the closing three. A date may have a space inside.
+_SCALAR: Final = re.compile(
+    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
+    r"""|[^,\]}#\s](?:[^,\]}#\r\n]*[^,\]}#\s])?""",
     re.DOTALL,
 )
-_SCALAR: Final = re.compile(r"[^,\]}#\r\n]*")
 _PLAIN_LINE: Final = re.compile(
     r"""[ \t]*+(?:
         (?P<key>[A-Za-z0-9_-]++) [ \t]*+ = [ \t]*+
@@ -185,20 +185,12 @@ class _Scanner:
                 self.at += 1
                 open_containers.append(_Container(path, start, is_array=self.text[start] == "["))
             else:
-                self.step_over_scalar()
+                self.skip(_SCALAR)
                 self.close(path, start)
             following = self.next_in(open_containers)
             if following is None:
                 return
             path = following
-
-    def step_over_scalar(self) -> None:
-        match = _STRING.match(self.text, self.at)
-        if match:
-            self.at = match.end()
-            return
-        match = _SCALAR.match(self.text, self.at)
-        self.at += len(match.group().rstrip()) if match else 0
 
     def next_in(self, open_containers: list[_Container]) -> KeyPath | None:
         """Close what ends here; the path of the next value, or None after the last."""
