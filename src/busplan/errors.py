@@ -1,7 +1,7 @@
 """The one exception that stops a run, and its form for what stands at a place of a file."""
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 
 class BusplanError(Exception):
@@ -29,6 +29,9 @@ ProblemKind = Literal[
 """What is wrong with a file, in the terms of its gate."""
 
 
+_MOST_SHOWN: Final = 50
+
+
 class PlacedProblem(NamedTuple):
     """One thing that is wrong at one place of a file; lines and columns count from 1."""
 
@@ -48,12 +51,14 @@ class PlacedError(BusplanError):
     name
         What the file is called.
     problems
-        At least one, in the order of their places.
+        At least one, in the order of their places; the first ones of very many are listed.
     hidden
-        How many further problems are not listed.
+        How many further problems are not even given.
     """
 
     def __init__(self, name: str, problems: tuple[PlacedProblem, ...], *, hidden: int = 0) -> None:
+        hidden += len(problems[_MOST_SHOWN:])
+        problems = problems[:_MOST_SHOWN]
         more = [f"{name}: and {hidden} more problems"] if hidden else []
         super().__init__(*(f"{name}:{one.line}:{one.column}: {one.message}" for one in problems), *more)
         self.name = name

@@ -1,6 +1,6 @@
 # Row 9: a partial clone allows itself a protocol that is a program, and git fetches what is missing by itself.
 # exits: 2
-# says: an object of it was not fetched into this partial clone, and busplan asks no other machine
+# says: git says: .*(not allowed|lazy fetching disabled)
 export GIT_CONFIG_GLOBAL=/dev/null GIT_CONFIG_NOSYSTEM=1
 git init --quiet there
 mv p.toml there

@@ -126,6 +126,24 @@ def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(bench: Path) 
     assert {"# from the bench", "# least", "# by Li"} <= set(lines)
 
 
+def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(bench: Path) -> None:
+    text = bench.read_text()
+    start = text.index("[node.execution]")
+    inline = 'execution = { kind = "table", payload_bytes = [4, 64, 256], time_us = [3, 5.5, 9] }  # mine\n'
+    bench.write_text(text[:start] + inline)
+    before = bench.read_bytes()
+    run = busplan("calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply", cwd=bench.parent)
+    assert (run.returncode, run.stdout) == (2, "")
+    first, note, header, *lines = run.stderr.splitlines()
+    assert first.endswith(", so that it stays as it is; change these lines by hand:")
+    assert note.startswith("# busplan calibrate: linear (least squares) of 7 measurements in m.csv, ")
+    assert header == "[node.execution]"
+    assert [line.partition(" = ")[0] for line in lines] == [
+        *("kind", "grade", "base_us", "per_byte_us", "# remove payload_bytes", "# remove time_us")
+    ]
+    assert bench.read_bytes() == before
+
+
 @pytest.mark.parametrize("moment", KILLS)
 def test_a_kill_while_writing_leaves_the_profile_whole(bench: Path, moment: str) -> None:
     before = bench.read_bytes()

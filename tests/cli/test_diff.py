@@ -166,7 +166,7 @@ def test_what_is_wrong_with_either_side_is_said_together(refused: Refused, repos
     said = refused("diff", "v1:broken.toml", "bad.toml", cwd=repository).splitlines()
     assert [line.partition(": ")[0] for line in said] == ["v1:broken.toml:6:1", "bad.toml:1:2"]
     said = refused("diff", "nope:bad.toml", "none.toml", cwd=repository).splitlines()
-    assert said[0].startswith("nope:bad.toml: revision nope is unknown in the git repository of ")
+    assert said[0].startswith("nope:bad.toml: no file of that name; of REV:path git says: fatal: ")
     assert said[1].startswith("none.toml: no such file")
     assert len(refused("diff", "none.toml", "none.toml", cwd=repository).splitlines()) == 1
 

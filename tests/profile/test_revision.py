@@ -1,6 +1,7 @@
 """REV:path is the file that git has there, or one message that says why there is none."""
 
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -42,8 +43,8 @@ def test_the_path_begins_at_the_current_folder(repository: Path, monkeypatch: py
     assert period_us("HEAD~1:./line.toml") == 4000
     assert period_us("HEAD~1:../profiles/line.toml") == 4000
     assert refusal("HEAD~1:profiles/line.toml") == (
-        "HEAD~1:profiles/line.toml: no such file in revision HEAD~1; the path starts at the current folder, not at the "
-        "top of the repository"
+        "HEAD~1:profiles/line.toml: no file of that name; of REV:path git says: "
+        "fatal: path 'profiles/profiles/line.toml' does not exist in 'HEAD~1'"
     )
 
 
@@ -61,7 +62,7 @@ def test_a_folder_that_is_gone_is_still_in_the_revision(repository: Path, monkey
     monkeypatch.chdir(repository)
     assert not (repository / "gone").exists()
     assert period_us("v1:gone/old.toml") == 4000
-    assert "no such file in revision HEAD;" in refusal("HEAD:gone/old.toml")
+    assert "does not exist in 'HEAD'" in refusal("HEAD:gone/old.toml")
 
 
 def test_links_are_followed_as_in_a_checkout(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,7 +70,7 @@ def test_links_are_followed_as_in_a_checkout(repository: Path, monkeypatch: pyte
     assert (period_us("v1:link.toml"), period_us("HEAD:link.toml")) == (4000, 1000)
     for name in ("lost.toml", "out.toml"):
         assert refusal(f"v1:{name}") == (
-            f"v1:{name}: is a link in revision v1 that leads to no file of it; name the file itself"
+            f"v1:{name}: leads to no file of revision v1; name the file itself, not a link"
         )
 
 
@@ -87,17 +88,17 @@ def test_what_is_there_under_that_name_comes_first(repository: Path, monkeypatch
 @pytest.mark.parametrize(
     ("argument", "said"),
     [
-        ("nope:profiles/line.toml", "revision nope is unknown in the git repository of "),
-        ("-x:profiles/line.toml", "revision -x is unknown in the git repository of "),
-        ("--output=x:profiles/line.toml", "revision --output=x is unknown in the git repository of "),
-        ("HEAD~9:profiles/line.toml", "revision HEAD~9 is unknown in the git repository of "),
-        ("nope@{10:00}:profiles/line.toml", "revision nope@{10:00} is unknown in the git repository of "),
-        ("a tree b:profiles/line.toml", "revision a tree b is unknown in the git repository of "),
-        ("HEAD:profiles/other.toml", "no such file in revision HEAD;"),
-        ("HEAD:profiles/a tree b", "no such file in revision HEAD;"),
-        ("HEAD:profiles/line.toml/x", "no such file in revision HEAD;"),
-        ("HEAD:profiles", "is a directory in revision HEAD; give a file"),
-        ("HEAD:.", "is a directory in revision HEAD; give a file"),
+        ("nope:profiles/line.toml", "fatal: invalid object name 'nope'."),
+        ("HEAD~9:profiles/line.toml", "fatal: invalid object name 'HEAD~9'."),
+        ("nope@{10:00}:profiles/line.toml", "fatal: invalid object name 'nope@{10:00}'."),
+        ("a tree b:profiles/line.toml", "fatal: invalid object name 'a tree b'."),
+        ("HEAD:profiles/other.toml", "fatal: path 'profiles/other.toml' does not exist in 'HEAD'"),
+        ("HEAD:profiles/a tree b", "fatal: path 'profiles/a tree b' does not exist in 'HEAD'"),
+        ("HEAD:profiles/line.toml/x", "fatal: path 'profiles/line.toml/x' does not exist in 'HEAD'"),
+        ("HEAD:profiles", "bad file"),
+        ("HEAD:.", "bad file"),
+        ("-x:profiles/line.toml", "no such file, and no shipped profile of that name"),
+        ("--output=x:profiles/line.toml", "no such file, and no shipped profile of that name"),
         (":profiles/line.toml", "no such file, and no shipped profile of that name"),
         ("HEAD:", "no such file, and no shipped profile of that name"),
         ("HEAD\n:profiles/line.toml", "no such file, and no shipped profile of that name"),
@@ -110,7 +111,8 @@ def test_what_cannot_be_read_is_said(
 ) -> None:
     monkeypatch.chdir(repository)
     message = refusal(argument)
-    assert message.startswith(f"{argument}: {said}")
+    assert message.startswith(f"{argument}: ")
+    assert said in message
     assert sorted(repository.glob("x")) == []
 
 
@@ -123,15 +125,13 @@ def test_faults_of_a_file_are_named_as_it_was_typed(repository: Path, monkeypatc
 def test_without_a_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
-    assert refusal("HEAD:line.toml") == (
-        f"HEAD:line.toml: no such file, and no git repository to read REV:path from at {tmp_path}"
-    )
+    assert "git says: fatal: not a git repository" in refusal("HEAD:line.toml")
 
 
 def test_an_empty_repository_has_no_revision(git: Git, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert git("status", "--short") == b""
     monkeypatch.chdir(tmp_path / "repository")
-    assert "revision HEAD is unknown" in refusal("HEAD:line.toml")
+    assert "invalid object name 'HEAD'" in refusal("HEAD:line.toml")
 
 
 @pytest.mark.parametrize(
@@ -150,7 +150,7 @@ def test_what_git_sets_for_its_hooks_leads_nowhere_else(
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     assert period_us("v1:profiles/line.toml") == 4000
-    assert "revision nope is unknown" in refusal("nope:profiles/line.toml")
+    assert "invalid object name 'nope'" in refusal("nope:profiles/line.toml")
 
 
 def fake_git(folder: Path, monkeypatch: pytest.MonkeyPatch, script: str) -> None:
@@ -179,12 +179,12 @@ def test_a_git_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("script", "said"),
     [
-        ("echo 'fatal: detected dubious ownership' >&2; exit 128", "REV:path: detected dubious ownership"),
-        ("exit 1", "REV:path: no reason given"),
-        ('[ "$LC_ALL" = C ] || exit 1; echo "fatal: in C" >&2; exit 1', "REV:path: in C"),
-        ("echo 'ab12^{tree} ambiguous'", "revision HEAD is ambiguous in the git repository of "),
-        ("exit 0", "revision HEAD is unknown in the git repository of "),
-        ("printf '\\377\\n'", "revision HEAD is unknown in the git repository of "),
+        ("echo 'fatal: dubious' >&2; echo '  call git' >&2; exit 128", "git says: fatal: dubious call git"),
+        ("printf 'fatal: a\\033[2Jb' >&2; exit 128", "git says: fatal: a\\x1b[2Jb"),
+        ("exit 1", "git says: nothing"),
+        ('[ "$LC_ALL" = C ] || exit 1; echo "fatal: in C" >&2; exit 1', "git says: fatal: in C"),
+        ("exit 0", "leads to no file of revision HEAD"),
+        ("printf '\\377\\n'", "leads to no file of revision HEAD"),
     ],
 )
 def test_a_git_that_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str) -> None:
@@ -198,7 +198,7 @@ def test_a_git_that_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scr
 def test_a_large_file_is_not_even_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     some = "0" * 40
-    fake_git(tmp_path, monkeypatch, f'[ "$4" = blob ] && touch read; echo {some} tree 9; echo {some} blob 9000000000')
+    fake_git(tmp_path, monkeypatch, f'[ "$4" = blob ] && touch read; echo {some} blob 9000000000')
     assert refusal("HEAD:line.toml").startswith("HEAD:line.toml:1:1: the file is larger than 100,000 bytes")
     assert not (tmp_path / "read").exists()
 
@@ -212,22 +212,13 @@ def damaged(repository: Path, git: Git, name: str) -> Path:
     return path
 
 
-def test_a_file_that_git_cannot_read_is_not_called_absent(
-    repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["profiles/line.toml", ""])
+def test_what_git_cannot_read_is_refused(
+    repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    damaged(repository, git, "profiles/line.toml")
+    damaged(repository, git, name)
     monkeypatch.chdir(repository)
-    with pytest.raises(BusplanError, match="is in revision HEAD, and git cannot read it here"):
-        load_revision("HEAD:profiles/line.toml")
-
-
-def test_a_tree_that_git_cannot_read_is_no_unknown_revision(
-    repository: Path, git: Git, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    damaged(repository, git, "")
-    monkeypatch.chdir(repository)
-    with pytest.raises(BusplanError, match="is in revision HEAD, and git cannot read it here"):
-        load_revision("HEAD:profiles/line.toml")
+    assert "git says: fatal: " in refusal("HEAD:profiles/line.toml")
 
 
 def old_git(folder: Path) -> Path:
@@ -256,10 +247,8 @@ def test_no_program_of_a_repository_is_run_to_fetch_what_is_missing(
     monkeypatch.chdir(repository)
     for url in (f"ext::touch {mark}", "ssh://nowhere.invalid/x"):
         git("config", "remote.origin.url", url)
-        assert refusal("HEAD:profiles/line.toml") == (
-            "HEAD:profiles/line.toml: an object of it was not fetched into this partial clone, and busplan asks no "
-            "other machine; fetch it with git first"
-        )
+        said = refusal("HEAD:profiles/line.toml")
+        assert re.search("lazy fetching disabled|transport '[a-z]+' not allowed", said)
         assert not mark.exists()
 
 
@@ -267,5 +256,4 @@ def test_a_name_of_two_things_is_refused(repository: Path, git: Git, monkeypatch
     git("branch", "two", "v1")
     git("tag", "two", "HEAD")
     monkeypatch.chdir(repository)
-    with pytest.raises(BusplanError, match="git is not sure what is meant: refname 'two' is ambiguous"):
-        load_revision("two:profiles/line.toml")
+    assert "git says: warning: refname 'two' is ambiguous." in refusal("two:profiles/line.toml")

@@ -27,7 +27,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns, plural, with_unit
-from busplan.profile.layout import written
+from busplan.profile.write import value_text
 from busplan.sections.execution import LinearExecution, TableExecution
 
 SECTION: Final = "node.execution"
@@ -107,7 +107,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     yield from fit_sentences(result)
     yield from (joined(sentence("Warning: ", state="warns"), one, by="") for one in warning_sentences(result))
     yield _by_payload(result.payloads, measured=result.way == "measured-halves")
-    keys = (f"{key} = {written(value)}" for key, value in execution_keys(result.execution).items())
+    keys = (f"{key} = {value_text(value)}" for key, value in execution_keys(result.execution).items())
     yield Snippet((f"[{SECTION}]", *keys))
 
 

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from bisect import bisect_right
+from codecs import BOM_UTF8
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -43,6 +44,25 @@ class Lines:
         return line, offset - self._starts[line - 1] + 1
 
 
+def text_of(content: bytes, *, name: str, wanted: str) -> str:
+    """Turn a file's bytes into text, a byte order mark left out.
+
+    Raises
+    ------
+    PlacedError
+        Not UTF-8: where, and what is wanted.
+    """
+    # The mark goes first: what the codec that knows it says of places, it says of the bytes behind.
+    content = content.removeprefix(BOM_UTF8)
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        before = content[: error.start].decode()
+        line, column = Lines(before + "?").line_and_column(len(before))
+        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; {wanted}"
+        raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
+
+
 @dataclass(frozen=True)
 class Document:
     """One TOML text with the name it is called by in messages."""
@@ -70,6 +90,12 @@ class Document:
         from busplan.profile.positions import scan  # only who asks for places pays for the scanner
 
         return scan(self.text)
+
+    def nearest(self, path: "KeyPath") -> int:
+        """Offset of a key, or of the nearest table around one that is not there; the start of the text at last."""
+        while path and path not in self.places:
+            path = path[:-1]
+        return self.places[path].key_start if path else 0
 
     def syntax_error(self, offset: int, message: str) -> PlacedError:
         """Make the error for a text that is no TOML, at an offset."""

@@ -1,116 +1,229 @@
 r"""Change values of a profile's text in place: what is not changed keeps its bytes, its comments and its layout.
 
-Each change is one small splice at the places that the scanner finds (see `layout`), and the text is scanned again
-before the next. Nothing here is trusted: the finished text is parsed, compared with the data that was asked for, and
-validated.
+Three changes are made: another value where one stands, a line more in a section, a line less. A layout that would
+need more is refused, with the lines to change by hand. Nothing here is trusted: the finished text is parsed, and
+compared with the data that was asked for.
 """
 
-import codecs
+import re
 import tomllib
-from collections.abc import Mapping
-from typing import Any
+from codecs import BOM_UTF8
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import tomli_w
 
 from busplan.errors import BusplanError, PlacedError
+from busplan.printable import printable
 from busplan.profile.document import Document
-from busplan.profile.layout import Layout, canonical
-from busplan.profile.positions import KeyPath
+from busplan.profile.keys import flat, holder
+from busplan.profile.positions import KeyPath, Place
 from busplan.profile.toml import decode, validate
+from busplan.profile.write import value_text
+
+_HEADER_END: Final = re.compile(r"[ \t]*\]")
+_BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
 
 
-def edited(document: Document, changes: Mapping[str, object], *, notes: Mapping[str, str] | None = None) -> str:
-    r"""Text of a profile with other values.
-
-    Parameters
-    ----------
-    document
-        A valid profile; its line ends may be LF or CRLF.
-    changes
-        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "node.axes": None}. A value
-        is a boolean, an int, a float, a text, or a sequence of them; one that is equal already stays as written.
-        A key or table that is not there yet is added: keys behind the last one of their table, tables at the end.
-    notes
-        A comment of one line by dotted table, for the line above it: {"node.execution": "busplan calibrate: ..."}. It
-        takes the place of a comment there that begins alike, up to the colon.
-
-    Returns
-    -------
-    str
-        The new text: a valid profile with exactly the data asked for.
-
-    Raises
-    ------
-    BusplanError
-        A change that cannot be made in place, or that makes no valid profile.
-    TypeError, ValueError
-        What is given as a value can be none in TOML, or is not finite: a caller's mistake.
-
-    Examples
-    --------
-    >>> from busplan.profile.shipped import load
-    >>> text = edited(load("paper-4ms").document, {"bus.nodes": 16, "limits.min_spare_nodes": 3})
-    >>> print(*(line for line in text.splitlines() if line.startswith(("nodes", "min_spare"))), sep="\n")
-    nodes = 16                 # distributed nodes, host not counted
-    min_spare_nodes = 3
-    """
-    text, wanted = document.text, document.data()
-    # What is set goes before what is removed, so that no table is ever without keys in between.
-    for key, value in sorted(changes.items(), key=lambda change: change[1] is None):
-        path = tuple(key.split("."))
-        text = Layout(document.name, text).changed(path, value)
-        _change(wanted, path, value)
-    for key, note in (notes or {}).items():
-        text = Layout(document.name, text).noted(tuple(key.split(".")), note)
-    _check(document.name, text, wanted)
-    return text
+class _LayoutError(Exception):
+    """A change that cannot be made safely, with what stands in its way."""
 
 
 def edited_file(
     content: bytes, changes: Mapping[str, object], *, name: str, notes: Mapping[str, str] | None = None
 ) -> bytes:
-    """Bytes of a profile's file with other values: `edited`, and a byte order mark and CRLF line ends stay.
+    r"""Bytes of a profile's file with other values; a byte order mark and CRLF line ends stay.
 
     Parameters
     ----------
     content
-        The file.
-    changes, notes
-        As for `edited`.
+        The file, a valid profile.
+    changes
+        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "bus.max_hops": None}. A value
+        is a boolean, an int, a float, a text, or a sequence of them; one that is equal already stays as written. A key
+        that is not there yet is added behind the last one of its section, a section at the end.
     name
         What to call the file in messages.
+    notes
+        A comment of one line by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It takes
+        the place of a comment there that begins alike, up to the colon.
+
+    Returns
+    -------
+    bytes
+        The new file: a valid profile with exactly the data asked for.
 
     Raises
     ------
     BusplanError
-        As `edited`; or the file is no profile, or would be longer than one may be.
+        The changes make no valid profile; or the layout cannot take them, with the lines to change by hand.
+    TypeError
+        What is given as a value can be none in TOML: a caller's mistake.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> content = load("paper-4ms").document.text.encode()
+    >>> new = edited_file(content, {"bus.nodes": 16, "limits.min_spare_nodes": 3}, name="paper-4ms").decode()
+    >>> print(*(line for line in new.splitlines() if line.startswith(("nodes", "min_spare"))), sep="\n")
+    nodes = 16                 # distributed nodes, host not counted
+    min_spare_nodes = 3
     """
-    decode(content, name=name)
-    mark = codecs.BOM_UTF8 if content.startswith(codecs.BOM_UTF8) else b""
-    text = edited(Document(name, content.removeprefix(mark).decode()), changes, notes=notes)
+    document, notes = decode(content, name=name), notes or {}
+    data = document.data()
+    before = _texts(data)
+    for key, value in changes.items():
+        table, last = holder(data, key)
+        if value is None:
+            table.pop(last, None)
+        else:
+            table[last] = value
+    _require_profile(name, data)
+    after = _texts(data)
+    # What is set comes before what is removed: a comment that stays of the latter is not the last of its section.
+    changed = {key: after.get(key) for key in {**after, **before} if after.get(key) != before.get(key)}
     try:
-        result = mark + text.encode()
-    except UnicodeEncodeError:
-        raise BusplanError(f"{name}: a new value is no text that UTF-8 can hold") from None
+        result = _encoded(_edited(document, changed, notes, wanted=after), like=content)
+    except _LayoutError as error:
+        raise BusplanError(
+            f"{name}: {error}, so that it stays as it is; change these lines by hand:", *_by_hand(changed, notes)
+        ) from None
     decode(result, name=name)
     return result
 
 
-def _check(name: str, text: str, wanted: dict[str, Any]) -> None:
-    """Refuse a text that is no profile or has other data than asked for."""
+def _texts(data: Mapping[str, Any]) -> dict[str, str]:
+    """Every value as text, so that equal means equal in type as well."""
+    return {key: value_text(value) for key, value in flat(data)}
+
+
+def _reads_to(text: str, wanted: dict[str, str]) -> bool:
     try:
-        validate(Document(name, text))
+        return _texts(tomllib.loads(text)) == wanted
+    except tomllib.TOMLDecodeError:
+        return False
+
+
+def _require_profile(name: str, data: dict[str, Any]) -> None:
+    try:
+        validate(Document(name, tomli_w.dumps(data)))
     except PlacedError as error:
-        changed = (f"{name}: with the changes, {one.message}" for one in error.placed)
-        raise BusplanError(*changed) from None
-    if canonical(tomllib.loads(text)) != canonical(wanted):
-        raise BusplanError(f"{name}: the layout of the file cannot take the changes; make them by hand")
+        raise BusplanError(*(f"{name}: with the changes, {one.message}" for one in error.placed)) from None
 
 
-def _change(data: dict[str, Any], path: KeyPath, value: object) -> None:
-    """Make a change in the data as `Layout.changed` makes it in the text."""
-    table: Any = data
-    for part in path[:-1]:
-        table = table.setdefault(part, {})
-    if value is None:
-        table.pop(path[-1], None)
-    else:
-        table[path[-1]] = value
+def _encoded(text: str, *, like: bytes) -> bytes:
+    line_ends = like.count(b"\r\n")
+    if line_ends not in (0, like.count(b"\n")):
+        raise _LayoutError("some of its lines end in CRLF and some in LF")
+    mark = BOM_UTF8 if like.startswith(BOM_UTF8) else b""
+    return mark + (text.replace("\n", "\r\n") if line_ends else text).encode()
+
+
+def _by_hand(changed: Mapping[str, str | None], notes: Mapping[str, str]) -> Iterator[str]:
+    """Lines that make the changes, ready to be copied: those above the first section come first."""
+    sections = dict.fromkeys([*sorted(key.rpartition(".")[0] for key in changed), *notes])
+    for section in sections:
+        if section in notes:
+            yield f"# {printable(notes[section])}"
+        if section:
+            yield f"[{section}]"
+        for key, text in changed.items():
+            table, _, name = key.rpartition(".")
+            if table == section:
+                yield f"# remove {name}" if text is None else f"{name} = {text}"
+
+
+def _edited(
+    document: Document, changed: Mapping[str, str | None], notes: Mapping[str, str], *, wanted: dict[str, str]
+) -> str:
+    """Make each change in the text of the one before."""
+    for key, text in changed.items():
+        path = tuple(key.split("."))
+        if text is None:
+            new = _without(document, path)
+        else:
+            new = (_replaced if path in document.places else _with_line)(document, path, text)
+        document = Document(document.name, new)
+    for section, note in notes.items():
+        document = Document(document.name, _noted(document, tuple(section.split(".")), note))
+    if not _reads_to(document.text, wanted):
+        raise _LayoutError("its sections are laid out in an unusual way")
+    return document.text
+
+
+def _replaced(document: Document, path: KeyPath, new: str) -> str:
+    """The text with another value; a comment behind it stays in its column."""
+    text, (_, _, start, end) = document.text, document.places[path]
+    if any(start <= comment < end for comment in document.comments):
+        raise _LayoutError(f"there are comments among the values of {path[-1]}")
+    space = _BEFORE_COMMENT.match(text, end)
+    if space and "\n" not in text[start:end]:
+        new, end = f"{new} ".ljust(space.end() - start), space.end()
+    return text[:start] + new + text[end:]
+
+
+def _with_line(document: Document, path: KeyPath, value: str) -> str:
+    """The text with one more line in its section, or with a new section at its end."""
+    text, table, line = document.text, path[:-1], f"{path[-1]} = {value}\n"
+    if table and table not in document.places:
+        return f"{_whole_lines(text)}\n[{'.'.join(map(str, table))}]\n{line}"
+    own = [place for key, place in document.places.items() if key[:-1] == table and place.value_start > place.key_end]
+    header = [_header(document, table)] if table else []  # no profile is without keys above its sections
+    last = max(header + own, key=lambda place: place.value_end)
+    start, end = _line_start(text, last.key_start), _line_end(text, last.value_end)
+    return f"{_whole_lines(text[:end])}{_indent(text, start)}{line}{text[end:]}"
+
+
+def _without(document: Document, path: KeyPath) -> str:
+    """The text without the lines of a key; their comments stay, on lines of their own."""
+    text, place = document.text, document.places[path]
+    start, end = _line_start(text, place.key_start), _line_end(text, place.value_end)
+    if text[start : place.key_start].strip():
+        raise _LayoutError(f"{path[-1]} does not begin a line")
+    comments = (text[at : _line_end(text, at)].rstrip() for at in document.comments if start <= at < end)
+    return text[:start] + "".join(f"{_indent(text, start)}{one}\n" for one in comments) + text[end:]
+
+
+def _noted(document: Document, table: KeyPath, note: str) -> str:
+    """The text with a comment above the comments of a section, so that a suppression stays next to its line."""
+    text = document.text
+    top = _line_start(text, _header(document, table).key_start)
+    line = f"{_indent(text, top)}# {printable(note)}\n"
+    mark = line.lstrip().partition(":")[0] + ":"
+    while top:
+        above = _line_start(text, top - 1)
+        comment = text[above:top].lstrip(" \t")
+        if not comment.startswith("#"):
+            break
+        if comment.startswith(mark):
+            return text[:above] + line + text[top:]
+        top = above
+    return text[:top] + line + text[top:]
+
+
+def _header(document: Document, table: KeyPath) -> Place:
+    """Place of a table's name in its line [a.b]."""
+    text, place = document.text, document.places.get(table)
+    if place is not None:
+        before = text[_line_start(text, place.key_start) : place.key_start]
+        if before.lstrip().startswith("[") and _HEADER_END.match(text, place.key_end):
+            return place
+    section = ".".join(map(str, table))
+    raise _LayoutError(f"there is no line [{section}]")
+
+
+def _line_start(text: str, offset: int) -> int:
+    return text.rfind("\n", 0, offset) + 1
+
+
+def _line_end(text: str, offset: int) -> int:
+    """Start of the next line, or the end of the text."""
+    return text.find("\n", offset) + 1 or len(text)
+
+
+def _indent(text: str, line_start: int) -> str:
+    return text[line_start : len(text) - len(text[line_start:].lstrip(" \t"))]
+
+
+def _whole_lines(text: str) -> str:
+    return text if text.endswith("\n") else f"{text}\n"

@@ -1,8 +1,9 @@
-"""A profile as dotted keys: each value in force, and whether the file says it."""
+"""A profile as dotted keys: each value in force, whether the file says it, and where a new one goes."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
+from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
 
 
@@ -34,13 +35,30 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
     >>> keys["bus.nodes"], keys["servo.y.drive_lag_us"].source
     (KeyValue(value=2, source='file'), 'default')
     """
-    said = dict(_flat(profile.model_dump(exclude_unset=True)))
-    return {key: KeyValue(value, "file" if key in said else "default") for key, value in _flat(profile.model_dump())}
+    said = dict(flat(profile.model_dump(exclude_unset=True)))
+    return {key: KeyValue(value, "file" if key in said else "default") for key, value in flat(profile.model_dump())}
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted key and value of all that is no table."""
     for name, value in table.items():
         if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}.")
+            yield from flat(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
+
+
+def holder(data: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
+    """Find the table that has or may have a dotted key, made where it is missing, and the key's name in it.
+
+    Raises
+    ------
+    BusplanError
+        A part of the key is a value.
+    """
+    *tables, last = key.split(".")
+    for name in tables:
+        data = data.setdefault(name, {})
+        if not isinstance(data, dict):
+            raise BusplanError(f"{key}: no such key; {name} is a value, not a section")
+    return data, last

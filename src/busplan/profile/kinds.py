@@ -5,6 +5,7 @@ from types import UnionType
 from typing import Annotated, Any, Final, Union, get_args, get_origin
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from busplan.buses import kind_named, kind_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
@@ -27,13 +28,17 @@ def profile_model(kind: str | None) -> type[Profile]:
 
 def is_of_a_kind(path: tuple[int | str, ...]) -> bool:
     """Whether any kind of bus has a key: then it may be right, once the kind is known."""
-    return any(_has(profile_model(kind), path) for kind in kind_names())
+    return any(True for kind in kind_names() for _ in _fields(profile_model(kind), path))
 
 
-def _has(model: type[BaseModel], path: tuple[int | str, ...]) -> bool:
+def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[FieldInfo]:
+    """What models say of a key: each member of a union that has it; of an element, its array."""
     field = model.model_fields.get(str(path[0]))
     inner = [] if field is None else models_of(field.annotation)
-    return field is not None and (len(path) == 1 or not inner or any(_has(one, path[1:]) for one in inner))
+    if field is not None and (len(path) == 1 or not inner):
+        yield field
+    for one in inner if len(path) > 1 else []:
+        yield from _fields(one, path[1:])
 
 
 def models_of(annotation: Any) -> list[type[BaseModel]]:
@@ -64,15 +69,8 @@ def cycle_keys(kind: str) -> tuple[str, ...]:
 
 def words_of(kind: str, key: str) -> tuple[str, ...]:
     """Words that a key takes in the place of a number."""
-    model: type[BaseModel] = profile_model(kind)
-    *sections, name = key.split(".")
-    for part in sections:
-        inner = models_of(model.model_fields[part].annotation) if part in model.model_fields else []
-        if not inner:
-            return ()
-        model = inner[0]
-    field = model.model_fields.get(name)
-    return () if field is None or not _is_number(field.annotation) else tuple(_texts(field.annotation))
+    fields = _fields(profile_model(kind), tuple(key.split(".")))
+    return tuple(text for one in fields if _is_number(one.annotation) for text in _texts(one.annotation))
 
 
 def _is_number(annotation: Any) -> bool:

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.network import TRANSACTION_KINDS, TransactionKind
 from busplan.errors import PlacedError, PlacedProblem, ProblemKind
-from busplan.profile.document import Lines
+from busplan.profile.document import text_of
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US
 
 MAX_MEASUREMENTS_BYTES: Final = 20_000_000
@@ -18,7 +18,6 @@ OPTIONAL_COLUMNS: Final = ("transaction", "request_and_acknowledge_us")
 _COLUMNS: Final = (*REQUIRED_COLUMNS, *OPTIONAL_COLUMNS)
 _EXPECTED: Final = f"expected {','.join(REQUIRED_COLUMNS)} and, where known, {','.join(OPTIONAL_COLUMNS)}"
 
-_MOST_SHOWN: Final = 50
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 _OTHER_DELIMITER: Final = re.compile(r"[;\t|]|(?<=[a-z]) +(?=[a-z])")
 _DELIMITER_NAMES: Final = {"\t": "tabs", ";": "semicolons", "|": "bars"}
@@ -93,7 +92,7 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     found = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows[1:]]
     problems = sorted(one for each in found if isinstance(each, list) for one in each)
     if problems:
-        raise PlacedError(name, tuple(problems[:_MOST_SHOWN]), hidden=max(0, len(problems) - _MOST_SHOWN))
+        raise PlacedError(name, tuple(problems))
     measurements = tuple(each for each in found if isinstance(each, Measurement))
     if not measurements:
         raise PlacedError(name, (PlacedProblem(line, 1, "missing-key", "no measurement below the header"),))
@@ -104,13 +103,7 @@ def _decoded(content: bytes, *, name: str) -> str:
     if len(content) > MAX_MEASUREMENTS_BYTES:
         message = f"the file is larger than {MAX_MEASUREMENTS_BYTES:,} bytes; give fewer repetitions"
         raise PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = content[: error.start].decode("utf-8-sig")
-        line, column = Lines(before + "?").line_and_column(len(before))
-        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; save it as CSV in UTF-8"
-        raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
+    return text_of(content, name=name, wanted="save it as CSV in UTF-8")
 
 
 def _rows(text: str) -> Iterator[tuple[int, list[_Cell]]]:

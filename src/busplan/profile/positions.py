@@ -31,12 +31,12 @@ _SPACE: Final = re.compile(r"[ \t]*")
 _SPACE_AND_LINES: Final = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
 _COMMENT: Final = re.compile(r"#[^\n]*")
 _KEY_PART: Final = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'""")
-# A multi-line string may end in one or two quotes of its own before the closing three.
-_STRING: Final = re.compile(
-    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\'''',
+# A multi-line string may end in one or two quotes of its own before the closing three. A date may have a space inside.
+_SCALAR: Final = re.compile(
+    r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
+    r"""|[^,\]}#\s](?:[^,\]}#\r\n]*[^,\]}#\s])?""",
     re.DOTALL,
 )
-_SCALAR: Final = re.compile(r"[^,\]}#\r\n]*")
 _PLAIN_LINE: Final = re.compile(
     r"""[ \t]*+(?:
         (?P<key>[A-Za-z0-9_-]++) [ \t]*+ = [ \t]*+
@@ -88,8 +88,7 @@ class _Scanner:
         table: KeyPath = ()
         while self.at < len(self.text):
             match = _PLAIN_LINE.match(self.text, self.at)
-            # With arrays of tables in the file, headers need the scanner, which knows what they belong to.
-            if match is not None and not (match["header"] and self.last_element):
+            if match is not None:
                 table = self.plain_line(match, table)
                 continue
             self.skip_lines()
@@ -108,7 +107,7 @@ class _Scanner:
         if comment is not None:
             self.comments.append(match.start("comment"))
         if header is not None:
-            return self.plain_header(header, match.start("header"))
+            return self.enter([(one[0], *one.span()) for one in _KEY_PART.finditer(self.text, *match.span("header"))])
         if key is not None:
             path = (*table, key)
             self.places[path] = Place(*match.span("key"), *match.span("value"))
@@ -117,23 +116,17 @@ class _Scanner:
                     self.places[*path, index] = Place(*one.span(), *one.span())
         return table
 
-    def plain_header(self, name: str, start: int) -> KeyPath:
-        path: KeyPath = ()
-        for part in name.split("."):
-            path = (*path, part)
-            place = Place(start, start + len(part), start, start + len(part))
-            self.places.setdefault(path, place)
-            start += len(part) + 1
-        # A table's own header says more than the [a.b] that first implied it.
-        self.places[path] = place
-        return path
-
     def header(self) -> KeyPath:
         """Read [a.b] or [[a.b]] and give the path its keys belong to."""
         is_array = self.text.startswith("[[", self.at)
-        self.at += 2 if is_array else 1
-        path: KeyPath = ()
+        self.at += 1 + is_array
         parts = self.dotted_key()
+        self.at += 1 + is_array
+        return self.enter(parts, is_array=is_array)
+
+    def enter(self, parts: list[tuple[str, int, int]], *, is_array: bool = False) -> KeyPath:
+        """Take in the name of a header, and give the path its keys belong to."""
+        path: KeyPath = ()
         for number, (part, start, end) in enumerate(parts, start=1):
             path = (*path, part)
             self.places.setdefault(path, Place(start, end, start, end))
@@ -142,8 +135,6 @@ class _Scanner:
                 self.places[*path, index] = Place(start, end, start, end)
             if path in self.last_element:
                 path = (*path, self.last_element[path])
-        self.skip(_SPACE)
-        self.at += 2 if is_array else 1
         if not is_array:
             # A table's own header says more than the [a.b] that first implied it.
             _, start, end = parts[-1]
@@ -194,20 +185,12 @@ class _Scanner:
                 self.at += 1
                 open_containers.append(_Container(path, start, is_array=self.text[start] == "["))
             else:
-                self.step_over_scalar()
+                self.skip(_SCALAR)
                 self.close(path, start)
             following = self.next_in(open_containers)
             if following is None:
                 return
             path = following
-
-    def step_over_scalar(self) -> None:
-        match = _STRING.match(self.text, self.at)
-        if match:
-            self.at = match.end()
-            return
-        match = _SCALAR.match(self.text, self.at)
-        self.at += len(match.group().rstrip()) if match else 0
 
     def next_in(self, open_containers: list[_Container]) -> KeyPath | None:
         """Close what ends here; the path of the next value, or None after the last."""

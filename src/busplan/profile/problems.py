@@ -12,11 +12,11 @@ from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.printable import printable
 from busplan.profile.document import Document
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_model
-from busplan.profile.positions import KeyPath, Place
+from busplan.profile.positions import KeyPath
+from busplan.profile.write import value_text
 
 _TAG: Final = "kind"
 """The key that chooses the member of every union of tables."""
-_MOST_SHOWN: Final = 50
 _WRONG_TYPE: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -60,10 +60,7 @@ class KeyFinding(NamedTuple):
 
 def _quoted(part: str) -> str:
     bare = part.isascii() and part.replace("-", "").replace("_", "").isalnum()
-    if bare:
-        return part
-    escaped = part.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + printable(escaped, write=lambda one: f"\\U{ord(one):08x}") + '"'
+    return part if bare else value_text(part)
 
 
 def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
@@ -83,22 +80,22 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
     """
     model = profile_model(kind_of(data))
     for details in error.errors(include_url=False):
-        path = _path(details["loc"], model)
+        path, section = _path(details["loc"], model)
         if details["type"] == "busplan":
             for problem in details["ctx"]["problems"]:
                 yield KeyFinding(_parsed(problem.key) if problem.key else path, problem.message, problem.kind)
         elif details["type"] == "missing":
-            yield KeyFinding(path, _missing(path, data), "missing-key", shows_value=False)
+            yield KeyFinding(path, _missing(path, section), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
             if kind_of(data) is not None or not is_of_a_kind(path):
-                yield KeyFinding(path, _unknown(path, data), "unknown-key", shows_value=False)
+                yield KeyFinding(path, _unknown(path, section), "unknown-key", shows_value=False)
         elif details["type"] == "union_tag_not_found":
-            key, tags = _tags(path, data)
-            message = f"missing key; expected {' or '.join(f'{key} = {_text(tag)}' for tag in tags)}"
-            yield KeyFinding((*path, key), message, "missing-key", shows_value=False)
+            tags = [f"{_TAG} = {tag}" for tag in _tags(path, section)]
+            yield KeyFinding(
+                (*path, _TAG), f"missing key; expected {' or '.join(tags)}", "missing-key", shows_value=False
+            )
         elif details["type"] == "union_tag_invalid":
-            key, tags = _tags(path, data)
-            yield KeyFinding((*path, key), f"expected {' or '.join(map(_text, tags))}", "out-of-range")
+            yield KeyFinding((*path, _TAG), f"expected {' or '.join(_tags(path, section))}", "out-of-range")
         else:
             kind: ProblemKind = "wrong-type" if details["type"] in _WRONG_TYPE else "out-of-range"
             yield KeyFinding(path, _expected(details), kind)
@@ -109,25 +106,23 @@ def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
     """The kind of bus, where it is a text and none that is known: it says which other keys there are."""
     bus = data.get("bus")
     if kind_of(data) is None and isinstance(bus, dict) and isinstance(bus.get("kind"), str):
-        yield KeyFinding(("bus", "kind"), f"expected {' or '.join(map(_text, kind_names()))}", "out-of-range")
+        yield KeyFinding(("bus", "kind"), f"expected {' or '.join(map(value_text, kind_names()))}", "out-of-range")
 
 
-def _text(word: str) -> str:
-    return f'"{word}"'
-
-
-def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> KeyPath:
-    """The keys of a location of pydantic's, which has the tag of each union among them."""
+def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyPath, type[BaseModel]]:
+    """The keys of a location of pydantic's, which has the tag of each union among them; and the last one's section."""
     path: list[int | str] = []
-    members = [model]
+    members, section = [model], model
     for part in location:
         if len(members) > 1 and any(part in _tag(one) for one in members):
             members = [one for one in members if part in _tag(one)]
             continue
         path.append(part)
-        field = members[0].model_fields.get(str(part)) if members else None
+        if members:
+            section = members[0]
+        field = section.model_fields.get(str(part)) if members else None
         members = models_of(field.annotation) if field is not None else []
-    return tuple(path)
+    return tuple(path), section
 
 
 def _tag(model: type[BaseModel]) -> tuple[Any, ...]:
@@ -135,10 +130,9 @@ def _tag(model: type[BaseModel]) -> tuple[Any, ...]:
     return get_args(model.model_fields[_TAG].annotation) if _TAG in model.model_fields else ()
 
 
-def _tags(path: KeyPath, data: dict[str, Any]) -> tuple[str, list[str]]:
-    """The key that chooses the member of a union, and its words."""
-    field = _section(path, data).model_fields[str(path[-1])]
-    return _TAG, [str(tag) for one in models_of(field.annotation) for tag in _tag(one)]
+def _tags(path: KeyPath, section: type[BaseModel]) -> list[str]:
+    """The words that choose the member of a union."""
+    return [value_text(tag) for one in models_of(section.model_fields[str(path[-1])].annotation) for tag in _tag(one)]
 
 
 def _parsed(key: str) -> KeyPath:
@@ -159,29 +153,16 @@ def _expected(details: ErrorDetails) -> str:
     return details["msg"]
 
 
-def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
-    """The model of the table that holds `path`."""
-    section: type[BaseModel] = profile_model(kind_of(data))
-    table: Any = data
-    for part in path[:-1]:
-        table = table.get(part, {}) if isinstance(table, dict) else {}
-        members = models_of(section.model_fields[str(part)].annotation)
-        wanted = table.get(_TAG) if isinstance(table, dict) else None
-        section = next((one for one in members if len(members) > 1 and wanted in _tag(one)), members[-1])
-    return section
-
-
-def _missing(path: KeyPath, data: dict[str, Any]) -> str:
-    field = _section(path, data).model_fields[str(path[-1])]
+def _missing(path: KeyPath, section: type[BaseModel]) -> str:
+    field = section.model_fields[str(path[-1])]
     if not field.examples:
-        needed = [name for name, one in _section((*path, ""), data).model_fields.items() if one.is_required()]
+        needed = [name for name, one in models_of(field.annotation)[-1].model_fields.items() if one.is_required()]
         return f"missing section [{'.'.join(map(str, path))}]; it needs {', '.join(needed)}"
-    example = str(field.examples[0]) if not isinstance(field.examples[0], str) else f'"{field.examples[0]}"'
-    return f"missing key. {field.description}; for example {path[-1]} = {example}"
+    return f"missing key. {field.description}; for example {path[-1]} = {value_text(field.examples[0])}"
 
 
-def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
-    known = list(_section(path, data).model_fields)
+def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
+    known = list(section.model_fields)
     close = get_close_matches(str(path[-1]), known, n=1)
     if close:
         return f"unknown key; did you mean {close[0]}?"
@@ -201,32 +182,24 @@ def refusal(error: ValidationError | None, data: dict[str, Any], document: Docum
         Where it stands.
     """
     found = _unknown_kind(data) if error is None else findings(error, data)
-    placed = sorted(((_place(document, one.path), one) for one in found), key=lambda pair: pair[0].key_start)
-    problems = tuple(_problem(document, place, one) for place, one in placed[:_MOST_SHOWN])
-    return PlacedError(document.name, problems, hidden=max(0, len(placed) - _MOST_SHOWN))
+    placed = sorted(((document.nearest(one.path), one) for one in found), key=lambda pair: pair[0])
+    return PlacedError(document.name, tuple(_problem(document, offset, one) for offset, one in placed))
 
 
-def _place(document: Document, path: KeyPath) -> Place:
-    """Place of a key, or of the nearest table around one that is not there; the start of the file at last."""
-    while path:
-        if path in document.places:
-            return document.places[path]
-        path = path[:-1]
-    return Place(0, 0, 0, 0)
-
-
-def _problem(document: Document, place: Place, found: KeyFinding) -> PlacedProblem:
-    # A table that is spread over the file has no value to show.
-    has_value = found.shows_value and place.value_start != place.key_start
-    written = document.text[place.value_start : place.value_end] if has_value or _is_element(found) else ""
+def _problem(document: Document, offset: int, found: KeyFinding) -> PlacedProblem:
     key = _shortened(found.key, limit=100)
-    subject = f"{key} = {_shortened(written)}" if written else key
-    line, column = document.lines.line_and_column(place.key_start)
+    written = _shortened(_written(document, found)) if found.shows_value else ""
+    subject = f"{key} = {written}" if written else key
+    line, column = document.lines.line_and_column(offset)
     return PlacedProblem(line, column, found.kind, f"{subject}: {found.message}", found.key)
 
 
-def _is_element(found: KeyFinding) -> bool:
-    return found.shows_value and isinstance(found.path[-1], int)
+def _written(document: Document, found: KeyFinding) -> str:
+    """The value as it is written; a table that is spread over the file has none."""
+    place = document.places.get(found.path)
+    if place is None or (place.value_start == place.key_start and isinstance(found.path[-1], str)):
+        return ""
+    return document.text[place.value_start : place.value_end]
 
 
 def _shortened(written: str, limit: int = 40) -> str:

@@ -6,6 +6,7 @@ from typing import Final
 from busplan.errors import BusplanError
 from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
+from busplan.profile.write import value_text
 
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
 
@@ -30,10 +31,9 @@ def starter_text(source: str, *, name: str) -> str:
     path, _ = locate(source)
     document = decode(read_bytes(path, name=source), name=source)
     place = document.places["name",]
-    quoted = '"' + name.replace("\\", "\\\\").replace('"', '\\"') + '"'
     # Nobody has looked at the new machine yet: what the gate may not say of the shipped one, it says of this one.
     before, after = document.text[: place.value_start], document.text[place.value_end :]
-    text = before + quoted + _SUPPRESSION.sub("", after)
+    text = before + value_text(name) + _SUPPRESSION.sub("", after)
     # The line that names the schema is right in the shipped folder alone.
     text = text.removeprefix("#:schema ./busplan.schema.json\n")
     try:

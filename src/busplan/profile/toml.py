@@ -5,14 +5,14 @@ Whatever fails, the message names file, line and column, the value, and what wou
 """
 
 import sys
-from codecs import BOM_UTF8
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
-from busplan.profile.document import Document, Lines
+from busplan.profile.document import Document, text_of
+from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
 
@@ -46,15 +46,7 @@ def decode(content: bytes, *, name: str) -> Document:
     """
     if len(content) > MAX_FILE_BYTES:
         raise too_large(name)
-    # The mark goes first: what the codec that knows it says of places, it says of the bytes behind.
-    content = content.removeprefix(BOM_UTF8)
-    try:
-        text = content.decode()
-    except UnicodeDecodeError as error:
-        before = content[: error.start].decode()
-        line, column = Lines(before + "?").line_and_column(len(before))
-        message = f"not a text file: byte 0x{content[error.start]:02x} is not UTF-8; a profile is TOML in UTF-8"
-        raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
+    text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
     # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
     return Document(name, text.replace("\r\n", "\n"))
 
@@ -143,12 +135,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
         return profile
     data = profile.model_dump(exclude_unset=True)
     for key, value in changes.items():
-        *tables, last = key.split(".")
-        table = data
-        for name in tables:
-            table = table.setdefault(name, {})
-            if not isinstance(table, dict):
-                raise BusplanError(f"{key}: no such key; {name} is a value, not a section")
+        table, last = holder(data, key)
         table[last] = value
     kind, problem = kind_of(data), None
     try:

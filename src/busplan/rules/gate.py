@@ -141,11 +141,8 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
 
 def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Put a problem at the line of its key, or of the table that should have it."""
-    places, path = subject.document.places, tuple(problem.key.split("."))
-    while path and path not in places:
-        path = path[:-1]
-    offset = places[path].key_start if path else 0
-    line, column = subject.document.lines.line_and_column(offset)
+    document = subject.document
+    line, column = document.lines.line_and_column(document.nearest(tuple(problem.key.split("."))))
     message = f"{problem.key}: {problem.message}"
     return Finding(rule.code, rule.name, rule.severity, message, problem.key, line, column)
 

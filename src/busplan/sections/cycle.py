@@ -23,7 +23,16 @@ SliceRatio = Annotated[
 ]
 
 
-class BusSection(Section):
+class _Extended(Section):
+    """A section to which a kind of bus adds its own keys."""
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any:
+            """A key of the kind of bus, which only a run knows."""
+
+
+class BusSection(_Extended):
     """Section [bus]. Every kind of bus has `nodes` and `timing_model`, where they belong among its own keys."""
 
     kind: str = Field(description="Kind of bus", examples=["ieee1394"])
@@ -32,11 +41,8 @@ class BusSection(Section):
         nodes: int
         timing_model: str
 
-        def __getattr__(self, key: str) -> Any:
-            """A key of the kind of bus, which only a run knows."""
 
-
-class CycleSection(Section):
+class CycleSection(_Extended):
     """Section [cycle]: the communication period and what of it is for communication."""
 
     period_us: Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)] = Field(
@@ -47,22 +53,12 @@ class CycleSection(Section):
         default=0.0, description="Time kept for non-periodic data in each cycle T_npd [us]", examples=[0]
     )
 
-    if TYPE_CHECKING:
 
-        def __getattr__(self, key: str) -> Any:
-            """A key of the kind of bus, which only a run knows."""
-
-
-class PayloadSection(Section):
+class PayloadSection(_Extended):
     """Section [payload]: what is read from and written to each node in a cycle."""
 
     read_bytes: Count = Field(description="Payload of the read transaction [bytes]", examples=[12])
     write_bytes: Count = Field(description="Payload of the write transaction [bytes]", examples=[12])
-
-    if TYPE_CHECKING:
-
-        def __getattr__(self, key: str) -> Any:
-            """A key of the kind of bus, which only a run knows."""
 
 
 class NodeSection(Section):
