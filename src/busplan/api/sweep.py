@@ -169,7 +169,7 @@ def sweep(
     if grid.points > MOST_POINTS:
         raise BusplanError(
             f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
-            "write them with busplan sweep -o FILE.npz"
+            "write them with busplan sweep -o FILE.csv"
         )
     blocks = analysis.sweep(network, grid, timing_models=models)
     if with_circle:
