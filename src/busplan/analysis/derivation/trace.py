@@ -6,7 +6,7 @@ behind. What a line of a derivation shows is therefore what was executed, and no
 
 import operator
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import ceil
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
@@ -210,6 +210,22 @@ class Traced(SpecialNumber):
     def worded(self, words: str) -> Any:
         """Say where the number comes from."""
         return Traced(self.value, formula=words, numbers=short(self.value), parts=(self,))
+
+
+def found(value: object, words: str, parts: Iterable[Operand]) -> Traced:
+    """A result that no equation gives, as that of a search or a simulation: it has no steps, but all their inputs.
+
+    Parameters
+    ----------
+    value
+        The result.
+    words
+        What gives it.
+    parts
+        What that starts from.
+    """
+    leaves = inputs(Traced(value, parts=tuple(parts)))
+    return Traced(value, formula=words, parts=tuple(Traced(leaf.value, given=leaf) for leaf in leaves))
 
 
 def value_of(operand: Operand) -> Any:
