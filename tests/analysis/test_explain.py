@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
-from busplan.analysis.derivation.capacity import capacity_figures
+from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures
 from busplan.analysis.derivation.circle import circle_figures
 from busplan.analysis.derivation.explain import assumptions, explain
 from busplan.analysis.derivation.latency import latency_figures
 from busplan.analysis.derivation.trace import Traced, inputs
-from busplan.analysis.derivation.verdict import VERDICT_KEYS
 from busplan.analysis.latency import latency
 from busplan.analysis.register import figure_named, figures_of
 from busplan.answers.capacity import capacity_document, capacity_records

@@ -15,7 +15,7 @@ from pydantic_core import PydanticUndefined
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.circle.roundness import CircleFigures
-from busplan.analysis.derivation.trace import short
+from busplan.analysis.derivation.origin import short
 from busplan.analysis.latency import latency
 from busplan.answers.assumptions import constant_rows, equation_rows
 from busplan.answers.capacity import capacity_records

@@ -7,7 +7,7 @@ from typing import Any, Final
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
-from busplan.analysis.derivation.trace import DIGITS, short
+from busplan.analysis.derivation.origin import DIGITS, short
 from busplan.answers.assumptions import INPUT_COLUMNS, input_cells
 from busplan.answers.capacity import capacity_document
 from busplan.answers.documents import document, with_profile

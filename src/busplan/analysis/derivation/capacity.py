@@ -3,18 +3,24 @@
 Only what is no operator is put into words here: words, truths, and a search's answer.
 """
 
-from typing import Any
+from typing import Final
 
-from busplan.analysis.capacity.figures import CapacityFigures, figures, numeric_figures
+from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures, numeric_figures
+from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.formulas import against
-from busplan.analysis.derivation.inputs import traced_profile
+from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import chosen, remembered
-from busplan.analysis.derivation.trace import Traced, found, short
-from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.derivation.origin import short
+from busplan.analysis.derivation.trace import Operand, Traced, found
+from busplan.analysis.network import bus_of, model_names, network_of
+from busplan.analysis.planning.cures import changeable, listed
 from busplan.buses.bus import Bus, Term
 from busplan.buses.figure import by_key
 from busplan.buses.network import Network
 from busplan.sections.profile import Profile
+
+_SENTENCES: Final = "sentences on what the command computes"
+VERDICT_KEYS: Final = ("models_agree", "cheapest_change", "warnings", "text")
 
 
 def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
@@ -35,7 +41,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     bus, plain = bus_of(profile), figures(profile, model=model)
     network = network_of(traced_profile(profile))
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Any] = {
+    numbers: dict[str, Operand] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         **{term.key: term.us for term in cycle.terms},
         **cycle.figures(),
@@ -63,14 +69,14 @@ def _limit_names(bus: Bus) -> str:
     return " and ".join(limit.key for limit in bus.limits if not limit.is_safety)
 
 
-def _limits(bus: Bus, network: Network) -> tuple[Any, ...]:
+def _limits(bus: Bus, network: Network) -> tuple[Operand, ...]:
     """The bus's own limits, and what each is for."""
     pairs = ((limit.value(network), limit.most(network)) for limit in bus.limits if not limit.is_safety)
     return tuple(one for pair in pairs for one in pair)
 
 
 def _words(
-    named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Any, ...]
+    named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Operand, ...]
 ) -> dict[str, Traced]:
     """Figures that are words or truths."""
     required, available = named["required_us"], named["available_us"]
@@ -96,3 +102,22 @@ def _words(
             parts=(required, available, broken),
         ),
     }
+
+
+def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
+    """A figure of the verdict, which compares the models."""
+    others = (other for other in model_names(profile) if other != model)
+    (verdict,) = verdicts(capacity(profile, timing_models=(model, *others)))
+    bus, derived = bus_of(profile), [capacity_figures(profile, model=name) for name in model_names(profile)]
+    fits = tuple(figures["fits"] for figures in derived)
+    safety = () if bus.safety_figure is None else (bus.safety_figure.key,)
+    safe = tuple(figures[key] for figures in derived for key in safety)
+    if key == "models_agree":
+        return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
+    # The document's change and sentences are a reporter's; it puts them in the place of these.
+    if key == "cheapest_change":
+        purpose = "carries more nodes" if verdict.all_well else "makes every model fit on a bus that is set safely"
+        words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
+        return found(None, words, (*fits, *safe))
+    warned: tuple[Operand, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
+    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *safe, *warned))

@@ -12,7 +12,8 @@ from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.inputs import traced
-from busplan.analysis.derivation.trace import Input, Traced, found
+from busplan.analysis.derivation.origin import Input
+from busplan.analysis.derivation.trace import Traced, found
 from busplan.progress import Progress
 from busplan.sections.machine import AxisKeys
 from busplan.sections.profile import Profile

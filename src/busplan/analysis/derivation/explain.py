@@ -5,13 +5,13 @@ Nothing is computed a second time by other means: the functions that give the fi
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.analysis.derivation.capacity import capacity_figures
+from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
 from busplan.analysis.derivation.formulas import written
 from busplan.analysis.derivation.latency import latency_figures, latency_names
-from busplan.analysis.derivation.trace import Input, Traced, inputs, lines
-from busplan.analysis.derivation.verdict import VERDICT_KEYS, verdict_figure
+from busplan.analysis.derivation.origin import Input
+from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.analysis.network import bus_of, model_names
 from busplan.analysis.register import Command, figure_named, figures_of
 from busplan.buses.figure import Figure
@@ -50,7 +50,7 @@ class Step(NamedTuple):
     reference: str
     formula: str
     numbers: str
-    value: Any
+    value: object
     unit: str
 
 
@@ -63,7 +63,7 @@ class Derivation(NamedTuple):
     transaction: str | None
     """Of a figure of `latency`."""
     period_us: float
-    value: Any
+    value: object
     """As the command's JSON has it."""
     steps: tuple[Step, ...]
     """What is computed first comes first; the figure itself is last, unless it is an input."""
