@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
@@ -143,12 +143,12 @@ def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
     return (found if isinstance(found, Value) else found.text,)
 
 
-def _result(value: Any, key: str, unit: str, *, at: str) -> Value | Words:
+def _result(value: object, key: str, unit: str, *, at: str) -> Value | Words:
     if value is None or value == []:
         return _NONE
     if isinstance(value, dict):
         return Words(", ".join(f"{changed} = {new}" for changed, new in value["changes"].items()))
-    if _has_names(value):
+    if isinstance(value, list) and _has_names(value):
         return Words(", ".join(str(one.get("name", one.get("source"))) for one in value))
     return Value(value, key, unit, digits=DIGITS, at=at)
 

@@ -1,7 +1,7 @@
 """A profile as dotted keys: each value in force, and whether the file says it."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from busplan.sections.profile import Profile
 
@@ -9,7 +9,7 @@ from busplan.sections.profile import Profile
 class KeyValue(NamedTuple):
     """The value of one key."""
 
-    value: Any
+    value: object
     """None where nothing is said and nothing is assumed."""
     source: Literal["file", "default"]
 
@@ -38,7 +38,7 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
     return {key: KeyValue(value, "file" if key in said else "default") for key, value in _flat(profile.model_dump())}
 
 
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{name}.")

@@ -5,7 +5,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Final
 
 from busplan.errors import BusplanError
 from busplan.printable import printable
@@ -16,12 +16,12 @@ _HEADER_END: Final = re.compile(r"[ \t]*\]")
 _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
 
 
-def canonical(value: Any) -> str:
+def canonical(value: object) -> str:
     """Write data so that equal means equal in type as well; an empty table is as good as none."""
     return json.dumps(_pruned(value), sort_keys=True, default=repr)
 
 
-def _pruned(value: Any) -> Any:
+def _pruned(value: object) -> object:
     if not isinstance(value, dict):
         return value
     pruned = {key: _pruned(one) for key, one in value.items()}
