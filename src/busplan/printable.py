@@ -5,7 +5,6 @@ would be obeyed by the terminal, the log or the editor that shows the name.
 """
 
 from collections.abc import Callable
-from typing import Any
 
 
 def commands(text: str) -> bool:
@@ -52,7 +51,7 @@ def printable_lines(text: str, *, write: Callable[[str], str] = _escape) -> str:
     return "\n".join(printable(line, write=write) for line in text.split("\n"))
 
 
-def json_text(value: Any, *, indent: int | None = None) -> str:
+def json_text(value: object, *, indent: int | None = None) -> str:
     r"""Write a value as JSON that commands no terminal, and reads to the same value.
 
     Parameters

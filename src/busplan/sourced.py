@@ -63,7 +63,7 @@ class Sourced(float):
         return number
 
 
-def constants(namespace: Mapping[str, Any]) -> Mapping[str, Sourced]:
+def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
     """List the sourced numbers of a module by name, and tell each its name.
 
     Parameters
@@ -124,7 +124,7 @@ EQUATIONS: Final[dict[str, Equation]] = {}
 SYMBOLS: Final[dict[str, str]] = {}
 """What stands for a quantity in the equations, by its name here; the modules of equations fill it."""
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+_Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def published(*numbers: int, symbol: str, section: str, part: str = "") -> Callable[[_Function], _Function]:

@@ -1,8 +1,8 @@
 """Derivations: each ends in the figure that the command gives, and each line reads back as its result."""
 
-import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -12,21 +12,20 @@ from hypothesis import strategies as st
 from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
-from busplan.analysis.derivation.capacity import capacity_figures
+from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures
 from busplan.analysis.derivation.circle import circle_figures
-from busplan.analysis.derivation.explain import assumptions, explain, figure_named
-from busplan.analysis.derivation.formulas import written
+from busplan.analysis.derivation.explain import assumptions, explain
 from busplan.analysis.derivation.latency import latency_figures
-from busplan.analysis.derivation.trace import Traced
-from busplan.analysis.derivation.verdict import VERDICT_KEYS
+from busplan.analysis.derivation.trace import Traced, inputs
 from busplan.analysis.latency import latency
-from busplan.analysis.register import figures_of
+from busplan.analysis.register import figure_named, figures_of
 from busplan.answers.capacity import capacity_document, capacity_records
 from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
 from busplan.errors import BusplanError
+from busplan.profile.kinds import cycle_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -137,20 +136,9 @@ def test_a_circle_on_the_host_rests_on_the_bus_too() -> None:
     changes = {"servo.loop": "host", "circle.radius_mm": 20.0, "node.execution.grade": "assumed"}
     for key in ("mean_contour_error_mm", "circular_deviation_mm", "phase_margin_deg"):
         (one,) = explain(override(load("paper-1ms").profile, changes), key).derivations
-        assert "T_d" in [step.symbol for step in one.steps]
+        assert "MAX_PAYLOAD_BYTES[S400]" not in {given.name for given in one.inputs}
+        assert "bus.gap_count" in {given.name for given in one.inputs}
         assert one.weakest_grade == "assumed"
-
-
-def test_formulas_of_the_path_in_symbols_give_its_figures() -> None:
-    profile = override(load("paper-1ms").profile, {"circle.radius_mm": 20.0, "circle.ramp_periods": 33})
-    found = circle_figures(profile)
-    symbols = {"r": 20.0, "F": 10_000.0, "T_s": 1000.0, "ramp": 33, "h": 100.0, "pi": math.pi}
-    setpoints, words = found["setpoints"].formula.split(",")
-    assert words == " rounded up"
-    assert math.ceil(eval(setpoints.replace("2 pi r", "2 * pi * r"), symbols)) == found["setpoints"].value
-    steps = eval(found["steps"].formula.replace("n T_s", "n * T_s"), symbols | {"n": found["setpoints"].value})
-    assert steps == found["steps"].value
-    assert written(found["duration_s"], in_numbers=False) == "n T_s / 1000000"
 
 
 def test_grades_rank_from_the_weakest() -> None:
@@ -197,15 +185,6 @@ def test_the_papers_two_packets_have_names_of_their_own() -> None:
     assert one.steps[-1].formula.endswith("8 B_resp / R")
 
 
-def test_the_change_is_told_under_one_model() -> None:
-    profile = override(load("paper-1ms").profile, {"cycle.period_us": 600.0})
-    (one,) = explain(profile, "cheapest_change").derivations
-    assert one.steps[-1].numbers == (
-        "with bus.gap_count = 7 the bus carries 3 nodes instead of 1, and these 2 leave 107.2051 us instead of "
-        "-20.39908 us (standard model)"
-    )
-
-
 def test_the_binding_term_is_the_largest_of_what_is_listed(make: Make) -> None:
     step = explain(make(), "binding_term").derivations[0].steps[-1]
     assert step.formula == "the largest of sync, arbitration, data, acknowledge, execution, gaps, nonperiodic"
@@ -227,27 +206,101 @@ def test_the_own_keys_of_both_axes_are_among_what_a_circle_starts_from() -> None
     assert {"servo.x.position_gain_per_s", "servo.y.drive_lag_us"} <= names
 
 
-def test_the_lines_of_a_circle_read_back_as_its_measures() -> None:
-    profile = override(load("paper-1ms").profile, {"circle.radius_mm": 20.0, "circle.feed_mm_per_min": 5000.0})
-    found = circle_figures(profile)
-    for key in ("max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"):
-        root = found[key].numbers.split(",")[0].replace("^", "**").replace("sqrt", "math.sqrt")
-        assert abs(abs(eval(root, {"math": math})) - abs(found[key].value)) < 2e-5, key
-    total, steps = found["mean_contour_error_mm"].numbers.split(" / ")
-    assert float(total) / int(steps) == pytest.approx(found["mean_contour_error_mm"].value, rel=1e-6)
-    outer, inner = re.findall(r"r \+ (\S+)\)", found["circular_deviation_mm"].numbers)
-    assert float(outer) - float(inner) == pytest.approx(found["circular_deviation_mm"].value, rel=1e-5)
-    way = found["setpoints"].numbers.split(",")[0].replace("2 pi", "2 * math.pi")
-    assert math.ceil(eval(way, {"math": math})) == found["setpoints"].value
+LINEAR: dict[str, object] = {"node.execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}}
+SMALL: dict[str, object] = {"circle.radius_mm": 20.0, "circle.feed_mm_per_min": 5000.0}
+WITHOUT_EQUATION = {
+    "capacity.max_nodes": "a search: the largest whole N with T_need <= alpha T_s, within the limits of ",
+    "capacity.limited_by": "a search: ",
+    "capacity.cheapest_change": "a search: the first of gap count, slice ratio, period, speed and wiring that ",
+    "capacity.models_agree": "a comparison: ",
+    "capacity.text": "sentences ",
+    "capacity.warnings": "sentences ",
+    "circle-test.setpoints": "a count along the path",
+    "circle-test.phase_margin_deg": "the linear position loop of both axes",
+    "circle-test.max_contour_error_mm": "a simulation of both axes",
+    "circle-test.circular_deviation_mm": "a simulation of both axes",
+    "circle-test.contributions": "a simulation of the same circle without each error source in turn",
+    "circle-test.passed": "a comparison of bus, loop and simulation",
+}
 
 
-def test_a_verdict_is_explained_by_both_models() -> None:
-    profile = override(load("paper-1ms").profile, {"cycle.period_us": 600.0})
-    (one,) = explain(profile, "models_agree").derivations
-    assert one.value is False
-    assert {"paper: fits, standard: does not fit"} <= {step.numbers for step in one.steps}
-    (change,) = explain(profile, "cheapest_change").derivations
-    assert change.value == "bus.gap_count = 7"
+@pytest.mark.parametrize("name", WITHOUT_EQUATION)
+def test_what_no_equation_gives_is_one_step_that_says_what_gives_it(name: str) -> None:
+    profile = override(load("paper-1ms").profile, SMALL)
+    (one,) = explain(profile, name).derivations
+    (step,) = one.steps
+    assert step.formula.startswith(WITHOUT_EQUATION[name])
+    assert (step.numbers, step.value, step.key) == ("", one.value, name.partition(".")[2])
+    assert one.inputs
+
+
+def test_a_figure_of_a_search_is_a_step_of_what_is_computed_from_it(make: Make) -> None:
+    most, axes = explain(make(), "max_axes").derivations[0].steps
+    assert (most.symbol, most.formula.split(":")[0]) == ("N_max", "a search")
+    assert (axes.formula, axes.numbers) == ("axes_node N_max", f"4 * {most.value}")
+
+
+OTHER: dict[str, object] = {
+    "bus.gap_count": 21,
+    "cycle.period_us": 1200.0,
+    "circle.direction": "cw",
+    "servo.interpolation": "hold",
+    "servo.step_us": 50.0,
+}
+"""Another legal value of what has no larger one."""
+
+
+def another(profile: Profile, key: str) -> Profile | None:
+    """The profile with another value of a key; None where nothing of it can differ alone."""
+    value: Any = profile
+    for part in key.split("."):
+        value = getattr(value, part)
+    if key == "servo.loop":
+        return override(profile, {key: "host" if value == "node" else "node"})
+    if key in OTHER:
+        return override(profile, {key: OTHER[key]})
+    if not isinstance(value, (int, float)):
+        return None
+    return override(profile, {key: value + 1 if isinstance(value, int) else value * 1.25 + 0.001})
+
+
+def differing(profile: Profile, figures: Callable[[Profile], dict[str, Traced]], keys: Iterable[str]) -> set[Any]:
+    """Figures with the keys that change them."""
+    before = figures(profile)
+    others = {key: other for key in keys if (other := another(profile, key)) is not None}
+    after = {key: figures(other) for key, other in others.items()}
+    return {(name, key) for name in before for key in after if after[key][name].value != before[name].value}
+
+
+def resting(derived: dict[str, Traced], names: Iterable[str]) -> set[Any]:
+    """Figures with the keys of the profile among their inputs."""
+    return {(name, one.name) for name in names for one in inputs(derived[name]) if "." in one.name}
+
+
+@pytest.mark.parametrize("model", TIMING_MODELS)
+def test_a_figure_changes_with_each_of_its_inputs_and_with_nothing_else(make: Make, model: str) -> None:
+    profile, figures_by_key = make(), partial(capacity_figures, model=model)
+    changing = differing(profile, figures_by_key, cycle_keys("ieee1394"))
+    given = resting(figures_by_key(profile), CAPACITY_KEYS)
+    # The others are whole or words: a little more of an input need not show.
+    for name in ("required_us", "margin_us", "min_slice_ratio", "utilisation", "sync_us", "axes", "read_latency_us"):
+        assert {key for one, key in given if one == name} == {key for one, key in changing if one == name}, name
+    assert changing <= given
+    assert {("max_nodes", "cycle.period_us"), ("max_nodes", "bus.gap_count"), ("fits", "cycle.period_us")} <= given
+    assert not {("max_nodes", "bus.nodes"), ("max_nodes", "node.axes")} & given
+
+
+@pytest.mark.parametrize("loop", ["node", "host"])
+def test_a_figure_of_the_circle_changes_with_each_of_its_inputs_and_with_nothing_else(loop: str) -> None:
+    profile = override(load("paper-1ms").profile, {**SMALL, **LINEAR, "servo.loop": loop, "servo.drive_lag_us": 2000.0})
+    sections = ("circle", "servo", "delivery", "mechanics", "tolerance")
+    own = {f"{section}.{key}" for section in sections for key, value in getattr(profile, section) if value}
+    changing = differing(profile, circle_figures, {*cycle_keys("ieee1394"), *own})
+    given = resting(circle_figures(profile), FIGURES["circle-test"])
+    assert changing <= given
+    for name in ("max_contour_error_mm", "phase_margin_deg", "setpoints", "steps", "delay_us"):
+        # A circle the other way round, and a speed that is never reached, may show nothing.
+        assert {key for one, key in given - changing if one == name} <= {"circle.direction", "servo.max_velocity_mm_s"}
 
 
 def test_periods_models_and_transactions_multiply() -> None:

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.analysis.derivation.formulas import formula_of, written
-from busplan.analysis.derivation.trace import Input, Traced, inputs, lines
+from busplan.analysis.derivation.origin import Input
+from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
 from busplan.elementwise import choose

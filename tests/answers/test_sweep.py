@@ -121,7 +121,7 @@ def test_top_rows_are_those_of_a_whole_sort(ascending: bool, top: int) -> None:
     for block in blocks():
         kept.add(block)
         rows += [block.row(index, ("bus.nodes", "margin_us", "max_axes")) for index in range(2 * block.chunk.points)]
-    rows.sort(key=lambda row: row["max_axes"] * (1 if ascending else -1))
+    rows.sort(key=lambda row: int(str(row["max_axes"])) * (1 if ascending else -1))
     assert [one.record for one in kept.kept] == rows[:top]
 
 

@@ -174,10 +174,10 @@ import resource, subprocess, sys
 subprocess.run([sys.executable, "-m", "busplan", *sys.argv[1:]], stdout=subprocess.DEVNULL, check=True)
 print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
-MEMORY_POINTS = {"table": (3_000_000, 1_000_000), "csv": (300_000, 100_000), "npz": (3_000_000, 300_000)}
+MEMORY_POINTS = {"table": (3_000_000, 1_000_000), "csv": (300_000, 100_000)}
 
 
-@pytest.mark.parametrize("form", ["table", "csv", "npz"])
+@pytest.mark.parametrize("form", ["table", "csv"])
 def test_peak_memory_is_flat(benchmark: Any, form: str, tmp_path: Path, size: Callable[[int, int], int]) -> None:
     # Memory is no matter of how busy the machine is: this one is asserted.
     # Even the smaller ones would be over their limit if rows were kept: a point has 490 bytes of figures, 820 of text.

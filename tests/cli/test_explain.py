@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
-from busplan.analysis.derivation.explain import figure_named
+from busplan.analysis.register import figure_named
 from busplan.buses import kind_named
 
 Run = Callable[..., Any]

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
-from busplan.analysis.derivation.trace import short
+from busplan.analysis.derivation.origin import short
 from busplan.analysis.register import figures_of
 from busplan.answers.assumptions import constant_rows, equation_rows
 from busplan.buses import kind_named

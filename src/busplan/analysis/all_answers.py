@@ -8,7 +8,7 @@ from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
 from busplan.analysis.derivation.explain import assumptions
-from busplan.analysis.derivation.trace import Input
+from busplan.analysis.derivation.origin import Input
 from busplan.analysis.latency import LatencyResult, latency
 from busplan.analysis.network import model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule

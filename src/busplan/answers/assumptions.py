@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from busplan.analysis.derivation.formulas import formula_of
-from busplan.analysis.derivation.trace import DIGITS, Input
+from busplan.analysis.derivation.origin import DIGITS, Input
 from busplan.analysis.network import bus_of
 from busplan.analysis.register import Command, figures_of
 from busplan.answers.documents import document

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from itertools import takewhile
 from operator import eq
-from typing import Any, Final
+from typing import Final
 
 from busplan.analysis.comparison.difference import KeyDifference
 from busplan.forms.blocks import Code, Document, Table, TableColumn, TableRow
@@ -33,7 +33,7 @@ def _written(value: KeyValue | None, other: KeyValue | None) -> str:
     return shown if value.source == "file" else f"{shown} (default)"
 
 
-def shown_value(value: Any, other: Any = None) -> str:
+def shown_value(value: object, other: object = None) -> str:
     """Write a value as TOML does, and of a long one what is not as in the other.
 
     Examples
@@ -55,12 +55,12 @@ def shown_value(value: Any, other: Any = None) -> str:
     return str(value)
 
 
-def _alike(one: Sequence[Any], other: Sequence[Any]) -> int:
+def _alike(one: Sequence[object], other: Sequence[object]) -> int:
     """How many elements two sequences begin with in common."""
     return sum(takewhile(bool, map(eq, one, other)))
 
 
-def _list(items: tuple[Any, ...], other: tuple[Any, ...]) -> str:
+def _list(items: tuple[object, ...], other: tuple[object, ...]) -> str:
     if len(items) <= _MOST_ITEMS:
         return f"[{', '.join(map(shown_value, items))}]"
     before = _alike(items, other)

@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
-from busplan.analysis.derivation.trace import DIGITS, short
+from busplan.analysis.derivation.origin import DIGITS, short
 from busplan.answers.assumptions import INPUT_COLUMNS, input_cells
 from busplan.answers.capacity import capacity_document
 from busplan.answers.documents import document, with_profile
@@ -143,12 +143,12 @@ def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
     return (found if isinstance(found, Value) else found.text,)
 
 
-def _result(value: Any, key: str, unit: str, *, at: str) -> Value | Words:
+def _result(value: object, key: str, unit: str, *, at: str) -> Value | Words:
     if value is None or value == []:
         return _NONE
     if isinstance(value, dict):
         return Words(", ".join(f"{changed} = {new}" for changed, new in value["changes"].items()))
-    if _has_names(value):
+    if isinstance(value, list) and _has_names(value):
         return Words(", ".join(str(one.get("name", one.get("source"))) for one in value))
     return Value(value, key, unit, digits=DIGITS, at=at)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
@@ -201,7 +201,7 @@ def plan_records(plan: Plan) -> list[Record]:
 
 def plan_document(plan: Plan) -> Document:
     """Document of `busplan plan --format json`."""
-    recommended: dict[str, Any] | None = None if plan.recommended is None else plan.all_changes(plan.recommended)
+    recommended = None if plan.recommended is None else plan.all_changes(plan.recommended)
     return document(
         "plan",
         profile=plan.profile.name,

@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from busplan.analysis.network import model_names
 from busplan.analysis.planning.cures import listed
@@ -17,6 +17,8 @@ Path = str | os.PathLike[str]
 """A text may also be the name of a shipped profile; a path object is always a path."""
 ProfileLike = Profile | Path
 MOST_FLOAT: Final = sys.float_info.max
+
+_Item = TypeVar("_Item")
 
 
 def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None = None) -> Profile:
@@ -82,7 +84,7 @@ def plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
-def items(values: Iterable[Any], *, name: str) -> list[Any]:
+def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
     """Values one by one, each plain.
 
     Raises

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -11,7 +11,15 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Block, Column
-from busplan.analysis.sweep.circles import MOST_CIRCLES_UNASKED, all_columns, require_circles, run_task, with_circles
+from busplan.analysis.sweep.circles import (
+    MOST_CIRCLES_UNASKED,
+    CircleTask,
+    Figures,
+    all_columns,
+    require_circles,
+    run_task,
+    with_circles,
+)
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
 from busplan.answers.sweep.rows import json_footer, json_header, json_rows
 from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows, sweep_report
@@ -106,7 +114,7 @@ def _spelled(column: Column) -> Array:
 def sweep(
     profile: ProfileLike,
     *,
-    vary: Mapping[str, str | Iterable[Any]],
+    vary: Mapping[str, str | Iterable[object]],
     timing_models: Iterable[str] | None = None,
     with_circle: bool = False,
     force: bool = False,
@@ -169,7 +177,7 @@ def sweep(
     if grid.points > MOST_POINTS:
         raise BusplanError(
             f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
-            "write them with busplan sweep -o FILE.npz"
+            "write them with busplan sweep -o FILE.csv"
         )
     blocks = analysis.sweep(network, grid, timing_models=models)
     if with_circle:
@@ -178,7 +186,7 @@ def sweep(
     return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=with_circle), tuple(blocks))
 
 
-def _values(profile: Profile, key: str, given: str | Iterable[Any]) -> Values:
+def _values(profile: Profile, key: str, given: str | Iterable[object]) -> Values:
     words = words_of(profile.bus.kind, key)
     if isinstance(given, str):
         return parse_values(given, name=f"vary {key}={given}", words=words)
@@ -199,5 +207,5 @@ def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:
     require_circles(profile, grid)
 
 
-def _run_here(tasks: Iterable[Any]) -> Iterable[Any]:
+def _run_here(tasks: Iterable[CircleTask]) -> Iterable[list[Figures]]:
     return map(run_task, tasks)

@@ -5,7 +5,7 @@ module; a kind of bus adds its own.
 """
 
 from collections.abc import Callable, Iterable
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from busplan.buses import time_slice
 from busplan.sourced import EQUATIONS
@@ -104,7 +104,7 @@ def unit_of(key: str) -> str:
     return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
 
 
-def by(*functions: Callable[..., Any]) -> str:
+def by(*functions: Callable[..., object]) -> str:
     """The numbers of the equations that some functions compute.
 
     Examples

@@ -78,8 +78,9 @@ def explain_command(
     """Show where a figure comes from: every step in symbols and in numbers, and what it starts from.
 
     Each step names its equation. Each constant has its source and how well it is known: published, derived, recalled,
-    measured, calibrated or assumed; "given" is what the profile sets. The lines are what the program itself computed.
-    A figure of the circle test runs the test. Each figure has its unit. A report: it exits 0 whatever the figures are.
+    measured, calibrated or assumed; "given" is what the profile sets. The lines are what the program itself computed;
+    a search or a simulation is one line. A figure of the circle test runs the test. Each figure has its unit. A
+    report: it exits 0 whatever the figures are.
 
     Example: busplan explain paper-4ms required_us
     """

@@ -9,7 +9,7 @@ import typer
 
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
-from busplan.cli.output import partial_path, refuse_terminal
+from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl", ".npz": "npz"})
+_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl"})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "max_axes"
 
@@ -43,8 +43,8 @@ def sweep_command(
         typer.Option(
             "--format",
             help="Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
-            "json (one document), jsonl (a JSON object a line, the first describes the sweep) or npz (NumPy columns, "
-            "no text).  [default: by the ending of --output, else table]",
+            "json (one document) or jsonl (a JSON object a line, the first describes the sweep).  [default: by the "
+            "ending of --output, else table]",
             show_default=False,
         ),
     ] = None,
@@ -113,12 +113,12 @@ def sweep_command(
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
     points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
-    FILE.partial.csv (or .json, .jsonl, .npz) and leave FILE as it was. A report: it exits 0 whatever fits.
+    FILE.partial.csv (or .json, .jsonl) and leave FILE as it was. A report: it exits 0 whatever fits.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
-    form = format_ or (_ENDINGS.get(output.suffix.lower(), "table") if output else "table")
-    _require_sense(form, output=output, sort=sort, top=top)
+    form = format_ or _form_of(output)
+    _require_sense(form, sort=sort, top=top)
     _require_needed("--plot FILE", plot is not None, {"--figure": figure})
     _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None})
     for option, number in (("--top", top), ("--jobs", jobs)):
@@ -163,10 +163,19 @@ def sweep_command(
     )
 
 
-def _require_sense(form: SweepForm, *, output: Path | None, sort: str | None, top: int | None) -> None:
+def _form_of(output: Path | None) -> SweepForm:
+    """Choose the form by the ending of a file."""
+    ending = "" if output is None else output.suffix.lower()
+    if ending == ".npz":
+        raise BusplanError(
+            f"--output {output}: a sweep writes no NumPy file; in Python, busplan.sweep(...) gives arrays, "
+            "and FILE.csv or FILE.jsonl holds every row"
+        )
+    return _ENDINGS.get(ending, "table")
+
+
+def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:
     """Refuse options that the form cannot follow."""
-    if form == "npz" and output is None:
-        refuse_terminal("npz")
     for option, value in (("--sort", sort), ("--top", top)):
         if value is not None and form not in TOP_FORMS:
             forms = f"{', '.join(TOP_FORMS[:-1])} or {TOP_FORMS[-1]}"

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 RowsForm = Literal["csv", "json", "jsonl"]
 """Forms of every row as text, written as it comes."""
-SweepForm = Literal[Form, RowsForm, "npz"]
+SweepForm = Literal[Form, RowsForm]
 ROWS_FORMS: Final = get_args(RowsForm)
 TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in ROWS_FORMS)
 """Forms of the rows at the top, for people."""

@@ -9,7 +9,7 @@ from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
 from busplan.cli.output import CANNOT, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.sweep_job import ROWS_FORMS, TOP_FORMS
-from busplan.cli.sweep_sinks import opened_sink
+from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def run_sweep(job: "SweepJob") -> None:
             # Opened before the work: a path that cannot be written is said at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
-            sink = stack.enter_context(opened_sink(job, file, tally))
+            sink = sink_for(job, file, tally)
             takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
             lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected

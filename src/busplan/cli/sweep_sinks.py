@@ -1,10 +1,7 @@
-"""Where the blocks of a sweep go: the rows at the top, rows as text, one JSON document or an archive of columns."""
+"""Where the blocks of a sweep go: the rows at the top, rows as text, or one JSON document."""
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol
 
 from busplan.cli.answering import give
@@ -16,7 +13,6 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import Block
     from busplan.answers.sweep.rows import Style
     from busplan.answers.sweep.top import Tally
-    from busplan.cli.npz import Archive, NpzColumns
     from busplan.cli.sweep_job import SweepJob
 
 
@@ -30,41 +26,20 @@ class Sink(Protocol):
         """End the document; without all blocks it is a partial one."""
 
 
-@contextmanager
-def opened_sink(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Iterator[Sink]:
+def sink_for(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Sink:
     """Where the document goes."""
     write = emit_document if file is None else partial(_write, file)
     match job.form:
         case "csv" | "jsonl":
-            yield _LinesSink(job, job.form, write)
+            return _LinesSink(job, job.form, write)
         case "json":
-            yield _JsonSink(job, write)
-        case "npz":
-            from busplan.cli.npz import NpzColumns
-
-            folder = Path(os.path.realpath(job.output)).parent if job.output else None
-            with NpzColumns(job.columns, folder=folder) as columns:
-                yield _NpzSink(job, file or _Pipe(), columns)
+            return _JsonSink(job, write)
         case _:
-            yield _TopSink(job, job.form, file, tally)
+            return _TopSink(job, job.form, file, tally)
 
 
 def _write(file: BinaryIO, text: str) -> None:
     file.write(document_bytes(text))
-
-
-class _Pipe:
-    """Standard output as a file that cannot go back, for an archive."""
-
-    def write(self, data: bytes, /) -> int:
-        emit_document(data)
-        return len(data)
-
-    def flush(self) -> None:
-        """Nothing is held back."""
-
-    def close(self) -> None:
-        """It stays open for others."""
 
 
 class _TopSink:
@@ -132,18 +107,3 @@ class _JsonSink:
         from busplan.answers.sweep.rows import json_footer
 
         self._write(json_footer(complete=complete))
-
-
-class _NpzSink:
-    """Collects columns, for an archive at the end."""
-
-    def __init__(self, job: "SweepJob", file: "Archive", columns: "NpzColumns") -> None:
-        self._job, self._file, self._columns = job, file, columns
-        self.add = columns.add
-
-    def finish(self, *, complete: bool) -> None:
-        """Write the archive, with what a reader must know of it."""
-        from busplan.answers.documents import document
-
-        facts = document("sweep", profile=self._job.profile.name, points=self._job.grid.points, complete=complete)
-        self._columns.write(self._file, facts)

@@ -8,7 +8,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.resource_tracker import ensure_running
 from threading import Thread
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from busplan.cli.interrupt import ENDING
 from busplan.errors import WorkerLostError
@@ -60,7 +60,7 @@ def _shared(pipes: list[Connection], function: Callable[[Task], Answer], tasks: 
     """Give each worker one task at a time."""
     left = enumerate(tasks)
     found: dict[int, Answer] = {}
-    free, busy = list(pipes), dict[Any, int]()
+    free, busy = list(pipes), dict[Connection, int]()
     while True:
         # First a worker, then a task: each task that is taken is handed out.
         for pipe, (place, task) in zip(free, left, strict=False):
@@ -99,7 +99,7 @@ def _work(pipe: Connection) -> None:
             pipe.send(_tried(function, task))
 
 
-def _tried(function: Callable[[Any], Any], task: Any) -> tuple[Any, Exception | None]:
+def _tried(function: Callable[[Task], Answer], task: Task) -> tuple[Answer | None, Exception | None]:
     """The answer, or the error, which the one that hands the work out tells."""
     try:
         return function(task), None

@@ -87,7 +87,7 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
     return buffer.getvalue()
 
 
-def metadata(file_format: str) -> dict[str, Any]:
+def metadata(file_format: str) -> dict[str, None]:
     """No date: the same test gives the same bytes."""
     return {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(file_format, {})
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from busplan.analysis.sweep.blocks import Block
-from busplan.analysis.sweep.grid import Grid
+from busplan.analysis.sweep.grid import Array, Grid
 from busplan.drawings.circle_plot import metadata, require_matplotlib
 from busplan.errors import BusplanError
 
@@ -109,7 +109,7 @@ class FigureData:
             axes.set_title(f"{self._models[number]} model")
         figure.colorbar(image, ax=figure.axes, label=self._figure)
 
-    def _places(self, key: str) -> tuple[Any, list[str] | None]:
+    def _places(self, key: str) -> tuple[Array, list[str] | None]:
         """Where a key's values lie along its axis, and what they are called where that is not by their number."""
         values = self._grid.axes[key].part(0, self._grid.axes[key].size)
         if values.dtype == object or not (np.diff(values) > 0).all():

@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -13,7 +13,7 @@ _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 """How a text begins that spreadsheets take for a formula: it may run a program, or send the sheet away."""
 
 
-def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+def to_csv(rows: Sequence[Mapping[str, object]]) -> str:
     """Write rows of the same keys as CSV with a header; a list becomes words with spaces between.
 
     Raises
@@ -24,7 +24,7 @@ def to_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return "".join(csv_blocks(rows, columns=list(rows[0]))) if rows else ""
 
 
-def csv_blocks(rows: Iterable[Mapping[str, Any]], *, columns: Sequence[str]) -> Iterator[str]:
+def csv_blocks(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
     """Write rows as CSV block by block, so that a long table needs no memory of its own.
 
     Raises

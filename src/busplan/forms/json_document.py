@@ -1,13 +1,12 @@
 """The record of an answer as one JSON document."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from busplan.forms.blocks import Report
 from busplan.printable import json_text
 
 
-def to_json(document: Mapping[str, Any]) -> str:
+def to_json(document: Mapping[str, object]) -> str:
     """Write one JSON document, indented, with a line end.
 
     Raises

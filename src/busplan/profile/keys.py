@@ -10,7 +10,7 @@ from busplan.sections.profile import Profile
 class KeyValue(NamedTuple):
     """The value of one key."""
 
-    value: Any
+    value: object
     """None where nothing is said and nothing is assumed."""
     source: Literal["file", "default"]
 
@@ -39,7 +39,7 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
     return {key: KeyValue(value, "file" if key in said else "default") for key, value in flat(profile.model_dump())}
 
 
-def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     """Yield dotted key and value of all that is no table."""
     for name, value in table.items():
         if isinstance(value, Mapping):

@@ -14,7 +14,7 @@ _NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
 """Sections of every profile that no cycle depends on; what a kind of bus adds to them is its cycle's."""
 
 
-def kind_of(data: Mapping[str, Any]) -> str | None:
+def kind_of(data: Mapping[str, object]) -> str | None:
     """The kind of bus that a profile's data names; None where it names none that is known."""
     section = data.get("bus")
     kind = section.get("kind") if isinstance(section, Mapping) else None

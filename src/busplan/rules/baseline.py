@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 from sys import float_info
-from typing import Any, Final
+from typing import Final
 
 from busplan.buses.rule import RuleProblem
 from busplan.errors import BusplanError
@@ -67,7 +67,7 @@ def read_baseline(text: str, *, name: str) -> dict[str, dict[str, float]]:
     return profiles
 
 
-def _are_figures(value: Any) -> bool:
+def _are_figures(value: object) -> bool:
     return isinstance(value, dict) and all(
         isinstance(one, int | float) and not isinstance(one, bool) and abs(one) <= float_info.max
         for one in value.values()

@@ -1,6 +1,6 @@
 """What all sections of a profile share: strictness, ranges, and errors in our own words."""
 
-from typing import Annotated, Any, Final, NamedTuple, TypeVar
+from typing import Annotated, Final, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -55,7 +55,7 @@ class Section(BaseModel):
 _Section = TypeVar("_Section", bound=Section)
 
 
-def with_unchecked(section: _Section, key: str, value: Any) -> _Section:
+def with_unchecked(section: _Section, key: str, value: object) -> _Section:
     """Return a copy with one key replaced, unvalidated.
 
     Parameters

@@ -93,8 +93,8 @@ class Parameter(NamedTuple):
     """One value that can be set."""
 
     name: str
-    type: Any
-    default: Any
+    type: object
+    default: object
     known: Known
 
 

@@ -5,7 +5,7 @@ the number of nodes is no polynomial, and says so.
 """
 
 from itertools import zip_longest
-from typing import Any, Final, Never
+from typing import Final, Never
 
 from busplan.elementwise import Number, SpecialNumber, choose, larger
 
@@ -14,7 +14,7 @@ class NoPolynomialError(ArithmeticError):
     """What was computed is no polynomial of the number of nodes, or none whose root has a closed form."""
 
 
-def _refuse(*_operands: Any, **_words: Any) -> Never:
+def _refuse(*_operands: object, **_words: object) -> Never:
     raise NoPolynomialError
 
 

@@ -5,7 +5,7 @@ Each figure is that of `capacity`, `latency` or `circle_test`; nothing is comput
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import inf, isclose, isfinite, log10
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeGuard
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, TypeGuard
 
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
@@ -82,6 +82,9 @@ def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
 
 
 _MARGINS: Final = ("phase_margin_deg", "gain_margin_db")
+
+_Figures: TypeAlias = Mapping[str, Any]
+"""Figures by key, as the answer has them."""
 
 
 class KeyDifference(NamedTuple):
@@ -231,21 +234,19 @@ def _figures(
         yield from _compared("circle", _CIRCLE, circle_a, circle_b)
 
 
-def _plan(profile: Profile) -> dict[str, Any]:
+def _plan(profile: Profile) -> _Figures:
     """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
     deciding = figures(profile, model=profile.bus.timing_model)
     return deciding.by_key() | {VERDICT_FITS.key: deciding.fits}
 
 
-def _cycle(profile: Profile, model: str) -> dict[str, Any]:
+def _cycle(profile: Profile, model: str) -> _Figures:
     """Figures of one cycle by name: those of `capacity`, and others that the bus compares."""
     found = figures(profile, model=model)
     return found.by_key() | dict(found.own)
 
 
-def _compared(
-    part: str, measures: Sequence[Figure], a: Mapping[str, Any], b: Mapping[str, Any]
-) -> Iterator[ComparedFigure]:
+def _compared(part: str, measures: Sequence[Figure], a: _Figures, b: _Figures) -> Iterator[ComparedFigure]:
     for measure in measures:
         of_a, of_b = a.get(measure.key), b.get(measure.key)
         noise = 0.0 if measure.scale is None else ROUNDING * max(side.get(measure.scale, 0.0) for side in (a, b))
@@ -261,7 +262,7 @@ def _compared(
         )
 
 
-def _judgement(measure: Figure, a: Mapping[str, Any], b: Mapping[str, Any], *, noise: float) -> Judgement:
+def _judgement(measure: Figure, a: _Figures, b: _Figures, *, noise: float) -> Judgement:
     of_a, of_b = a.get(measure.key), b.get(measure.key)
     rank_a, rank_b = _rank(measure, a), _rank(measure, b)
     if rank_a is None or rank_b is None:
@@ -274,7 +275,7 @@ def _judgement(measure: Figure, a: Mapping[str, Any], b: Mapping[str, Any], *, n
     return "better" if (rank_b > rank_a) == (measure.better == "more") else "worse"
 
 
-def _rank(measure: Figure, values: Mapping[str, Any]) -> float | None:
+def _rank(measure: Figure, values: _Figures) -> float | None:
     """A figure as a number that orders; None where it has no order."""
     value = values.get(measure.key)
     if measure.key == "passed":
@@ -294,5 +295,5 @@ def _share(change: float | None, of: Any, *, noise: float) -> float | None:
     return share if isfinite(share) else None
 
 
-def _is_number(value: Any) -> TypeGuard[float]:
+def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)

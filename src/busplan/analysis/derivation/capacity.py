@@ -3,19 +3,24 @@
 Only what is no operator is put into words here: words, truths, and a search's answer.
 """
 
-from typing import Any
+from typing import Final
 
-from busplan.analysis.capacity.cycle import available_us, cycle_of
-from busplan.analysis.capacity.figures import CapacityFigures, figures, numeric_figures
+from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures, numeric_figures
+from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.formulas import against
-from busplan.analysis.derivation.inputs import traced_profile
+from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import chosen, remembered
-from busplan.analysis.derivation.trace import Traced, short
-from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.derivation.origin import short
+from busplan.analysis.derivation.trace import Operand, Traced, found
+from busplan.analysis.network import bus_of, model_names, network_of
+from busplan.analysis.planning.cures import changeable, listed
 from busplan.buses.bus import Bus, Term
 from busplan.buses.figure import by_key
 from busplan.buses.network import Network
 from busplan.sections.profile import Profile
+
+_SENTENCES: Final = "sentences on what the command computes"
+VERDICT_KEYS: Final = ("models_agree", "cheapest_change", "warnings", "text")
 
 
 def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
@@ -36,55 +41,46 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     bus, plain = bus_of(profile), figures(profile, model=model)
     network = network_of(traced_profile(profile))
     cycle = bus.cycle(network, model=model)
-    found: dict[str, Any] = {
+    numbers: dict[str, Operand] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         **{term.key: term.us for term in cycle.terms},
         **cycle.figures(),
         **numeric_figures(cycle),
     }
     known = by_key(bus.capacity_figures)
-    named = {key: remembered(number, key, known[key].symbol) for key, number in found.items() if key in known}
-    limits = _limits(bus, network)
-    named["max_nodes"] = _max_nodes(profile, plain, (*limits, named["available_us"], named["required_us"]))
-    named["max_nodes"].named("max_nodes", known["max_nodes"].symbol)
-    named["max_axes"] = network.groups[0].axes * named["max_nodes"]
-    named |= _words(named, plain, cycle.terms, limits)
+    named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if key in known}
+    # The profile's own number of nodes plays no part in the largest one: this one is no input.
+    searched = network.with_nodes(Traced(plain.max_nodes + 1))
+    needed_us = bus.cycle(searched, model=model).required_us
+    most = found(
+        plain.max_nodes,
+        f"a search: the largest whole N with T_need <= alpha T_s, within the limits of {_limit_names(bus)}",
+        (*_limits(bus, searched), named["available_us"], needed_us),
+    ).named("max_nodes", known["max_nodes"].symbol)
+    named["max_nodes"], named["max_axes"] = most, network.groups[0].axes * most
+    named["limited_by"] = found(plain.limited_by, "a search: what keeps N_max + 1 nodes off the bus", (most,))
+    named |= _words(named, plain, cycle.terms, _limits(bus, network))
     for key, number in named.items():
         number.named(key, known[key].symbol)
     return named
 
 
-def _max_nodes(profile: Profile, plain: CapacityFigures, parts: tuple[Any, ...]) -> Traced:
-    """The largest number of nodes, with the neighbours that prove it."""
-    given_us, last = available_us(network_of(profile)), plain.max_nodes
-
-    def needs(nodes: int, sign: str) -> str:
-        needed_us = cycle_of(profile, model=plain.timing_model, nodes=nodes).required_us
-        return f"T_need({nodes}) = {against(needed_us, sign, given_us)}"
-
-    within = [needs(last, "<=")] if last else []
-    beyond = [needs(last + 1, ">")] if plain.limited_by == "time" else [f"limit: {plain.limited_by}"]
-    limits = " and ".join(limit.key for limit in bus_of(profile).limits if not limit.is_safety)
-    return Traced(
-        last,
-        formula=f"the largest whole N with T_need(N) <= alpha T_s, within the limits of {limits}",
-        numbers=", ".join((*within, *beyond)),
-        parts=parts,
-    )
+def _limit_names(bus: Bus) -> str:
+    return " and ".join(limit.key for limit in bus.limits if not limit.is_safety)
 
 
-def _limits(bus: Bus, network: Network) -> tuple[Any, ...]:
+def _limits(bus: Bus, network: Network) -> tuple[Operand, ...]:
     """The bus's own limits, and what each is for."""
     pairs = ((limit.value(network), limit.most(network)) for limit in bus.limits if not limit.is_safety)
     return tuple(one for pair in pairs for one in pair)
 
 
 def _words(
-    found: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Any, ...]
+    named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Operand, ...]
 ) -> dict[str, Traced]:
     """Figures that are words or truths."""
-    required, available = found["required_us"], found["available_us"]
-    sizes = tuple(found[term.key] for term in terms)
+    required, available = named["required_us"], named["available_us"]
+    sizes = tuple(named[term.key] for term in terms)
     broken = Traced(
         list(plain.exceeded),
         formula="which limits are exceeded, time among them",
@@ -98,12 +94,6 @@ def _words(
             numbers=f"the largest of {', '.join(short(one.value) for one in sizes)}",
             parts=sizes,
         ),
-        "limited_by": Traced(
-            plain.limited_by,
-            formula="what keeps N_max + 1 nodes off the bus",
-            numbers=f"what keeps {plain.max_nodes + 1} nodes off it",
-            parts=(found["max_nodes"],),
-        ),
         "exceeded": broken,
         "fits": Traced(
             plain.fits,
@@ -112,3 +102,22 @@ def _words(
             parts=(required, available, broken),
         ),
     }
+
+
+def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
+    """A figure of the verdict, which compares the models."""
+    others = (other for other in model_names(profile) if other != model)
+    (verdict,) = verdicts(capacity(profile, timing_models=(model, *others)))
+    bus, derived = bus_of(profile), [capacity_figures(profile, model=name) for name in model_names(profile)]
+    fits = tuple(figures["fits"] for figures in derived)
+    safety = () if bus.safety_figure is None else (bus.safety_figure.key,)
+    safe = tuple(figures[key] for figures in derived for key in safety)
+    if key == "models_agree":
+        return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
+    # The document's change and sentences are a reporter's; it puts them in the place of these.
+    if key == "cheapest_change":
+        purpose = "carries more nodes" if verdict.all_well else "makes every model fit on a bus that is set safely"
+        words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
+        return found(None, words, (*fits, *safe))
+    warned: tuple[Operand, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
+    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *safe, *warned))

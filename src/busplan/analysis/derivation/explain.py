@@ -1,21 +1,19 @@
 """Where a figure comes from: every step to it, in symbols and in numbers, and everything it starts from.
 
 Nothing is computed a second time by other means: the functions that give the figure are given traced numbers
-(`busplan.analysis.derivation.trace`).
+(`busplan.analysis.derivation.trace`). What no equation gives, as a simulation or a search, is one step that says so.
 """
 
 from collections.abc import Iterator, Sequence
-from difflib import get_close_matches
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.analysis.derivation.capacity import capacity_figures
+from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
 from busplan.analysis.derivation.formulas import written
 from busplan.analysis.derivation.latency import latency_figures, latency_names
-from busplan.analysis.derivation.trace import Input, Traced, inputs, lines
-from busplan.analysis.derivation.verdict import VERDICT_KEYS, verdict_figure
+from busplan.analysis.derivation.origin import Input
+from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.analysis.network import bus_of, model_names
-from busplan.analysis.register import HOLDERS, Command, figures_of
-from busplan.buses.bus import Bus
+from busplan.analysis.register import Command, figure_named, figures_of
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -52,7 +50,7 @@ class Step(NamedTuple):
     reference: str
     formula: str
     numbers: str
-    value: Any
+    value: object
     unit: str
 
 
@@ -65,7 +63,7 @@ class Derivation(NamedTuple):
     transaction: str | None
     """Of a figure of `latency`."""
     period_us: float
-    value: Any
+    value: object
     """As the command's JSON has it."""
     steps: tuple[Step, ...]
     """What is computed first comes first; the figure itself is last, unless it is an input."""
@@ -82,43 +80,6 @@ class Explanation(NamedTuple):
 
     profile: Profile
     derivations: tuple[Derivation, ...]
-
-
-def figure_named(name: str, *, bus: Bus) -> tuple[Command, Figure]:
-    """Find the figure that a name means.
-
-    Parameters
-    ----------
-    name
-        A key, as "required_us", or one with its command before it, as "circle-test.required_us". A key inside a figure,
-        as "removed_mm", means that figure.
-    bus
-        The kind of bus.
-
-    Raises
-    ------
-    BusplanError
-        There is none; those that are spelt alike are named.
-
-    Examples
-    --------
-    >>> from busplan.buses import kind_named
-    >>> figure_named("latency.gaps_us", bus=kind_named("ieee1394"))[1].meaning
-    'both gaps, after each transaction'
-    """
-    register = figures_of(bus)
-    for command, figures in register.items():
-        key = name.removeprefix(f"{command}.")
-        if key in figures and name in (key, f"{command}.{key}"):
-            return command, figures[key]
-    before, _, inner = name.rpartition(".")
-    held = HOLDERS.get(inner)
-    if held is not None and before in ("", held[0]):
-        return held[0], register[held[0]][held[1]]
-    known = [key for figures in register.values() for key in figures]
-    close = get_close_matches(name.rpartition(".")[2], known, n=3, cutoff=0.5)
-    hint = f", did you mean {' or '.join(dict.fromkeys(close))}" if close else ""
-    raise BusplanError(f"{name or repr(name)}: no such figure{hint}? Without a figure, explain lists them all")
 
 
 def explain(
@@ -173,7 +134,10 @@ def explain(
         for kind in kinds:
             for model in models:
                 traced = _traced(where, command, one.key, model=model, kind=kind, progress=progress)
-                found.append(_derivation(where, command, one, traced, model=model, kind=kind))
+                steps = tuple(_steps(where, traced, command, one))
+                found.append(
+                    Derivation(command, one, model, kind, period_us, traced.value, steps, tuple(inputs(traced)))
+                )
     return Explanation(profile, tuple(found))
 
 
@@ -217,36 +181,12 @@ def _traced(
     if command == "latency":
         return latency_figures(profile, model=model, kind=kind or "")[key]
     if command == "capacity":
-        return (
-            verdict_figure(profile, key, model=model)
-            if key in VERDICT_KEYS
-            else capacity_figures(profile, model=model)[key]
-        )
+        if key in VERDICT_KEYS:
+            return verdict_figure(profile, key, model=model)
+        return capacity_figures(profile, model=model)[key]
     from busplan.analysis.derivation.circle import circle_figures  # as above
 
     return circle_figures(profile, with_contributions=key == "contributions", progress=progress)[key]
-
-
-def _derivation(
-    profile: Profile,
-    command: Command,
-    figure: Figure,
-    traced: Traced,
-    *,
-    model: str,
-    kind: str | None,
-) -> Derivation:
-    steps = tuple(_steps(profile, traced, command, figure))
-    return Derivation(
-        command=command,
-        figure=figure,
-        timing_model=model,
-        transaction=kind,
-        period_us=profile.cycle.period_us,
-        value=traced.value,
-        steps=steps,
-        inputs=tuple(inputs(traced)),
-    )
 
 
 def _steps(profile: Profile, traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:

@@ -3,18 +3,8 @@
 from inspect import signature
 from typing import Final
 
-from busplan.analysis.derivation.trace import (
-    CHOSEN,
-    COMPARISON,
-    DIGITS,
-    FUNCTION,
-    OPERATIONS,
-    Input,
-    Operand,
-    Traced,
-    short,
-    value_of,
-)
+from busplan.analysis.derivation.origin import DIGITS, Input, short
+from busplan.analysis.derivation.trace import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Operand, Traced, value_of
 from busplan.sourced import SYMBOLS, Equation, Sourced
 
 _ATOM: Final = 4
@@ -103,8 +93,9 @@ def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[
         return _atom(short(operand.value) if in_numbers or not operand.symbol else operand.symbol)
     if operand.operation == CHOSEN:
         won = operand.parts[0]
-        by_name = isinstance(won, Sourced) and not in_numbers
-        return _atom(won.meaning) if by_name else _written(won, in_numbers=in_numbers)
+        if isinstance(won, Sourced) and not in_numbers:
+            return _atom(won.meaning)
+        return _written(won, in_numbers=in_numbers)
     return _joined(operand, [_written(part, in_numbers=in_numbers) for part in operand.parts], in_numbers=in_numbers)
 
 

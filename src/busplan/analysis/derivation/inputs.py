@@ -3,7 +3,8 @@
 from types import MappingProxyType
 from typing import Any, Final
 
-from busplan.analysis.derivation.trace import GivenTable, Input, Traced
+from busplan.analysis.derivation.origin import GivenTable, Input
+from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of
 from busplan.profile.kinds import cycle_keys
 from busplan.sections.base import with_unchecked

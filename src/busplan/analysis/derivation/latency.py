@@ -1,11 +1,11 @@
 """How the figures of `latency` are computed: the functions of the bus itself, given traced numbers."""
 
-from typing import Any
-
 from busplan.analysis.derivation.inputs import traced_profile
-from busplan.analysis.derivation.trace import Input, Traced, short, value_of
+from busplan.analysis.derivation.origin import Input, short
+from busplan.analysis.derivation.trace import Operand, Traced
 from busplan.analysis.network import bus_of, network_of
 from busplan.sections.profile import Profile
+from busplan.sourced import Sourced
 
 
 def latency_names(profile: Profile) -> tuple[str, ...]:
@@ -34,7 +34,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
     """
     bus, network = bus_of(profile), network_of(traced_profile(profile))
     (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.name == kind)
-    found: dict[str, Any] = {
+    found: dict[str, Operand | None] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         "transaction": chosen(kind, "transaction", "transaction asked for"),
         "payload_bytes": one.payload_bytes,
@@ -49,11 +49,10 @@ def chosen(word: object, key: str, meaning: str) -> Traced:
     return Traced(word, given=Input(key, key, str(word), "", "given", "asked for", meaning))
 
 
-def remembered(number: Any, key: str, symbol: str) -> Traced:
+def remembered(number: "Operand | None", key: str, symbol: str) -> Traced:
     """A figure with its name; a constant that nothing computed becomes a line of its own."""
-    plain = value_of(number)
-    words = getattr(number, "meaning", "") or short(plain)
-    found = (
-        number if isinstance(number, Traced) else Traced(plain, formula=words, numbers=short(plain), parts=(number,))
-    )
-    return found.named(key, symbol)
+    if isinstance(number, Traced):
+        return number.named(key, symbol)
+    if isinstance(number, Sourced):
+        return Traced(float(number), formula=number.meaning, numbers=short(number), parts=(number,)).named(key, symbol)
+    return Traced(number, formula=short(number), numbers=short(number)).named(key, symbol)

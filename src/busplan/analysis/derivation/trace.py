@@ -6,50 +6,21 @@ behind. What a line of a derivation shows is therefore what was executed, and no
 
 import operator
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import ceil
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
+from busplan.analysis.derivation.origin import GivenTable, Input, constant, short
 from busplan.elementwise import SpecialNumber
 from busplan.sourced import Sourced
-
-
-class Input(NamedTuple):
-    """A number that a derivation starts from.
-
-    Parameters
-    ----------
-    symbol
-        What stands for it in formulas.
-    name
-        Its key in the profile, or its name among the constants.
-    value
-        The number, or the word.
-    unit
-        Unit in words; "1" for a plain number, empty for a word.
-    grade
-        How well it is known: a `Grade`; "given" for what the profile sets and nobody measures.
-    source
-        Where it stands.
-    meaning
-        What it is, in one line.
-    """
-
-    symbol: str
-    name: str
-    value: float | str
-    unit: str
-    grade: str
-    source: str
-    meaning: str
 
 
 class _Operation(NamedTuple):
     sign: str
     rank: int
     """How tightly it holds its operands together; a function's brackets do."""
-    compute: Callable[..., Any]
+    compute: Callable[..., float]
 
 
 COMPARISON: Final = 0
@@ -72,14 +43,8 @@ OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
 )
 CHOSEN: Final = "chosen"
 """The operation that is the first of its parts; the others say why."""
-Operand = Any
+Operand: TypeAlias = "Traced | float"
 """A `Traced` number, a `Sourced` one, or a plain one."""
-
-
-class GivenTable(tuple[float, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
-    """Entries of a table that a profile gives, as one input of a derivation."""
-
-    given: Input
 
 
 class Traced(SpecialNumber):
@@ -126,31 +91,31 @@ class Traced(SpecialNumber):
             self.key, self.symbol = key, symbol
         return self
 
-    def __add__(self, other: Operand) -> Any:
+    def __add__(self, other: Operand) -> "Traced":
         return _computed("add", self, other)
 
-    def __radd__(self, other: Operand) -> Any:
+    def __radd__(self, other: Operand) -> "Traced":
         return _computed("add", other, self)
 
-    def __sub__(self, other: Operand) -> Any:
+    def __sub__(self, other: Operand) -> "Traced":
         return _computed("sub", self, other)
 
-    def __rsub__(self, other: Operand) -> Any:
+    def __rsub__(self, other: Operand) -> "Traced":
         return _computed("sub", other, self)
 
-    def __mul__(self, other: Operand) -> Any:
+    def __mul__(self, other: Operand) -> "Traced":
         return _computed("mul", self, other)
 
-    def __rmul__(self, other: Operand) -> Any:
+    def __rmul__(self, other: Operand) -> "Traced":
         return _computed("mul", other, self)
 
-    def __truediv__(self, other: Operand) -> Any:
+    def __truediv__(self, other: Operand) -> "Traced":
         return _computed("truediv", self, other)
 
-    def __rtruediv__(self, other: Operand) -> Any:
+    def __rtruediv__(self, other: Operand) -> "Traced":
         return _computed("truediv", other, self)
 
-    def __pow__(self, other: Operand) -> Any:
+    def __pow__(self, other: Operand) -> "Traced":
         return _computed("pow", self, other)
 
     # Compared with anything it gives a traced truth; found again by what it is, not by what it equals.
@@ -159,40 +124,40 @@ class Traced(SpecialNumber):
     def __eq__(self, other: object) -> Any:
         return _computed("eq", self, other)
 
-    def __lt__(self, other: Operand) -> Any:
+    def __lt__(self, other: Operand) -> "Traced":
         return _computed("lt", self, other)
 
-    def __le__(self, other: Operand) -> Any:
+    def __le__(self, other: Operand) -> "Traced":
         return _computed("le", self, other)
 
-    def __gt__(self, other: Operand) -> Any:
+    def __gt__(self, other: Operand) -> "Traced":
         return _computed("gt", self, other)
 
-    def __ge__(self, other: Operand) -> Any:
+    def __ge__(self, other: Operand) -> "Traced":
         return _computed("ge", self, other)
 
     def __bool__(self) -> bool:
         return bool(self.value)
 
-    def larger_of(self, one: Operand, other: Operand) -> Any:
+    def larger_of(self, one: Operand, other: Operand) -> "Traced":
         """The larger of two numbers."""
         return Traced(max(value_of(one), value_of(other)), operation="larger", parts=(one, other))
 
-    def chosen(self, condition: Operand, yes: Operand, no: Operand) -> Any:
+    def chosen(self, condition: Operand, yes: Operand, no: Operand) -> "Traced":
         """`yes` where the condition holds, else `no`."""
         won = yes if value_of(condition) else no
         return Traced(value_of(won), operation=CHOSEN, parts=(won, condition))
 
-    def rounded_up(self) -> Any:
+    def rounded_up(self) -> "Traced":
         """The next whole number."""
         return Traced(ceil(self.value), operation="rounded_up", parts=(self,))
 
-    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Operand, ...]) -> Any:
+    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Operand, ...]) -> "Traced":
         """The entry of a table at this place."""
         index = min(int(self.value), len(table) - 1)
         return Traced(table[index], formula=words, numbers=f"entry {index + 1} of {len(table)}", parts=(self, *sources))
 
-    def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> Any:
+    def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> "Traced":
         """The value at this place, linear between points."""
         index = bisect_left(places, self.value)
         sources = tuple(Traced(one, given=one.given) for one in (values,) if isinstance(one, GivenTable))
@@ -203,52 +168,52 @@ class Traced(SpecialNumber):
         found = y0 + (y1 - y0) * (self - x0) / (x1 - x0)
         return Traced(found.value, operation=CHOSEN, parts=(found, *sources))
 
-    def constant(self, number: Operand) -> Any:
+    def constant(self, number: Operand) -> Operand:
         """Give a constant as an input of the derivation."""
         return Traced(float(number), given=constant(number)) if isinstance(number, Sourced) else number
 
-    def worded(self, words: str) -> Any:
+    def worded(self, words: str) -> "Traced":
         """Say where the number comes from."""
         return Traced(self.value, formula=words, numbers=short(self.value), parts=(self,))
 
 
-def value_of(operand: Operand) -> Any:
+def found(value: object, words: str, parts: Iterable[Operand]) -> Traced:
+    """A result that no equation gives, as that of a search or a simulation: it has no steps, but all their inputs.
+
+    Parameters
+    ----------
+    value
+        The result.
+    words
+        What gives it.
+    parts
+        What that starts from.
+    """
+    leaves = inputs(Traced(value, parts=tuple(parts)))
+    return Traced(value, formula=words, parts=tuple(Traced(leaf.value, given=leaf) for leaf in leaves))
+
+
+def value_of(operand: Operand) -> float:
     """Give the plain number behind any operand."""
-    found = operand.value if isinstance(operand, Traced) else operand
+    found: float = operand.value if isinstance(operand, Traced) else operand
     return float(found) if isinstance(found, Sourced) else found
 
 
-def _computed(name: str, left: Operand, right: Operand) -> Any:
+def _computed(name: str, left: Any, right: Any) -> Traced:
     """The result of an operation; a plain 0 or 1 that changes nothing leaves no trace."""
-    for one, other in ((left, right), (right, left)):
-        if (_is_switch(one, 0) and name == "add") or (_is_switch(one, 1) and name == "mul"):
-            return other
-    if _is_switch(right, 0 if name == "sub" else 1) and name in ("sub", "truediv"):
+    if isinstance(right, Traced) and name in ("add", "mul") and _is_switch(left, _NEUTRAL[name]):
+        return right
+    if isinstance(left, Traced) and name in _NEUTRAL and _is_switch(right, _NEUTRAL[name]):
         return left
     compute = OPERATIONS[name].compute
     return Traced(compute(value_of(left), value_of(right)), operation=name, parts=(left, right))
 
 
+_NEUTRAL: Final = MappingProxyType({"add": 0, "sub": 0, "mul": 1, "truediv": 1})
+
+
 def _is_switch(operand: Operand, value: int) -> bool:
     return not isinstance(operand, (Traced, Sourced)) and operand == value
-
-
-DIGITS: Final = 7
-
-
-def short(value: object) -> str:
-    """Write a number with as many digits as a reader puts into a pocket calculator.
-
-    Examples
-    --------
-    >>> short(393.216), short(4000.0), short(2.38808777), short(True), short("time"), short(None)
-    ('393.216', '4000', '2.388088', 'yes', 'time', '-')
-    """
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:.{DIGITS}g}" if isinstance(value, (int, float)) else str(value)
 
 
 def lines(figure: Traced) -> Iterator[Traced]:
@@ -264,21 +229,6 @@ def inputs(figure: Traced) -> Iterator[Input]:
             if leaf is not None:
                 found.setdefault((leaf.name, leaf.symbol), leaf)
     yield from found.values()
-
-
-def constant(number: Sourced) -> Input:
-    """Give a sourced constant as an input; without a symbol of its own, formulas show its value.
-
-    Examples
-    --------
-    >>> from busplan.buses.ieee1394.constants import DATA_END_US
-    >>> constant(DATA_END_US)[:4]
-    ('0.25', 'DATA_END_US', 0.25, 'us')
-    """
-    value = float(number)
-    return Input(
-        number.symbol or short(value), number.name, value, number.unit, number.grade, number.source, number.meaning
-    )
 
 
 def _visit(one: Traced, seen: set[int]) -> Iterator[Traced]:

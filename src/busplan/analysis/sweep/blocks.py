@@ -6,7 +6,7 @@ lie along an axis of their own; what a figure does not depend on costs it nothin
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,11 +16,17 @@ from busplan.analysis.capacity.node_limit import most_nodes
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
 from busplan.buses.figure import Sort
+from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays stay in the processor's cache."""
+
+Word: TypeAlias = str | float | list[str]
+"""What stands in a column that is no array of numbers: a word, a value of a key that also takes words, or a list."""
+Cell: TypeAlias = Word | None
+"""One figure of one row."""
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
 
@@ -40,7 +46,7 @@ class Column(NamedTuple):
 
     values: Array
     """Numbers, truths, or the places of its words; broadcasts to the chunk's shape. NaN is what does not exist."""
-    words: tuple[Any, ...] | None = None
+    words: tuple[Word, ...] | None = None
 
 
 class Block(NamedTuple):
@@ -56,15 +62,15 @@ class Block(NamedTuple):
         """One column under each timing model."""
         return [(self.varied if name in self.varied else figures)[name] for figures in self.models]
 
-    def row(self, index: int, names: Sequence[str]) -> dict[str, Any]:
+    def row(self, index: int, names: Sequence[str]) -> dict[str, Cell]:
         """One row: a point under one timing model, by its place among `rows`."""
         point, model = divmod(index, len(self.models))
         where = np.unravel_index(point, self.chunk.shape)
         return {name: self._value(self.columns(name)[model], where) for name in names}
 
-    def _value(self, column: Column, where: tuple[Any, ...]) -> Any:
-        found = np.broadcast_to(column.values, self.chunk.shape)[where].item()
-        return found if column.words is None else column.words[found]
+    def _value(self, column: Column, where: tuple[np.intp, ...]) -> Cell:
+        found: float = np.broadcast_to(column.values, self.chunk.shape)[where].item()
+        return found if column.words is None else column.words[int(found)]
 
     def rows(self, name: str) -> Array:
         """One column as plain values: a point after the other, a timing model after the other within each."""
@@ -150,7 +156,7 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     late = np.logical_not(fits_in(numbers["required_us"], available_us=numbers["available_us"]))
     flags = [late if limit.key == TIME else limit.is_broken(network) for limit in limits]
     bits = np.min_scalar_type((1 << len(flags)) - 1)
-    exceeded: Any = sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags))
+    exceeded: Number = sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags))
     most = most_nodes(network, model=model)
     numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)
@@ -173,20 +179,20 @@ def _combinations(keys: tuple[str, ...]) -> tuple[list[str], ...]:
     return tuple([key for bit, key in enumerate(keys) if code >> bit & 1] for code in range(1 << len(keys)))
 
 
-def _typed(number: Any, sort: Sort) -> Array:
+def _typed(number: Number, sort: Sort) -> Array:
     """Counts as whole numbers and all else as `capacity` has it, whatever it was computed in."""
     return np.asarray(number, dtype=_TYPES[sort])
 
 
-def _with_axes(values: Any, axes: int) -> Array:
+def _with_axes(values: Number, axes: int) -> Array:
     found = np.asarray(values)
     return found.reshape((1,) * axes) if found.ndim == 0 else found
 
 
-def _largest(terms: list[Any]) -> Any:
+def _largest(terms: list[Number]) -> Number:
     """Place of the largest of some terms, the first of equals."""
-    best: Any = terms[0]
-    place: Any = np.uint8(0)
+    best: Number = terms[0]
+    place: Number = np.uint8(0)
     for index, term in enumerate(terms[1:], start=1):
         place = np.where(np.greater(term, best), np.uint8(index), place)
         best = np.maximum(term, best)

@@ -1,7 +1,7 @@
 """Circle tests over a grid: one for each point and timing model, in any order and in any process."""
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
 from busplan.analysis.network import model_names
 from busplan.analysis.sweep.blocks import Block, Column, figure_names
-from busplan.analysis.sweep.grid import Grid
+from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -118,7 +118,7 @@ def with_circles(
     )
 
 
-def _array(values: Sequence[Any]) -> Any:
+def _array(values: Sequence[float | None]) -> Array:
     """Truths as they are, and numbers with NaN for what was not simulated or does not exist."""
     if all(isinstance(value, bool) for value in values):
         return np.array(values, dtype=bool)

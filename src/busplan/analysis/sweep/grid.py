@@ -8,12 +8,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from busplan.buses.bus import Value
 from busplan.errors import BusplanError
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
+"""Numbers, truths, or objects where there are words among them."""
 
 _CHECKED_EACH: Final = 100
 """Values of one key that are checked one by one; of more, the extremes: every range of the profile is an interval."""
@@ -24,7 +26,7 @@ MAX_POINTS: Final = 10**12
 class Listed(NamedTuple):
     """Values one by one: numbers, and words where the profile knows them."""
 
-    values: tuple[int | float | str, ...]
+    values: tuple[Value, ...]
 
     @property
     def size(self) -> int:
@@ -230,7 +232,7 @@ def _require_read(profile: Profile, key: str, *, name: str, circle_option: str |
         raise BusplanError(f"{name}: no figure of capacity depends on it; add {circle_option} to run circle tests")
 
 
-def _samples(axis: Values) -> list[Any]:
+def _samples(axis: Values) -> list[Value]:
     """Values to check: each, or of many the extremes and a fraction if there is one; whole numbers may be counts."""
     if isinstance(axis, Listed):
         if axis.size <= _CHECKED_EACH:
@@ -246,10 +248,10 @@ def _samples(axis: Values) -> list[Any]:
     return [int(value) if isinstance(value, float) and value.is_integer() else value for value in values]
 
 
-def _least(values: list[Any]) -> Any:
+def _least(values: list[Value]) -> Value:
     return min((one for one in values if not isinstance(one, str)), default=values[0])
 
 
-def _greatest(values: list[Any]) -> Any:
+def _greatest(values: list[Value]) -> Value:
     words = [one for one in values if isinstance(one, str)]
     return words[0] if words else max(values)

@@ -7,12 +7,13 @@ OASIS, Static Analysis Results Interchange Format (SARIF) Version 2.1.0.
 
 import os
 from pathlib import Path, PurePath
-from typing import Any, Final
+from typing import Final
 from urllib.parse import quote
 
 from busplan import __version__
 from busplan.answers.gate import GateFormat
 from busplan.buses.rule import Rule
+from busplan.forms.blocks import Document
 from busplan.printable import json_text
 from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport, Located
@@ -49,7 +50,7 @@ class Sarif(GateFormat):
         return json_text(document, indent=2) + "\n"
 
 
-def _rule(rule: Rule) -> dict[str, Any]:
+def _rule(rule: Rule) -> Document:
     return {
         "id": rule.code,
         "name": "".join(word.capitalize() for word in rule.name.split("-")),
@@ -60,7 +61,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
     }
 
 
-def _result(one: Located) -> dict[str, Any]:
+def _result(one: Located) -> Document:
     finding = one.finding
     return {
         "ruleId": finding.code,

@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.capacity.verdict import verdicts
@@ -82,7 +82,7 @@ def sources(answer: AllAnswers, *, argument: str, key: str, other_period: bool) 
     each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
     found: dict[str, Source] = {}
 
-    def add(name: str, purpose: str, document: dict[str, Any], *options: str) -> None:
+    def add(name: str, purpose: str, document: Document, *options: str) -> None:
         words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
         found[name] = Source(Command(" ".join(words), purpose, f"{key}-{name}"), document)
 

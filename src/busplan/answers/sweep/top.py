@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isnan
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.sweep.blocks import Block
+from busplan.analysis.sweep.grid import Array
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.forms.blocks import (
@@ -116,7 +117,7 @@ class Tally:
         return joined(*parts, by=" and ")
 
 
-def _share(flags: Any, points: int) -> int:
+def _share(flags: Array, points: int) -> int:
     """How many points of a block a flag holds for, from its values before they broadcast."""
     count = int(flags.sum())
     return count * (points // int(flags.size))

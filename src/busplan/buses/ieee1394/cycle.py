@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Limit, Term
 from busplan.buses.figure import AVAILABLE
@@ -228,7 +228,7 @@ def _parts(phases: Phases) -> Iterator[BusEvent]:
     yield BusEvent("arbitration_reset_gap", gaps, phases.arbitration_reset_gap_us, "arbitration reset gap")
 
 
-def _most_payload(network: Network) -> Any:
+def _most_payload(network: Network) -> Number:
     return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
 
 

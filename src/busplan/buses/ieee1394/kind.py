@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus, EventKind, Halves, Limit, PayloadRange, Setting, TimingModel, Value
-from busplan.buses.figure import NONPERIODIC, Figure, by_key
+from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _PHASES: Final = by_key(figures.LATENCY)
 
 
-def _kind(key: str, label: str, phase: str, mark: str, ink: Any) -> EventKind:
+def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
     return EventKind(key, label, _PHASES[phase].reference, mark, ink)
 
 
