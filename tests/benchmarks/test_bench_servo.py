@@ -1,6 +1,6 @@
 """How fast the servo core is, as ratios within one run; nothing is asserted about time.
 
-`pytest tests/benchmarks --numprocesses=0 --benchmark-enable` prints the table; the ratio to C stands in `extra_info`
+`pytest tests/benchmarks --benchmark-enable` prints the table; the ratio to C stands in `extra_info`
 of the saved JSON.
 """
 
