@@ -168,11 +168,8 @@ class _Scanner:
 
     def close(self, path: KeyPath, start: int) -> None:
         """Set the value span of a key that has one; an element of an array is its own key."""
-        known = self.places.get(path)
-        if known is None:
-            self.places[path] = Place(start, self.at, start, self.at)
-        else:
-            self.places[path] = Place(known.key_start, known.key_end, start, self.at)
+        key_start, key_end = self.places.get(path, (start, self.at))[:2]
+        self.places[path] = Place(key_start, key_end, start, self.at)
 
     def key_and_value(self, table: KeyPath) -> None:
         """Read one key = value, with everything inside the value."""
