@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from busplan.errors import BusplanError, PlacedError
-from busplan.profile.document import Document
+from busplan.profile.document import Document, TomlTable
 from busplan.profile.layout import Layout, canonical
 from busplan.profile.positions import KeyPath
 from busplan.profile.toml import decode, validate
@@ -94,7 +94,7 @@ def edited_file(
     return result
 
 
-def _check(name: str, text: str, wanted: dict[str, Any]) -> None:
+def _check(name: str, text: str, wanted: TomlTable) -> None:
     """Refuse a text that is no profile or has other data than asked for."""
     try:
         validate(Document(name, text))
@@ -105,7 +105,7 @@ def _check(name: str, text: str, wanted: dict[str, Any]) -> None:
         raise BusplanError(f"{name}: the layout of the file cannot take the changes; make them by hand")
 
 
-def _change(data: dict[str, Any], path: KeyPath, value: object) -> None:
+def _change(data: TomlTable, path: KeyPath, value: object) -> None:
     """Make a change in the data as `Layout.changed` makes it in the text."""
     table: Any = data
     for part in path[:-1]:

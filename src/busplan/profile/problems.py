@@ -10,7 +10,7 @@ from pydantic_core import ErrorDetails
 from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.printable import printable
-from busplan.profile.document import Document
+from busplan.profile.document import Document, TomlTable
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_model
 from busplan.profile.positions import KeyPath, Place
 
@@ -66,7 +66,7 @@ def _quoted(part: str) -> str:
     return '"' + printable(escaped, write=lambda one: f"\\U{ord(one):08x}") + '"'
 
 
-def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
+def findings(error: ValidationError, data: TomlTable) -> Iterator[KeyFinding]:
     """Translate a validation error.
 
     Parameters
@@ -105,7 +105,7 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
     yield from _unknown_kind(data)
 
 
-def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
+def _unknown_kind(data: TomlTable) -> Iterator[KeyFinding]:
     """The kind of bus, where it is a text and none that is known: it says which other keys there are."""
     bus = data.get("bus")
     if kind_of(data) is None and isinstance(bus, dict) and isinstance(bus.get("kind"), str):
@@ -135,7 +135,7 @@ def _tag(model: type[BaseModel]) -> tuple[Any, ...]:
     return get_args(model.model_fields[_TAG].annotation) if _TAG in model.model_fields else ()
 
 
-def _tags(path: KeyPath, data: dict[str, Any]) -> tuple[str, list[str]]:
+def _tags(path: KeyPath, data: TomlTable) -> tuple[str, list[str]]:
     """The key that chooses the member of a union, and its words."""
     field = _section(path, data).model_fields[str(path[-1])]
     return _TAG, [str(tag) for one in models_of(field.annotation) for tag in _tag(one)]
@@ -159,7 +159,7 @@ def _expected(details: ErrorDetails) -> str:
     return details["msg"]
 
 
-def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
+def _section(path: KeyPath, data: TomlTable) -> type[BaseModel]:
     """The model of the table that holds `path`."""
     section: type[BaseModel] = profile_model(kind_of(data))
     table: Any = data
@@ -171,7 +171,7 @@ def _section(path: KeyPath, data: dict[str, Any]) -> type[BaseModel]:
     return section
 
 
-def _missing(path: KeyPath, data: dict[str, Any]) -> str:
+def _missing(path: KeyPath, data: TomlTable) -> str:
     field = _section(path, data).model_fields[str(path[-1])]
     if not field.examples:
         needed = [name for name, one in _section((*path, ""), data).model_fields.items() if one.is_required()]
@@ -180,7 +180,7 @@ def _missing(path: KeyPath, data: dict[str, Any]) -> str:
     return f"missing key. {field.description}; for example {path[-1]} = {example}"
 
 
-def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
+def _unknown(path: KeyPath, data: TomlTable) -> str:
     known = list(_section(path, data).model_fields)
     close = get_close_matches(str(path[-1]), known, n=1)
     if close:
@@ -188,7 +188,7 @@ def _unknown(path: KeyPath, data: dict[str, Any]) -> str:
     return f"unknown key; known here: {', '.join(known)}"
 
 
-def refusal(error: ValidationError | None, data: dict[str, Any], document: Document) -> PlacedError:
+def refusal(error: ValidationError | None, data: TomlTable, document: Document) -> PlacedError:
     """Make the error for a document: every problem at its place, in the order of places.
 
     Parameters
@@ -235,7 +235,7 @@ def _shortened(written: str, limit: int = 40) -> str:
 
 
 def refused_changes(
-    error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
+    error: ValidationError | None, data: TomlTable, changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:
     """Make the error for changes of a profile: each problem with the option or key that asked for it."""
     messages = []
