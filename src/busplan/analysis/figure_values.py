@@ -1,12 +1,15 @@
 """Figures that only some kinds of bus have, as an answer holds them."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Never
+from typing import Any, Never, TypeAlias
 
 from busplan.sourced import Sourced
 
+FigureValue: TypeAlias = float | str | None
+"""A number, a count, a truth or a word; None where it does not exist."""
 
-class FigureValues(Mapping[str, Any]):
+
+class FigureValues(Mapping[str, FigureValue]):
     """Figures by key, and as attributes; like all of an answer they do not change, and travel between processes.
 
     Parameters
@@ -23,13 +26,13 @@ class FigureValues(Mapping[str, Any]):
 
     __slots__ = ("_values",)
 
-    _values: Mapping[str, Any]
+    _values: Mapping[str, FigureValue]
 
-    def __init__(self, values: Mapping[str, Any]) -> None:
+    def __init__(self, values: Mapping[str, FigureValue]) -> None:
         plain = {key: float(value) if isinstance(value, Sourced) else value for key, value in values.items()}
         object.__setattr__(self, "_values", plain)
 
-    def __getitem__(self, key: str) -> Any:
+    def __getitem__(self, key: str) -> FigureValue:
         return self._values[key]
 
     def __iter__(self) -> Iterator[str]:
@@ -50,7 +53,7 @@ class FigureValues(Mapping[str, Any]):
     def __hash__(self) -> int:
         return hash(frozenset(self._values.items()))
 
-    def __reduce__(self) -> tuple[type["FigureValues"], tuple[dict[str, Any]]]:
+    def __reduce__(self) -> tuple[type["FigureValues"], tuple[dict[str, FigureValue]]]:
         return FigureValues, (dict(self._values),)
 
     def __repr__(self) -> str:

@@ -7,13 +7,15 @@ from codecs import BOM_UTF8
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from busplan.errors import PlacedError, PlacedProblem
 
 if TYPE_CHECKING:
     from busplan.profile.positions import KeyPath, Place
 
+TomlTable: TypeAlias = dict[str, Any]
+"""A table of a TOML document as Python reads it."""
 _TOMLLIB_MESSAGE: Final = r"(?s)(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)\Z"
 _LONG_INTEGER: Final = r"[0-9_]{4000,}"
 _MAX_NESTING: Final = 100
@@ -102,7 +104,7 @@ class Document:
         line, column = self.lines.line_and_column(offset)
         return PlacedError(self.name, (PlacedProblem(line, column, "syntax", message),))
 
-    def data(self) -> dict[str, Any]:
+    def data(self) -> TomlTable:
         """Parse the text.
 
         Raises
