@@ -243,7 +243,9 @@ def test_html_has_the_style_of_its_drawings_once() -> None:
 def test_markdown_has_mermaid_where_a_drawing_has_it() -> None:
     text = render(answer(*one_of_each()), "markdown")
     assert "```mermaid\ngantt\n```" in text
-    assert text.startswith("# An answer for `p`\n")
+    assert text.startswith("### An answer for `p`\n")
+    assert render(answer()._replace(is_page=True), "markdown") == "# An answer for `p`\n"
+    assert render(answer(Sentence(("Alone.",)))._replace(is_page=True), "table") == "An answer for p\nAlone.\n"
     assert render(answer(Sentence(("Alone.",))), "markdown") == "### An answer for `p`\n\nAlone.\n"
 
 

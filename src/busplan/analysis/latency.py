@@ -1,11 +1,12 @@
 """Latency on the bus: a profile in, every part of what takes time under each timing model out."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses.bus import BusLatency
+from busplan.elementwise import Number
 from busplan.errors import BusplanError
 from busplan.sections.base import with_unchecked
 from busplan.sections.execution import TableExecution
@@ -73,12 +74,17 @@ def latency(
     return LatencyResult(
         profile.name,
         tuple(
-            Transaction(model, one.name, one.payload_bytes, profile.bus.nodes, FigureValues(one.phases))
+            Transaction(model, one.name, one.payload_bytes, profile.bus.nodes, FigureValues(_whole_bytes(one.phases)))
             for variant in variants
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
             for model, one in zip(models, alike, strict=True)
         ),
     )
+
+
+def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, Number]:
+    """Phases with the sizes of packets as whole numbers."""
+    return {key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}
 
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:

@@ -7,7 +7,7 @@ from typing import Final
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
-from busplan.answers.circle_verdict import circle_sentences, servo_sentence, setup_values, source_words
+from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence, setup_values, source_words
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
 from busplan.buses.figure import by_key
@@ -74,17 +74,38 @@ def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
     ranked = [
         result.contributions for result in test.results if with_contributions and result.contributions is not None
     ]
-    if any(ranked):
-        yield ACT_TOGETHER
-    elif ranked:
-        yield NO_SOURCES
+    if with_contributions:
+        yield from (
+            contributions_table(one, at=at) for one, at in zip(test.results, places, strict=True) if one.contributions
+        )
+    if ranked:
+        yield ACT_TOGETHER if any(ranked) else NO_SOURCES
     for result, run, at in zip(test.results, test.runs, places, strict=True):
-        if with_contributions and result.contributions:
-            yield contributions_table(result, at=at)
-        contour = drawn_profile(run)
-        if contour is not None:
-            chart = circle_chart(contour, result, test.profile, at=at)
-            yield chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result, at=at))
+        # Of a cycle that does not fit there is no circle to speak of, and the verdict says why.
+        if result.stable is not None:
+            yield circle_drawing(drawn_profile(run), result, test.profile, at=at)
+
+
+def circle_drawing(
+    contour: ContourProfile | None, result: CircleFigures, profile: Profile, *, at: str
+) -> Chart | Sentence:
+    """The circle with its error magnified, or why it is not drawn.
+
+    Parameters
+    ----------
+    contour
+        Contour error around the circle; None where there is none to speak of.
+    result
+        The circle test at one period.
+    profile
+        The network and its tolerances.
+    at
+        Place of its figures in the JSON document.
+    """
+    if contour is None:
+        return Sentence(("Not drawn: ", *failure_words(result, at=at).parts, "."))
+    chart = circle_chart(contour, result, profile, at=at)
+    return chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result, at=at))
 
 
 def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:

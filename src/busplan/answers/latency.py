@@ -82,7 +82,7 @@ def latency_records(result: LatencyResult) -> list[Record]:
 def _record(transaction: Transaction) -> Record:
     record = transaction._asdict()
     phases = record.pop("phases")
-    return {**record, **{key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}}
+    return {**record, **phases}
 
 
 def latency_document(result: LatencyResult) -> Document:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from busplan.profile.toml import LoadedProfile
     from busplan.sections.profile import Profile
 
+_PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
 
 
@@ -119,6 +120,11 @@ def plan_command(
     Example: busplan plan paper-1ms --axes 16
     """
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
+    if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
+        raise BusplanError(
+            f"--output {output}: expected a name ending in .toml for the profile, or in {', '.join(ENDINGS)} for the "
+            "report"
+        )
     new = None if report_file is not None else output
     _check_options(nodes=nodes, axes=axes, apply=apply, new=new, force=force, format_=format_)
     piped = new == STANDARD_OUTPUT

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import ProfileArgument, TimingOption, output_option, plot_format, timing_models
+from busplan.cli.options import ProfileArgument, TimingOption, form_of_file, output_option, plot_format, timing_models
 from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.errors import BusplanError
@@ -50,7 +50,7 @@ def sweep_command(
     ] = None,
     output: Annotated[
         Path | None,
-        output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}, or as a table to any other name"),
+        output_option(f"Write the answer to FILE{', '.join(_ENDINGS)}"),
     ] = None,
     columns: Annotated[
         str | None,
@@ -171,7 +171,7 @@ def _form_of(output: Path | None) -> SweepForm:
             f"--output {output}: a sweep writes no NumPy file; in Python, busplan.sweep(...) gives arrays, "
             "and FILE.csv or FILE.jsonl holds every row"
         )
-    return _ENDINGS.get(ending, "table")
+    return form_of_file(None, output, forms=_ENDINGS, default="table")
 
 
 def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:

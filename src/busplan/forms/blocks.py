@@ -235,6 +235,8 @@ class Report(NamedTuple):
     """For JSON: the record, and not the blocks."""
     records: Callable[[], Sequence[Record]] | None = None
     """For CSV: the rows of the record; None where they are no one table."""
+    is_page: bool = False
+    """Whether it is a page of its own, whose title stands in every form; other answers may be part of one."""
 
 
 def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:

@@ -9,12 +9,13 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.printable import printable
 
-Tone = Literal["passes", "fails", "warns", "heading", "neutral", "drawn"]
-"""How a line is meant: a state, a heading, words, or what keeps its columns, as a line of a table."""
+Tone = Literal["passes", "fails", "warns", "title", "heading", "neutral", "drawn"]
+"""How a line is meant: a state, a title, words, or what keeps its columns: headings and lines of a table."""
 _STYLES: Final[dict[Tone, str]] = {
     "passes": "bold green",
     "fails": "bold red",
     "warns": "yellow",
+    "title": "bold",
     "heading": "bold",
     "neutral": "",
     "drawn": "",

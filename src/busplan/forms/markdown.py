@@ -29,7 +29,7 @@ from busplan.forms.markdown_words import code, escaped, table
 from busplan.forms.numbers import with_unit
 
 _COMMENT_LEVEL: Final = 3
-"""Level of the title of what has no sections: it is read inside another page, as a comment on a change."""
+"""Level of the title of what is no page: it is read inside another one, as a comment on a change."""
 
 
 def text(report: Report) -> str:
@@ -41,7 +41,7 @@ def text(report: Report) -> str:
         The answer.
     """
     blocks = report.blocks()
-    level = 1 if any(isinstance(block, Chapter) for block in blocks) else _COMMENT_LEVEL
+    level = 1 if report.is_page else _COMMENT_LEVEL
     lines = (f"{'#' * level} {_sentence(report.title)}", *_blocks(blocks, level=level + 1))
     return "\n".join(lines) + "\n"
 

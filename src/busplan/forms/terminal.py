@@ -39,7 +39,8 @@ def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
     styled
         Whether to write for a terminal, with its colours.
     """
-    lines = block_lines(report.blocks(), width=width)
+    blocks = [Chapter(report.title, tuple(report.blocks()))] if report.is_page else report.blocks()
+    lines = block_lines(blocks, width=width)
     return styled_text(lines) if styled else plain_text(lines)
 
 
@@ -91,11 +92,11 @@ def _lines(block: Block, width: int) -> Sequence[Line]:
             head = Line(f"{block.question} {block.answer.text}", block.answer.state)
             return [head, *block_lines((*block.sentences, block.facts), width=width)]
         case Chapter():
-            return [Line(sentence_text(block.title), "heading"), *block_lines(block.blocks, width=width)]
+            return [Line(sentence_text(block.title), "title"), *block_lines(block.blocks, width=width)]
 
 
 def _caption(caption: Sentence | None) -> list[Line]:
-    return [Line(sentence_text(caption), "heading")] if caption else []
+    return [Line(sentence_text(caption), "title")] if caption else []
 
 
 def _part(part: Part) -> str:

@@ -5,9 +5,8 @@ from typing import Final
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
-from busplan.analysis.circle.roundness import CircleFigures
-from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_chart, circle_table, contributions_table
-from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence
+from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_drawing, circle_table, contributions_table
+from busplan.answers.circle_verdict import circle_sentences, servo_sentence
 from busplan.answers.page.commands import Source
 from busplan.buses.figure import by_key
 from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, value_of
@@ -31,7 +30,8 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
             Facts(()),
         )
     figures = by_key(CIRCLE_FIGURES)
-    facts = ((figures[key].label, value_of(figures[key], result, at="/results/0")) for key in _KEYS)
+    known = (key for key in _KEYS if getattr(result, key) is not None)
+    facts = ((figures[key].label, value_of(figures[key], result, at="/results/0")) for key in known)
     question = Question(
         _QUESTION,
         Words("PASSED", "passes") if result.passed else Words("FAILED", "fails"),
@@ -59,16 +59,10 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     if result is None:
         yield from (Sentence((why,)) for why in _why_not(answer))
         return
-    chart = None if answer.contour is None else circle_chart(answer.contour, result, answer.profile)
-    yield sources["circle"].gives(_not_drawn(answer, result) if chart is None else chart)
+    drawing = circle_drawing(answer.contour, result, answer.profile, at="/results/0")
+    yield sources["circle"].gives(drawing)
     yield sources["circle"].gives(circle_table((result,)))
     yield sources["circle"].line
-
-
-def _not_drawn(answer: AllAnswers, result: CircleFigures) -> Sentence:
-    if answer.contour is not None:
-        return Sentence(("Not drawn: there is no contour error to show.",))
-    return Sentence(("Not drawn: ", *failure_words(result, at="/results/0").parts, "."))
 
 
 def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
@@ -80,4 +74,4 @@ def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
     if not result.contributions:
         return Chapter(title, (NO_SOURCES,), "sources")
     table = contributions_table(result, at="/results/0")
-    return Chapter(title, (ACT_TOGETHER, source.gives(table), source.line), "sources")
+    return Chapter(title, (source.gives(table), ACT_TOGETHER, source.line), "sources")

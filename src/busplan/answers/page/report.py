@@ -91,7 +91,10 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
     ]
     own = Code(subjects[0].name) if len(subjects) == 1 else plural(len(subjects), "profile")
     return Report(
-        Sentence((own if title is None else title,)), lambda: tuple(_blocks(subjects)), lambda: _document(subjects)
+        Sentence((own if title is None else title,)),
+        lambda: tuple(_blocks(subjects)),
+        lambda: _document(subjects),
+        is_page=True,
     )
 
 
