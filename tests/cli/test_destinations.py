@@ -45,7 +45,7 @@ OVER_AN_INPUT = {
 }
 INTO_A_PROFILE = {
     "--output new.toml": ("check", "x.csv", "-o", "new.toml"),
-    "--output new.TOML": ("sweep", "x.csv", *VARY, "-o", "new.TOML"),
+    "--output new.TOML": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "new.TOML"),
     "--output p.csv": ("timeline", "x.csv", "-o", "p.csv"),
     "--trace new.toml": ("circle-test", "x.csv", "--trace", "new.toml"),
     "--output new.toml ": ("report", "x.csv", "-o", "new.toml", "--format", "html"),
@@ -53,9 +53,9 @@ INTO_A_PROFILE = {
     "--baseline new.toml": ("check", "x.csv", "--baseline", "new.toml", "--update-baseline"),
 }
 TWICE = {
-    "--output a.svg and --plot a.svg": ("sweep", "x.csv", *VARY, "-o", "a.svg", "--plot", "a.svg"),
-    "--output new.svg and --plot lost.svg": ("sweep", "x.csv", *VARY, "-o", "new.svg", "--plot", "lost.svg"),
-    "--output a.svg and --plot A.svg": ("sweep", "x.csv", *VARY, "-o", "a.svg", "--plot", "A.svg"),
+    "--output a.svg and --plot a.svg": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "a.svg", "--plot", "a.svg"),
+    "--output new.svg and --plot lost.svg": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "new.svg", "--plot", "lost.svg"),
+    "--output a.svg and --plot A.svg": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "a.svg", "--plot", "A.svg"),
     "--trace a.svg and --plot ./a.svg": ("circle-test", "x.csv", "--trace", "a.svg", "--plot", "./a.svg"),
     "--output b.json and --baseline b.json": (
         "check", "x.csv", "--baseline", "b.json", "--update-baseline", "-o", "b.json",
