@@ -79,11 +79,16 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
     "*": lambda left, right: left * right,
     "/": lambda left, right: left / right if right != 0 else left,
 }
+
+
+def applied(operation: str, left: Any, right: Any) -> Any:
+    """Compute with traced numbers; plain ones alone stay whole, for a fraction is written with seven digits."""
+    return OPERATIONS[operation](left, right) if isinstance(left, Traced) or isinstance(right, Traced) else left
+
+
 EXPRESSION = st.recursive(
     LEAF | st.integers(2, 9),
-    lambda inner: st.tuples(st.sampled_from(sorted(OPERATIONS)), inner, inner).map(
-        lambda one: OPERATIONS[one[0]](one[1], one[2])
-    ),
+    lambda inner: st.tuples(st.sampled_from(sorted(OPERATIONS)), inner, inner).map(lambda one: applied(*one)),
     max_leaves=8,
 )
 
