@@ -52,10 +52,11 @@ INTO_A_PROFILE = {
     "--output new.toml  ": ("manual", "profile", "-o", "new.toml"),
     "--baseline new.toml": ("check", "x.csv", "--baseline", "new.toml", "--update-baseline"),
 }
+AS_CSV = ("--format", "csv")
 TWICE = {
-    "--output a.svg and --plot a.svg": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "a.svg", "--plot", "a.svg"),
-    "--output new.svg and --plot lost.svg": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "new.svg", "--plot", "lost.svg"),
-    "--output a.svg and --plot A.svg": ("sweep", "x.csv", *VARY, "--format", "csv", "-o", "a.svg", "--plot", "A.svg"),
+    "--output a.svg and --plot a.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "a.svg", "--plot", "a.svg"),
+    "--output new.svg and --plot lost.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "new.svg", "--plot", "lost.svg"),
+    "--output a.svg and --plot A.svg": ("sweep", "x.csv", *VARY, *AS_CSV, "-o", "a.svg", "--plot", "A.svg"),
     "--trace a.svg and --plot ./a.svg": ("circle-test", "x.csv", "--trace", "a.svg", "--plot", "./a.svg"),
     "--output b.json and --baseline b.json": (
         "check", "x.csv", "--baseline", "b.json", "--update-baseline", "-o", "b.json",
