@@ -186,8 +186,16 @@ def test_what_is_worse_fails(paper: Profile) -> None:
 @pytest.mark.parametrize("name", ["paper-1ms", "paper-optimal-gap", "paper-dma", "paper-two-node"])
 def test_every_figure_stands_at_its_place(name: str, values_in_their_places: Callable[[Report], int]) -> None:
     found = difference(load("paper-4ms").profile, load(name).profile, circle=run_circle)
-    # Four of each row, and the two periods.
-    assert values_in_their_places(diff_report(found, arguments=AB)) == 4 * len(figures(found)) + 2
+    sides = (side.value for one in found.keys for side in (one.a, one.b) if side is not None)
+    numbers = [one for one in sides if isinstance(one, int | float) and not isinstance(one, bool)]
+    # Four of each row, the two periods, and the numbers of the keys.
+    assert values_in_their_places(diff_report(found, arguments=AB)) == 4 * len(figures(found)) + 2 + len(numbers)
+
+
+def test_keys_that_differ_in_their_last_digit_are_seen_to_differ() -> None:
+    near = override(load("paper-1ms").profile, {"cycle.slice_ratio": 0.1 + 0.2})
+    table = render(diff_report(difference(near, override(near, {"cycle.slice_ratio": 0.3})), arguments=AB), "table")
+    assert "cycle.slice_ratio  0.30000000000000004  0.29999999999999999" in table
 
 
 def test_a_terminal_is_commanded_by_no_argument(paper: Profile) -> None:

@@ -6,11 +6,14 @@ from operator import eq
 from typing import Final
 
 from busplan.analysis.comparison.difference import KeyDifference
-from busplan.forms.blocks import Code, Document, Table, TableColumn, TableRow
+from busplan.forms.blocks import Cell, Code, Document, Sentence, Table, TableColumn, TableRow, Value
+from busplan.forms.numbers import MISSING, written
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
 _COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("key", "A", "B"))
+_ALL_DIGITS: Final = 17
+"""Digits that tell any two floats apart."""
 _MOST_ITEMS: Final = 8
 """Longest list that is shown in full."""
 _MOST_CHARACTERS: Final = 40
@@ -21,16 +24,34 @@ _CONTEXT: Final = 8
 
 def change_table(keys: Iterable[KeyDifference]) -> Table:
     """One row a key: its values, and where they come from when that is not the file."""
-    rows = ((one.key, _written(one.a, one.b), _written(one.b, one.a)) for one in keys)
-    return Table(_COLUMNS, tuple(TableRow(tuple(map(Code, row))) for row in rows))
+    rows = (
+        (
+            Code(one.key),
+            _cell(one.key, one.a, one.b, at=f"/changes/{number}/a"),
+            _cell(one.key, one.b, one.a, at=f"/changes/{number}/b"),
+        )
+        for number, one in enumerate(keys)
+    )
+    return Table(_COLUMNS, tuple(map(TableRow, rows)))
 
 
-def _written(value: KeyValue | None, other: KeyValue | None) -> str:
-    """Write one side of a difference; the other side tells which part of a long value matters."""
+def _cell(key: str, value: KeyValue | None, other: KeyValue | None, *, at: str) -> Cell:
+    """One side of a difference; the other side tells which part, or how many digits, of a long value matter."""
     if value is None:
-        return "-"
-    shown = shown_value(value.value, None if other is None else other.value)
-    return shown if value.source == "file" else f"{shown} (default)"
+        return MISSING
+    own, beside = value.value, None if other is None else other.value
+    shown: Value | Code
+    if isinstance(own, int | float) and not isinstance(own, bool):
+        shown = Value(own, key, at=at)
+        if (
+            own != beside
+            and isinstance(beside, int | float)
+            and written(shown) == written(shown._replace(value=beside))
+        ):
+            shown = shown._replace(digits=_ALL_DIGITS)
+    else:
+        shown = Code(shown_value(own, beside))
+    return shown if value.source == "file" else Sentence((shown, " (default)"))
 
 
 def shown_value(value: object, other: object = None) -> str:

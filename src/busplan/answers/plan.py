@@ -8,7 +8,8 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.documents import document, with_profile
-from busplan.answers.plan_options import Changes, option_margins, options_table, quoted_value
+from busplan.answers.key_values import Changes, settings_sentence
+from busplan.answers.plan_options import option_margins, options_table
 from busplan.answers.verdict import warning_sentences
 from busplan.buses.figure import AXES, NODES, UTILISATION
 from busplan.forms.blocks import (
@@ -21,7 +22,6 @@ from busplan.forms.blocks import (
     Sentence,
     Value,
     figure_value,
-    joined,
     sentence,
 )
 from busplan.forms.columns import sentence_text
@@ -80,13 +80,7 @@ def settings(profile: Profile, changes: Changes) -> str:
 def _settings(profile: Profile, changes: Changes, *, at: str = "") -> Sentence:
     # A number of nodes is what was asked for, never what a second bus would leave.
     meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
-    return joined(
-        *(
-            Sentence((f"{key} = ", *quoted_value(key, value, at=at), f" ({meanings[key]})" if key in meanings else ""))
-            for key, value in changes.items()
-        ),
-        by=", ",
-    )
+    return settings_sentence(changes, meanings=meanings, at=at)
 
 
 _OF_MODELS: Final = (

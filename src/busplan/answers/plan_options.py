@@ -1,16 +1,14 @@
 """The options of a plan, side by side in one table."""
 
-from collections.abc import Mapping
 from typing import Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.options import Option, Plan
+from busplan.answers.key_values import Changes, key_value, settings_sentence
 from busplan.buses import bus
 from busplan.buses.figure import BINDING_TERM, MARGIN, MAX_AXES, MAX_NODES
 from busplan.forms.blocks import (
     Cell,
-    Part,
-    Sentence,
     Table,
     TableColumn,
     TableRow,
@@ -23,9 +21,6 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import MISSING, period_value
 from busplan.sections.profile import Profile
-
-Changes = Mapping[str, bus.Value]
-"""New values of a profile by dotted key."""
 
 
 def options_table(plan: Plan) -> Table:
@@ -93,13 +88,13 @@ def _short(profile: Profile, changes: Changes, *, at: str) -> Cell:
     payloads = {value for key, value in changes.items() if key.startswith("payload.")}
     if len(changes) == 2 and len(payloads) == 1 and all(key.startswith("payload.") for key in changes):  # noqa: PLR2004
         key, value = next(iter(changes.items()))
-        return sentence("payload {} bytes", _set_value(key, value, at=at))
+        return sentence("payload {} bytes", key_value(key, value, at=at))
     words = {**_SHORT, **bus_of(profile).change_words}
     return joined(
         *(
             sentence(words[key], _short_value(key, value, at=at))
             if key in words
-            else Sentence((f"{key} = ", *quoted_value(key, value, at=at)))
+            else settings_sentence({key: value}, meanings={}, at=at)
             for key, value in changes.items()
         ),
         by=", ",
@@ -107,25 +102,5 @@ def _short(profile: Profile, changes: Changes, *, at: str) -> Cell:
 
 
 def _short_value(key: str, value: bus.Value, *, at: str) -> Value:
-    found = _set_value(key, value, at=at)
+    found = key_value(key, value, at=at)
     return found._replace(unit=period_value(float(value)).unit) if key == "cycle.period_us" else found
-
-
-def quoted_value(key: str, value: bus.Value, *, at: str) -> tuple[Part, ...]:
-    """A value as TOML has it, a text between quotes.
-
-    Parameters
-    ----------
-    key
-        Its dotted key.
-    value
-        The value.
-    at
-        Place of the changes in the JSON document; empty where they have none.
-    """
-    found = _set_value(key, value, at=at)
-    return ('"', found, '"') if isinstance(value, str) else (found,)
-
-
-def _set_value(key: str, value: bus.Value, *, at: str) -> Value:
-    return Value(value, key, at=f"{at}/{key}" if at else "")

@@ -7,6 +7,7 @@ from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import changeable, listed
+from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import AVAILABLE, MARGIN, MAX_AXES, MAX_NODES, REQUIRED, UTILISATION
 from busplan.forms.blocks import Code, Part, Sentence, Value, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import nouns, period_value
@@ -156,23 +157,24 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
     change, figures = verdict.change, verdict.deciding
     if change is None:
         return _no_advice(verdict, profile)
-    meanings = bus_of(profile).change_meanings
-    settings = ", ".join(_setting(key, value, meanings) for key, value in change.changes.items())
+    at = places.get("change", "")
+    settings = settings_sentence(
+        change.changes, meanings=bus_of(profile).change_meanings, at=_place(at, "changes"), quotes=False
+    ).parts
     if verdict.all_well:
         more = change.nodes - figures.max_nodes
         return Sentence(
             (
                 *("Cheapest way to ", count_value(more), f" more {nouns(more, 'node')} "),
-                f"({figures.timing_model} model): {settings}, which carries ",
+                *(f"({figures.timing_model} model): ", *settings, ", which carries "),
                 *_nodes(change.nodes, change.nodes * profile.node.axes).parts,
                 ".",
             )
         )
     models = " and ".join(one.timing_model for one in verdict.all_figures)
     purpose = "make it safe" if all(one.fits for one in verdict.all_figures) else "make it fit"
-    at = places.get("change", "")
     spare = figure_value(MARGIN, change.figures.margin_us, at=_place(at, MARGIN.key))
-    return Sentence((f"Cheapest way to {purpose} ({models}): {settings}, which leaves ", spare, " to spare."))
+    return Sentence((f"Cheapest way to {purpose} ({models}): ", *settings, ", which leaves ", spare, " to spare."))
 
 
 def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
@@ -189,11 +191,6 @@ def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
         return sentence(f"No setting carries more nodes: that is the {bus.limits_of}'s limit.")
     most = count_value(limit.most(network_of(profile)))
     return sentence(f"No setting carries more nodes: {{}} {limit.key} are the {bus.limits_of}'s limit.", most)
-
-
-def _setting(key: str, value: object, meanings: Mapping[str, str]) -> str:
-    meaning = f" ({meanings[key]})" if key in meanings else ""
-    return f"{key} = {value}{meaning}"
 
 
 def places_of(results: Sequence[CapacityFigures], *, start: int, change: int) -> dict[str, str]:
