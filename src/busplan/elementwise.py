@@ -7,7 +7,7 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
-from math import ceil
+from math import ceil, floor
 from typing import Any, Final, TypeAlias
 
 Number: TypeAlias = Any
@@ -26,6 +26,10 @@ class SpecialNumber(ABC):
         """The larger of two numbers; this one is among them."""
 
     @abstractmethod
+    def smaller_of(self, one: Number, other: Number) -> Number:
+        """The smaller of two numbers; this one is among them."""
+
+    @abstractmethod
     def chosen(self, condition: Number, yes: Number, no: Number) -> Number:
         """`yes` where the condition holds, else `no`; this one is among the three."""
 
@@ -34,12 +38,20 @@ class SpecialNumber(ABC):
         """The next whole number."""
 
     @abstractmethod
+    def rounded_down(self) -> Number:
+        """The whole number before it, or itself."""
+
+    @abstractmethod
     def entry(self, table: Sequence[float], *, words: str, sources: tuple[Number, ...]) -> Number:
         """The entry of a table at this place."""
 
     @abstractmethod
     def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> Number:
         """The value at this place, linear between points."""
+
+    @abstractmethod
+    def is_one(self) -> Number:
+        """Whether it is 1."""
 
     def named(self, _key: str, _symbol: str) -> Number:
         """Give the number a name."""
@@ -76,6 +88,35 @@ def larger(one: Number, other: Number) -> Number:
     return np.maximum(one, other)
 
 
+def smaller(one: Number, other: Number) -> Number:
+    """The smaller of two numbers, the first of equals.
+
+    Examples
+    --------
+    >>> smaller(2, 3.0)
+    2
+    """
+    if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
+        return min(one, other)
+    own = _special(one, other)
+    if own is not None:
+        return own.smaller_of(one, other)
+    import numpy as np
+
+    return np.minimum(one, other)
+
+
+def is_one(number: Number) -> Number:
+    """Whether a number is 1: a truth, or an array of them.
+
+    Examples
+    --------
+    >>> is_one(1), is_one(2)
+    (True, False)
+    """
+    return number.is_one() if isinstance(number, SpecialNumber) else number == 1
+
+
 def choose(condition: Number, yes: Number, no: Number) -> Number:
     """`yes` where the condition holds, else `no`.
 
@@ -109,6 +150,23 @@ def rounded_up(number: Number) -> Number:
     import numpy as np
 
     return np.ceil(number)
+
+
+def rounded_down(number: Number) -> Number:
+    """The whole number before a number, or itself.
+
+    Examples
+    --------
+    >>> rounded_down(3.25), rounded_down(3)
+    (3, 3)
+    """
+    if isinstance(number, _PLAIN):
+        return floor(number)
+    if isinstance(number, SpecialNumber):
+        return number.rounded_down()
+    import numpy as np
+
+    return np.floor(number)
 
 
 def from_table(table: Sequence[float], place: Number, *, words: str, sources: tuple[Number, ...] = ()) -> Number:

@@ -20,17 +20,29 @@ def network_of(profile: Profile) -> Network:
         The network. Its values may be numbers of any sort.
     """
     payload, node, cycle = profile.payload, profile.node, profile.cycle
+    execution = node.execution
+    read_us, write_us = execution.execution_us(payload.read_bytes), execution.execution_us(payload.write_bytes)
     group = Group(
         nodes=profile.bus.nodes,
         axes=node.axes,
         read_bytes=payload.read_bytes,
         write_bytes=payload.write_bytes,
-        read_execution_us=node.execution.execution_us(payload.read_bytes),
-        write_execution_us=node.execution.execution_us(payload.write_bytes),
+        read_execution_us=read_us,
+        write_execution_us=write_us,
+        worst_extra_us=execution.worst_extra_us,
+        read_uncertainty_us=execution.standard_uncertainty_us(read_us),
+        write_uncertainty_us=execution.standard_uncertainty_us(write_us),
     )
     return Network(profile, (group,), cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us)
 
 
 def model_names(profile: Profile) -> tuple[str, ...]:
-    """Names of the timing models of a profile's kind of bus, in the order reports show them."""
-    return tuple(model.name for model in bus_of(profile).timing_models)
+    """Names of the timing models that can express a profile, in the order reports show them."""
+    bus, network = bus_of(profile), network_of(profile)
+    return tuple(one.name for one in bus.timing_models if not bus.cannot_express(network, model=one.name))
+
+
+def leading_model(profile: Profile) -> str:
+    """Name of the timing model whose figures lead: the profile's own, or the one that decides where that cannot."""
+    own = profile.bus.timing_model
+    return own if own in model_names(profile) else bus_of(profile).deciding_model

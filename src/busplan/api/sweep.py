@@ -182,7 +182,7 @@ def sweep(
     blocks = analysis.sweep(network, grid, timing_models=models)
     if with_circle:
         _require_circles(network, grid, force=force)
-        blocks = (with_circles(network, block, timing_models=models, run=_run_here) for block in blocks)
+        blocks = (with_circles(network, block, run=_run_here) for block in blocks)
     return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=with_circle), tuple(blocks))
 
 
@@ -207,5 +207,5 @@ def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:
     require_circles(profile, grid)
 
 
-def _run_here(tasks: Iterable[CircleTask]) -> Iterable[list[Figures]]:
+def _run_here(tasks: Iterable[CircleTask]) -> Iterable[Figures]:
     return map(run_task, tasks)

@@ -131,6 +131,24 @@ class PayloadRange(NamedTuple):
     """What carries no more."""
 
 
+class Doubt(NamedTuple):
+    """Something that a cycle rests on and that is not known exactly."""
+
+    key: str
+    """Dotted key of the profile, or a name of its own."""
+    label: str
+    us: Number
+    """Standard uncertainty that it gives the cycle: its own, times the sensitivity [us]."""
+
+
+class LeftOut(NamedTuple):
+    """What a cycle could have and a profile does not say: no verdict has it."""
+
+    label: str
+    key: str
+    """The key that would say it."""
+
+
 class BusLatency(NamedTuple):
     """How long one thing takes on the bus, part by part."""
 
@@ -157,7 +175,6 @@ class BusCycle(ABC):
     """
 
     network: Network
-    model: str
 
     @abstractmethod
     def computed_terms(self) -> tuple[Term, ...]:
@@ -172,6 +189,28 @@ class BusCycle(ABC):
     def required_us(self) -> Number:
         """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
         return total(term.us for term in self.terms)
+
+    def required_with(self, extra_us: Number) -> Number:
+        """What the whole cycle needs if what it transmits takes longer [us].
+
+        Parameters
+        ----------
+        extra_us
+            By how much [us].
+        """
+        return self.required_us + extra_us
+
+    def bias_us(self) -> Number | None:
+        """What the bus takes beyond the timing model, on the mean [us]; None where nobody has measured it."""
+        return None
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What is not known exactly; different inputs are independent."""
+        return ()
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What the cycle could have and the profile does not say."""
+        return ()
 
     @abstractmethod
     def events(self) -> Iterator[BusEvent]:
@@ -195,6 +234,8 @@ class Bus(ABC):
     """What the kind is called."""
     timing_models: ClassVar[tuple[TimingModel, ...]]
     """In the order reports show them."""
+    deciding_model: ClassVar[str]
+    """The conservative timing model: the verdict is by this one, always."""
     term_figures: ClassVar[tuple[Figure, ...]]
     """One for each term, in the order of the wire."""
     capacity_figures: ClassVar[tuple[Figure, ...]]
@@ -271,6 +312,10 @@ class Bus(ABC):
             The kind has no transactions whose latency could be measured.
         """
         raise BusplanError(f"bus.kind {self.kind}: {self.title} has no transactions to find an execution time from")
+
+    def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:  # noqa: ARG002 - most can
+        """Keys of a profile that a timing model has no term for: its figures are not applicable then."""
+        return ()
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn, with the values that are safe for this very network."""

@@ -191,10 +191,83 @@ MIN_SLICE_RATIO: Final = Figure(
 )
 EXCEEDED: Final = Figure("exceeded", "broken", _CYCLE, "limits that the profile breaks", sort="words")
 FITS: Final = Figure(
-    "fits", "fits", _CYCLE, "whether the cycle fits and breaks no limit", "fits", sort="truth", better="more"
+    "fits",
+    "fits",
+    _CYCLE,
+    "whether required <= available, and no limit is broken",
+    "required <= available",
+    sort="truth",
+    better="more",
 )
+_CERTAINTY: Final = "JCGM 100"
+BIAS: Final = Figure(
+    "bias_us", "bias", "Table I", "what the bus takes beyond the timing model, on the mean", "bias", better="less"
+)
+MARGIN_CORRECTED: Final = Figure(
+    "margin_corrected_us",
+    "margin_c",
+    _CERTAINTY,
+    "what is left of the slice, less the bias",
+    "margin, corrected",
+    better="more",
+    scale="available_us",
+)
+UNCERTAINTY: Final = Figure(
+    "uncertainty_us", "U", _CERTAINTY, "expanded uncertainty of that, two standard uncertainties", "uncertainty U"
+)
+SAFE_REQUIRED: Final = Figure(
+    "safe_required_us",
+    "T_safe",
+    _CERTAINTY,
+    "what the slice must give for the cycle to be shown to fit, with the reserve",
+    "needed to be shown to fit",
+    better="less",
+)
+SAFE_NODES: Final = Figure(
+    "safe_nodes",
+    "N_safe",
+    _CERTAINTY,
+    "most nodes that are shown to fit, on a bus set safely for them",
+    "safe nodes",
+    "nodes",
+    "count",
+    better="more",
+)
+SAFE_AXES: Final = Figure(
+    "safe_axes", "axes_safe", _CERTAINTY, "axes of the safe nodes", "safe axes", "axes", "count", better="more"
+)
+SAFE_LIMITED_BY: Final = Figure(
+    "safe_limited_by",
+    "limit_safe",
+    _CERTAINTY,
+    "what keeps the safe nodes from being more",
+    "safe nodes limited by",
+    sort="word",
+)
+SAFE_MIN_PERIOD: Final = Figure(
+    "safe_min_period_us",
+    "T_s,safe",
+    _CERTAINTY,
+    "smallest period that these nodes are shown to fit in",
+    "smallest safe period",
+    better="less",
+)
+VERDICT: Final = Figure(
+    "verdict", "verdict", _CERTAINTY, "fits, not shown to fit, or does not fit", "verdict", sort="word"
+)
+CERTAINTY: Final = (
+    *(BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_NODES, SAFE_AXES),
+    *(SAFE_LIMITED_BY, SAFE_MIN_PERIOD, VERDICT),
+)
+"""Figures of the timing model that decides; under another they do not exist."""
 VERDICT_FIGURES: Final = (
-    Figure("models_agree", "models agree", _CYCLE, "whether every timing model says the same of the fit", sort="truth"),
+    Figure(
+        "models_agree",
+        "models agree",
+        _CYCLE,
+        "whether required <= available is the same under every timing model",
+        sort="truth",
+    ),
     Figure("cheapest_change", "change", _CYCLE, "cheapest change that makes it fit, or carries more nodes"),
     Figure("warnings", "warnings", "table", "what to beware of, whatever the verdict", sort="words"),
     Figure("text", "text", _CYCLE, "the verdict in words", sort="word"),
@@ -234,4 +307,5 @@ def capacity_figures(
         *(BINDING_TERM, UTILISATION, MARGIN),
         *counted,
         *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
+        *CERTAINTY,
     )

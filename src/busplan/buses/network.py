@@ -24,6 +24,12 @@ class Group(NamedTuple):
     """Execution time of a read in the node [us]."""
     write_execution_us: Number
     """Execution time of a write in the node [us]."""
+    worst_extra_us: Number = 0.0
+    """What the slowest execution takes beyond these [us]."""
+    read_uncertainty_us: Number = 0.0
+    """Standard uncertainty of the execution time of a read [us]."""
+    write_uncertainty_us: Number = 0.0
+    """Standard uncertainty of the execution time of a write [us]."""
 
 
 class Network(NamedTuple):

@@ -43,6 +43,22 @@ class RuleFigures(Protocol):
     def max_nodes(self) -> int:
         """Most nodes that fit [1]."""
 
+    @property
+    def safe_nodes(self) -> int | None:
+        """Most nodes that are shown to fit [1]; of the model that decides."""
+
+    @property
+    def verdict(self) -> str | None:
+        """fits, not shown to fit, or does not fit; of the model that decides."""
+
+    @property
+    def margin_corrected_us(self) -> float | None:
+        """What is left of the slice, less the bias [us]; of the model that decides."""
+
+    @property
+    def uncertainty_us(self) -> float | None:
+        """Expanded uncertainty of that [us]; of the model that decides."""
+
     def __getattr__(self, key: str) -> Any:
         """A figure of the kind."""
 
@@ -63,17 +79,17 @@ class RuleSubject(Protocol):
         """Capacity under the other timing models."""
 
     @property
-    def others_overrun(self) -> bool:
-        """Whether the cycle is too long under another timing model; cheaper than its figures."""
+    def others_fit(self) -> Sequence[tuple[str, bool]]:
+        """The other timing models, each with whether the cycle fits; cheaper than their figures."""
 
     def after(self, changes: Mapping[str, object]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
 
-    def cure(self, *models: str) -> str:
-        """The cheapest change after which these timing models fit, in words."""
+    def cure(self) -> str:
+        """The cheapest change after which the profile is shown to fit, in words."""
 
     def room(self, nodes: int, *, utilisation: float = 1.0) -> str:
-        """The cheapest change that makes room for some nodes under the model that decides, in words."""
+        """The cheapest change that makes room for some nodes, in words."""
 
 
 class Rule(NamedTuple):
@@ -96,8 +112,9 @@ def microseconds(value_us: float) -> str:
 
 
 def overrun(one: RuleFigures) -> str:
-    """Say by how much a cycle is too long."""
-    return (
-        f"the cycle needs {microseconds(one.required_us)} of {microseconds(one.available_us)} under the "
-        f"{one.timing_model} timing, {microseconds(-one.margin_us)} too much"
-    )
+    """Say by how much a cycle is too long, as far as it is known."""
+    sides = f"the cycle needs {microseconds(one.required_us)} of {microseconds(one.available_us)}"
+    if one.uncertainty_us is None or one.margin_corrected_us is None:
+        return f"{sides} under the {one.timing_model} timing, {microseconds(-one.margin_us)} too much"
+    margin = f"{one.margin_corrected_us:.1f} +/- {one.uncertainty_us:.1f} us"
+    return f"{sides}; with the model's bias the margin is {margin}"

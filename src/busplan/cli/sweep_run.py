@@ -124,11 +124,11 @@ def _blocks(job: "SweepJob") -> "Iterator[Iterable[Block]]":
 
     few = sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=_CIRCLES_AT_ONCE * job.jobs)
     with _circle_runner(min(job.jobs, job.grid.points)) as run:
-        yield (with_circles(job.profile, block, timing_models=job.timing_models, run=run) for block in few)
+        yield (with_circles(job.profile, block, run=run) for block in few)
 
 
 @contextmanager
-def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iterable[list[Figures]]]]":
+def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iterable[Figures]]]":
     """Give a function that runs circle tests here, or in other processes."""
     from busplan.analysis.sweep.circles import run_task
 

@@ -4,16 +4,25 @@ from collections.abc import Iterator
 from math import ceil
 from typing import Final
 
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of
-from busplan.buses.rule import Rule, RuleFigures, RuleProblem, RuleSubject, overrun
+from busplan.buses.rule import Rule, RuleProblem, RuleSubject, overrun
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The cycle does not fit under the timing model that decides."""
-    if TIME in subject.deciding.exceeded:
-        cure = subject.cure(subject.deciding.timing_model)
-        yield RuleProblem("cycle.period_us", f"{overrun(subject.deciding)}; {cure}")
+    """The cycle does not fit, whatever is not known of it."""
+    one = subject.deciding
+    if one.verdict == DOES_NOT_FIT and (TIME in one.exceeded or not one.exceeded):
+        yield RuleProblem("cycle.period_us", f"{overrun(one)}; {subject.cure()}")
+
+
+def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The cycle may fit, but what is known of it does not show so."""
+    one, reserve = subject.deciding, subject.profile.limits.reserve
+    if one.verdict == NOT_SHOWN:
+        asked = f", and limits.reserve asks for {reserve:.0%} of the slice" if reserve else ""
+        yield RuleProblem("cycle.period_us", f"not shown to fit: {overrun(one)}{asked}; {subject.cure()}")
 
 
 def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -23,38 +32,37 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
         cure = subject.room(one.nodes, utilisation=limit)
         yield RuleProblem(
             "limits.max_utilisation",
-            f"{one.utilisation:.1%} of the slice is used under the {one.timing_model} timing, "
-            f"{limit:.1%} allowed; {cure}",
+            f"{one.utilisation:.1%} of the slice is used, {limit:.1%} allowed; {cure}",
         )
 
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further nodes than [limits] asks for."""
     limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
-    spare = one.max_nodes - one.nodes
+    spare = (one.safe_nodes or 0) - one.nodes
     if limit is not None and spare < limit:
-        yield RuleProblem("limits.min_spare_nodes", f"{_spare(spare, limit, one)}; {_room(subject, one.nodes + limit)}")
+        yield RuleProblem("limits.min_spare_nodes", f"{_spare(spare, limit)}; {_room(subject, one.nodes + limit)}")
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further axes than [limits] asks for."""
     limit, one = subject.profile.limits.min_spare_axes, subject.deciding
-    spare = one.max_axes - one.axes
+    spare = one.safe_axes - one.axes
     if limit is not None and spare < limit:
         nodes = ceil((one.axes + limit) / subject.profile.node.axes)
-        yield RuleProblem("limits.min_spare_axes", f"{_spare(spare, limit, one)}; {_room(subject, nodes)}")
+        yield RuleProblem("limits.min_spare_axes", f"{_spare(spare, limit)}; {_room(subject, nodes)}")
 
 
-def _spare(spare: int, limit: int, one: RuleFigures) -> str:
-    return f"{max(spare, 0)} to spare under the {one.timing_model} timing, {limit} asked for"
+def _spare(spare: int, limit: int) -> str:
+    return f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
 
 
 def _room(subject: RuleSubject, nodes: int) -> str:
     """What limits the nodes, and how that many would have room."""
     one = subject.deciding
-    limit = bus_of(subject.profile).limit(one.limited_by)
-    cure = subject.room(nodes) if limit is None else limit.way_out
-    return f"limited by {one.limited_by}; {cure}"
+    limit = bus_of(subject.profile).limit(one.safe_limited_by)
+    cure = subject.room(nodes) if limit is None or limit.is_safety else limit.way_out
+    return f"limited by {one.safe_limited_by}; {cure}"
 
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -72,10 +80,21 @@ RULES: Final = (
         "slice-overrun",
         "error",
         "the cycle does not fit its time slice",
-        "Under the timing model that decides (bus.timing_model), all terms of one cycle together (equation 2) take "
-        "longer than slice_ratio * period_us (equation 1). The message names the cheapest cure: a setting of the "
-        "bus needs no new parts, the slice ratio is computing time of the host, the period is what the machine is for.",
+        "All terms of one cycle together (equation 2), with the bias of the timing model, take longer than "
+        "slice_ratio * period_us (equation 1), by more than is not known. The message names the cheapest cure: a "
+        "setting of the bus needs no new parts, the slice ratio is computing time of the host, the period is what the "
+        "machine is for.",
         slice_overrun,
+    ),
+    Rule(
+        "BP114",
+        "not-shown-to-fit",
+        "error",
+        "the cycle is not shown to fit its time slice",
+        "The margin, less the bias of the timing model, is smaller than its uncertainty and limits.reserve together: "
+        "the plan may work, and nobody can say so. `busplan explain PROFILE margin_corrected_us` shows what the "
+        "uncertainty is made of; measuring the execution time is the most frequent way to make it smaller.",
+        not_shown_to_fit,
     ),
     Rule(
         "BP103",
@@ -91,7 +110,7 @@ RULES: Final = (
         "too-few-spare-nodes",
         "error",
         "fewer nodes to spare than limits.min_spare_nodes",
-        "[limits] min_spare_nodes asks that the bus could carry so many nodes more at the same period.",
+        "[limits] min_spare_nodes asks that so many more nodes are shown to fit the same period.",
         too_few_spare_nodes,
     ),
     Rule(
@@ -99,7 +118,7 @@ RULES: Final = (
         "too-few-spare-axes",
         "error",
         "fewer axes to spare than limits.min_spare_axes",
-        "[limits] min_spare_axes asks that the bus could carry so many axes more at the same period.",
+        "[limits] min_spare_axes asks that so many more axes are shown to fit the same period.",
         too_few_spare_axes,
     ),
     Rule(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.network import model_names, network_of
+from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.cures import Change, change_for_room, change_to_fit, changeable, listed
 from busplan.buses.rule import Severity
 from busplan.profile.toml import LoadedProfile, override
@@ -34,7 +34,7 @@ class Subject:
     @cached_property
     def deciding(self) -> CapacityFigures:
         """Capacity under the timing model that decides."""
-        return figures(self.profile, model=self.profile.bus.timing_model)
+        return figures(self.profile, model=bus_of(self.profile).deciding_model)
 
     @cached_property
     def others(self) -> tuple[CapacityFigures, ...]:
@@ -42,30 +42,30 @@ class Subject:
         return tuple(figures(self.profile, model=model) for model in self._other_models)
 
     @property
-    def others_overrun(self) -> bool:
-        """Whether the cycle does not fit under another timing model, which takes no figures to tell."""
+    def others_fit(self) -> tuple[tuple[str, bool], ...]:
+        """The other timing models, each with whether the cycle fits, which takes no figures to tell."""
         given_us = available_us(network_of(self.profile))
-        return any(
-            not fits_in(cycle_of(self.profile, model=model).required_us, available_us=given_us)
+        return tuple(
+            (model, bool(fits_in(cycle_of(self.profile, model=model).required_us, available_us=given_us)))
             for model in self._other_models
         )
 
     @property
     def _other_models(self) -> tuple[str, ...]:
-        return tuple(model for model in model_names(self.profile) if model != self.profile.bus.timing_model)
+        deciding = bus_of(self.profile).deciding_model
+        return tuple(model for model in model_names(self.profile) if model != deciding)
 
     def after(self, changes: Mapping[str, object]) -> CapacityFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
         return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
-    def cure(self, *models: str) -> str:
-        """The cheapest change after which these timing models fit, in words."""
-        return self._words(change_to_fit(self.profile, models=models))
+    def cure(self) -> str:
+        """The cheapest change after which the profile is shown to fit, in words."""
+        return self._words(change_to_fit(self.profile))
 
     def room(self, nodes: int, *, utilisation: float = 1.0) -> str:
-        """The cheapest change that makes room for some nodes under the model that decides, in words."""
-        model = self.deciding.timing_model
-        return self._words(change_for_room(self.profile, model=model, nodes=nodes, utilisation=utilisation))
+        """The cheapest change that makes room for some nodes, in words."""
+        return self._words(change_for_room(self.profile, nodes=nodes, utilisation=utilisation))
 
     def _words(self, change: Change | None) -> str:
         if change is None:

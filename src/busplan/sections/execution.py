@@ -1,12 +1,35 @@
 """The execution time of a node: section [node.execution], a line or a table."""
 
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from busplan.elementwise import Number, interpolated
 from busplan.sections.base import Bytes, Problem, Section, TimeUs, refused
+from busplan.sourced import Sourced
+
+UNKNOWN_SHARE: Final = Sourced(
+    0.1,
+    unit="1",
+    grade="assumed",
+    source="chosen",
+    meaning="standard uncertainty of a time that nobody has measured, as a share of it",
+)
+MEASURED_UNCERTAINTY_US: Final = Sourced(
+    0.1 / 12**0.5,
+    unit="us",
+    grade="derived",
+    source="one digit of 0.1 us, rectangular (JCGM 100, 4.3.7)",
+    meaning="standard uncertainty of a measured execution time",
+)
+DERIVED_UNCERTAINTY_US: Final = Sourced(
+    1 / 3**0.5,
+    unit="us",
+    grade="derived",
+    source="1 us either way, rectangular (JCGM 100, 4.3.7)",
+    meaning="standard uncertainty of an execution time derived from measured figures",
+)
 
 
 class GradedExecution(Section):
@@ -15,6 +38,26 @@ class GradedExecution(Section):
     grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
         default=None, description="How the execution time is known; the gate warns of assumed", examples=["measured"]
     )
+    uncertainty_us: TimeUs | None = Field(
+        default=None,
+        description="Standard uncertainty of the execution time; without it the grade says how large it is [us]",
+        examples=[0.5],
+    )
+    worst_extra_us: TimeUs = Field(
+        default=0.0, description="What the slowest execution takes beyond the execution time [us]", examples=[3.1]
+    )
+
+    def standard_uncertainty_us(self, execution_us: Number) -> Number:
+        """Standard uncertainty u(T_exec) of an execution time [us].
+
+        The key `uncertainty_us`, or by grade: of a measured time 0.1 / sqrt(12), of a derived one 1 / sqrt(3), else
+        10 % of it.
+        """
+        if self.uncertainty_us is not None:
+            return self.uncertainty_us
+        by_grade = {"measured": MEASURED_UNCERTAINTY_US, "derived": DERIVED_UNCERTAINTY_US}
+        known = by_grade.get(self.grade or "")
+        return UNKNOWN_SHARE * execution_us if known is None else known
 
 
 class LinearExecution(GradedExecution):

@@ -1,4 +1,4 @@
-"""The section that only the gate reads: [limits], what a plan must keep free."""
+"""Section [limits]: what a plan must keep free."""
 
 from typing import Annotated
 
@@ -10,7 +10,14 @@ SpareCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 
 
 class Limits(Section):
-    """Section [limits]: what `busplan check` asks of a plan beyond fitting. What is left out is not checked."""
+    """Section [limits]: what a plan must keep free.
+
+    `reserve` is part of every verdict. The others are for `busplan check`, which does not check what is left out.
+    """
+
+    reserve: Annotated[float, Field(ge=0, le=0.99, allow_inf_nan=False)] = Field(
+        default=0.0, description="Share of the time slice that must be free for a plan to fit, 0..0.99", examples=[0.15]
+    )
 
     max_utilisation: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(
         default=None, description="Largest share of the time slice that may be used, 0..1", examples=[0.8]

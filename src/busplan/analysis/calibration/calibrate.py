@@ -142,7 +142,7 @@ def calibrate(
     Paper, equations (3), (13) and (14); Table I. P. K. Sen, "Estimates of the regression coefficient based on
     Kendall's tau", JASA 63 (1968). B. Iglewicz, D. Hoaglin, "How to Detect and Handle Outliers" (1993).
     """
-    model = timing_model or profile.bus.timing_model
+    model = timing_model or bus_of(profile).deciding_model
     halves = _packets(profile, measurements, model)
     way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
     raw = [(one, _packets_us(one, halves)) for one in measurements]

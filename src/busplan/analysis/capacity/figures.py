@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
+from busplan.analysis.capacity.certainty import VERDICTS, Certainty, VerdictWord, certainty, verdict_code
 from busplan.analysis.capacity.cycle import TIME, available_us, broken_limits, fits_in
-from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
-from busplan.buses.bus import BusCycle, Term
+from busplan.buses.bus import BusCycle, Doubt, Term
+from busplan.buses.figure import CERTAINTY
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose
 from busplan.profile.toml import override
@@ -47,6 +49,19 @@ class CapacityFigures(NamedTuple):
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
     fits: bool
+    """Whether required <= available and no limit is broken; the verdict is another question."""
+    bias_us: float | None
+    """This and the figures below exist for the timing model that decides."""
+    margin_corrected_us: float | None
+    uncertainty_us: float | None
+    safe_required_us: float | None
+    safe_nodes: int | None
+    safe_axes: int | None
+    safe_limited_by: str | None
+    safe_min_period_us: float | None
+    verdict: VerdictWord | None
+    doubts: tuple[Doubt, ...]
+    """What the uncertainty is made of."""
     safe: bool
     """Whether the bus is set so that it works reliably, beside fitting."""
     own: FigureValues
@@ -129,7 +144,9 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     numbers, own = numeric_figures(cycle), FigureValues(cycle.figures())
     max_nodes, limited_by = largest_nodes(profile, model=model)
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
-    exceeded = (*broken_limits(profile), *((TIME,) if late else ()))
+    broken = broken_limits(profile)
+    exceeded = (*broken, *((TIME,) if late else ()))
+    decides = model == bus.deciding_model
     return CapacityFigures(
         kind=bus.kind,
         timing_model=model,
@@ -141,9 +158,45 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
         limited_by=limited_by,
         exceeded=exceeded,
         fits=not exceeded,
+        **(_certainty_figures(profile, cycle, is_broken=bool(broken)) if decides else _UNDECIDED),
         safe=bus.is_safe(network),
         own=own,
     )
+
+
+_UNDECIDED: Final[dict[str, Any]] = {**dict.fromkeys((one.key for one in CERTAINTY), None), "doubts": ()}
+
+
+def _certainty_figures(profile: Profile, cycle: BusCycle, *, is_broken: bool) -> dict[str, Any]:
+    """Figures of how sure the verdict is, by the names of `CapacityFigures`."""
+    found, (nodes, limit) = certainty(cycle), safe_nodes(profile)
+    return {
+        **certainty_numbers(found, cycle),
+        "safe_nodes": nodes,
+        "safe_axes": profile.node.axes * nodes,
+        "safe_limited_by": limit,
+        "verdict": VERDICTS[verdict_code(found, cycle.network, is_broken=is_broken)],
+        "doubts": found.doubts,
+    }
+
+
+def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number]:
+    """Figures of how sure the verdict is that follow by operators alone.
+
+    Parameters
+    ----------
+    found
+        The certainty of the cycle. Its numbers may be of any sort.
+    cycle
+        The cycle under the timing model that decides.
+    """
+    return {
+        "bias_us": found.bias_us,
+        "margin_corrected_us": found.margin_corrected_us,
+        "uncertainty_us": found.uncertainty_us,
+        "safe_required_us": found.safe_required_us,
+        "safe_min_period_us": found.safe_required_us / cycle.network.slice_ratio,
+    }
 
 
 def numeric_figures(cycle: BusCycle) -> dict[str, Number]:

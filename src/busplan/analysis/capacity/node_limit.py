@@ -1,8 +1,10 @@
 """The largest number of nodes that a bus carries, and what keeps it from being larger."""
 
+from collections.abc import Sequence
 from math import inf
 from typing import NamedTuple
 
+from busplan.analysis.capacity.certainty import limits_to_be_safe
 from busplan.analysis.capacity.cycle import limits_with_time
 from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial
 from busplan.analysis.network import network_of
@@ -14,7 +16,7 @@ from busplan.sections.profile import Profile
 
 
 class MostNodes(NamedTuple):
-    """A largest number of nodes, and the place of its limit among `limits_with_time`; arrays broadcast."""
+    """A largest number of nodes, and the place of its limit among those asked; arrays broadcast."""
 
     nodes: Number
     limit: Number
@@ -40,12 +42,35 @@ def largest_nodes(profile: Profile, *, model: str) -> tuple[int, str]:
     Paper, equations (1)-(11), with (11) solved for N.
     """
     network = network_of(profile)
-    most = most_nodes(network, model=model)
-    return int(most.nodes), limits_with_time(network, model=model)[int(most.limit)].key
+    return _with_key(network, limits_with_time(network, model=model))
 
 
-def most_nodes(network: Network, *, model: str) -> MostNodes:
-    """Find the largest number of nodes within every limit; of equal answers the first limit gives its name.
+def safe_nodes(profile: Profile) -> tuple[int, str]:
+    """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
+
+    Each number of nodes has its own cycle, bias, uncertainty and limits; a gap count that follows them does so.
+
+    Parameters
+    ----------
+    profile
+        The network; its own number of nodes plays no part.
+
+    Returns
+    -------
+    tuple
+        Number of nodes [1], and the key of the limit.
+    """
+    network = network_of(profile)
+    return _with_key(network, limits_to_be_safe(network))
+
+
+def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
+    most = most_nodes(network, limits)
+    return int(most.nodes), limits[int(most.limit)].key
+
+
+def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_COUNT) -> MostNodes:
+    """Find the largest number of nodes within some limits; of equal answers the first limit gives its name.
 
     Each limit is asked alone, and asks the cycle itself: once, with a polynomial in the place of the number of nodes.
     One that is no polynomial is searched by halves, below what the others allow.
@@ -54,12 +79,13 @@ def most_nodes(network: Network, *, model: str) -> MostNodes:
     ----------
     network
         Its own number of nodes plays no part. Its numbers may be arrays.
-    model
-        Timing model.
+    limits
+        The limits; the value of none falls with the nodes.
+    ceiling
+        No answer is larger [1].
     """
-    limits = limits_with_time(network, model=model)
     closed = [_in_closed_form(limit, network) for limit in limits]
-    ceiling = int(min([MAX_COUNT, *(_greatest(one) for one in closed if one is not None)]))
+    ceiling = int(min([ceiling, *(_greatest(one) for one in closed if one is not None)]))
     nodes: Number = None
     place: Number = 0
     for index, (limit, found) in enumerate(zip(limits, closed, strict=True)):
@@ -80,10 +106,17 @@ def _in_closed_form(limit: Limit, network: Network) -> Number | None:
         if isinstance(most, Polynomial):
             return None
         if isinstance(value, Polynomial):
-            return value.largest_within(most)
+            return _with_one_node(value.largest_within(most), limit, network)
         return choose(value > most, 0.0, inf)
     except NoPolynomialError:
         return None
+
+
+def _with_one_node(nodes: Number, limit: Limit, network: Network) -> Number:
+    """The most nodes, where a polynomial gave them: it is the cycle of two nodes or more, so one is asked alone."""
+    if _least(nodes) > 1:
+        return nodes
+    return choose(nodes > 1, nodes, choose(limit.is_broken(network.with_nodes(1)), 0.0, 1.0))
 
 
 def _by_halves(limit: Limit, network: Network, ceiling: int) -> Number:
@@ -95,6 +128,10 @@ def _by_halves(limit: Limit, network: Network, ceiling: int) -> Number:
         over = limit.is_broken(network.with_nodes(middle))
         low, high = choose(over, low, middle), choose(over, middle - 1, high)
     return low
+
+
+def _least(number: Number) -> float:
+    return float(number.min()) if hasattr(number, "min") else float(number)
 
 
 def _greatest(number: Number) -> float:

@@ -1,7 +1,8 @@
 """A polynomial of the number of nodes that goes through a cycle in the place of a number.
 
 What comes out is the cycle for every number of nodes at once. A cycle that compares, rounds or looks up what depends on
-the number of nodes is no polynomial, and says so.
+the number of nodes is no polynomial, and says so. Whether there is one node alone is the one thing that a cycle may
+ask: the polynomial is the cycle of two nodes or more.
 """
 
 from itertools import zip_longest
@@ -106,7 +107,11 @@ class Polynomial(SpecialNumber):
     __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = __int__ = __index__ = __round__ = _refuse
     __eq__ = __ne__ = _refuse
 
-    larger_of = chosen = rounded_up = entry = between = _refuse
+    def is_one(self) -> bool:
+        """It is a number of nodes from 2 on."""
+        return False
+
+    larger_of = smaller_of = chosen = rounded_up = rounded_down = entry = between = _refuse
 
 
 _QUADRATIC: Final = 3

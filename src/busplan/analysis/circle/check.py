@@ -1,7 +1,7 @@
 """The circle test as a question that a search asks many times: what does it not hold?"""
 
-from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.roundness import circle_test
+from busplan.analysis.circle.setup import bus
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -36,7 +36,7 @@ class CircleCheck:
         """
         # A loop on the node sees of the bus no more than the period; one on the host has the cycle inside it.
         on_host = profile.servo.loop == "host"
-        delay_us = figures(profile, model=profile.bus.timing_model).required_us if on_host else 0.0
+        delay_us = bus(profile).required_us if on_host else 0.0
         key = (profile.cycle.period_us, delay_us)
         if key not in self._known:
             self._known[key] = self._run(profile)

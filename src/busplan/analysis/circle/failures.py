@@ -5,6 +5,7 @@ from math import inf
 from string import Formatter
 from typing import Any, Final, NamedTuple
 
+from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.network import bus_of, network_of
@@ -51,6 +52,13 @@ _FAILURES: Final[dict[str, _Saying]] = {
     "required_us": _Saying(
         "the cycle does not fit the bus: {value} needed of {limit}",
         "required_us",
+        "us",
+        limit_key="available_us",
+        limit_decimals=3,
+    ),
+    "safe_required_us": _Saying(
+        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve {value} needed of {limit}",
+        "safe_required_us",
         "us",
         limit_key="available_us",
         limit_decimals=3,
@@ -141,7 +149,7 @@ def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float 
 
 
 def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
-    """Tell which limits of the bus a cycle breaks.
+    """Tell which limits of the bus a cycle breaks, or that it is not shown to fit.
 
     Parameters
     ----------
@@ -152,7 +160,11 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     """
     network = network_of(profile)
     broken = [one for one in bus_of(profile).limits if one.key in capacity.exceeded]
-    late = (Failure("required_us", capacity.required_us, capacity.available_us),) if TIME in capacity.exceeded else ()
+    late: tuple[Failure, ...] = ()
+    if TIME in capacity.exceeded:
+        late = (Failure("required_us", capacity.required_us, capacity.available_us),)
+    elif not broken and capacity.verdict != FITS:
+        late = (Failure("safe_required_us", capacity.safe_required_us, capacity.available_us),)
     return (
         *(
             Failure(one.failure or one.key, float(one.value(network)), float(one.most(network)), one.words(network))

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, Figure, by
+from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, by
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)
@@ -34,7 +34,8 @@ CIRCLE_FIGURES: Final = (
     ),
     Figure("delay_us", "T_d", _SLICE, "bus delay inside the loop"),
     Figure("timing_model", "model", "profile", "timing model that decides whether the bus fits"),
-    Figure("bus_fits", "fits", _CYCLE, "whether the cycle fits the bus"),
+    Figure("bus_fits", "fits", _CYCLE, "whether required <= available, and no limit is broken"),
+    VERDICT,
     REQUIRED,
     AVAILABLE,
     Figure("servo_grade", "grade", "profile", "how the servo values are known", "servo values", sort="word"),

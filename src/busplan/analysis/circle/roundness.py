@@ -42,6 +42,9 @@ class CircleFigures(NamedTuple):
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
+    """Whether required <= available and no limit is broken."""
+    verdict: str
+    """fits, not shown to fit, or does not fit: a circle passes only on a bus that is shown to carry it."""
     required_us: float
     available_us: float
     servo_grade: str
@@ -235,7 +238,7 @@ def _figures(
         period_us=timing.period_us,
         ramp_periods=circle.ramp_periods,
     )
-    failures = bus_failures(profile, capacity) if run is None else circle_failures(profile, run)
+    failures = (*bus_failures(profile, capacity), *(() if run is None else circle_failures(profile, run)))
     return CircleFigures(
         period_us=profile.cycle.period_us,
         feed_mm_per_min=circle.feed_mm_per_min,
@@ -248,6 +251,7 @@ def _figures(
         delay_us=timing.delay_us,
         timing_model=capacity.timing_model,
         bus_fits=capacity.fits,
+        verdict=capacity.verdict or "",
         required_us=capacity.required_us,
         available_us=capacity.available_us,
         servo_grade=profile.servo.grade,

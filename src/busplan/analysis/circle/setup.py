@@ -4,6 +4,7 @@ from typing import Any
 
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
+from busplan.analysis.network import bus_of
 from busplan.sections.base import Section
 from busplan.sections.profile import Profile
 from busplan.servo.checks import parameters
@@ -14,7 +15,7 @@ from busplan.servo.path import circle_path
 
 def bus(profile: Profile) -> CapacityFigures:
     """Capacity under the timing model that decides."""
-    return figures(profile, model=profile.bus.timing_model)
+    return figures(profile, model=bus_of(profile).deciding_model)
 
 
 def setup(profile: Profile) -> Setup:

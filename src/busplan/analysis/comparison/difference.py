@@ -224,7 +224,7 @@ def _figures(
 ) -> Iterator[ComparedFigure]:
     buses = (bus_of(a), bus_of(b))
     yield from _compared("plan", plan_figures(*buses), _plan(a), _plan(b))
-    deciding = (("deciding", a.bus.timing_model, b.bus.timing_model),)
+    deciding = (("deciding", buses[0].deciding_model, buses[1].deciding_model),)
     models = model_names(a) if timing_models is None else timing_models
     pairs = tuple((model, model, model) for model in models) if buses[0] is buses[1] else deciding
     for part, of_a, of_b in pairs:
@@ -236,7 +236,7 @@ def _figures(
 
 def _plan(profile: Profile) -> _Figures:
     """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
-    deciding = figures(profile, model=profile.bus.timing_model)
+    deciding = figures(profile, model=bus_of(profile).deciding_model)
     return deciding.by_key() | {VERDICT_FITS.key: deciding.fits}
 
 

@@ -7,7 +7,7 @@ behind. What a line of a derivation shows is therefore what was executed, and no
 import operator
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from math import ceil
+from math import ceil, floor
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -38,7 +38,9 @@ OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
         "ge": _Operation(">=", COMPARISON, operator.ge),
         "eq": _Operation("=", COMPARISON, operator.eq),
         "larger": _Operation("max", FUNCTION, max),
+        "smaller": _Operation("min", FUNCTION, min),
         "rounded_up": _Operation("ceil", FUNCTION, ceil),
+        "rounded_down": _Operation("floor", FUNCTION, floor),
     }
 )
 CHOSEN: Final = "chosen"
@@ -143,14 +145,26 @@ class Traced(SpecialNumber):
         """The larger of two numbers."""
         return Traced(max(value_of(one), value_of(other)), operation="larger", parts=(one, other))
 
+    def smaller_of(self, one: Operand, other: Operand) -> "Traced":
+        """The smaller of two numbers."""
+        return Traced(min(value_of(one), value_of(other)), operation="smaller", parts=(one, other))
+
     def chosen(self, condition: Operand, yes: Operand, no: Operand) -> "Traced":
         """`yes` where the condition holds, else `no`."""
         won = yes if value_of(condition) else no
         return Traced(value_of(won), operation=CHOSEN, parts=(won, condition))
 
+    def is_one(self) -> "Traced":
+        """Whether it is 1."""
+        return _computed("eq", self, 1)
+
     def rounded_up(self) -> "Traced":
         """The next whole number."""
         return Traced(ceil(self.value), operation="rounded_up", parts=(self,))
+
+    def rounded_down(self) -> "Traced":
+        """The whole number before it, or itself."""
+        return Traced(floor(self.value), operation="rounded_down", parts=(self,))
 
     def entry(self, table: Sequence[float], *, words: str, sources: tuple[Operand, ...]) -> "Traced":
         """The entry of a table at this place."""

@@ -1,25 +1,23 @@
-"""The best value of one setting, the others as they are: period, slice ratio, payload, nodes.
+"""The best value of one setting, the others as they are: period, slice ratio, payload.
 
 What has a closed form is computed, and its neighbours on the grid of settings are tested. The largest payload and the
 smallest period that passes the circle are scanned: neither a measured execution table nor a contour error is monotone.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from math import ceil
 from typing import Final, NamedTuple
 
-from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
-from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.analysis.capacity.cycle import available_us, fits_in
 from busplan.analysis.latency import with_payload
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.cures import RATIO_STEPS
+from busplan.analysis.planning.cures import RATIO_STEPS, safe_required_us
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
 
-Models = Sequence[str]
 Circle = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 
@@ -44,14 +42,9 @@ class Largest(NamedTuple):
     bounded_by: str
 
 
-def required_us(profile: Profile, *, models: Models) -> float:
-    """What the cycle needs under the model that needs most [us]."""
-    return max(float(cycle_of(profile, model=model).required_us) for model in models)
-
-
-def smallest_ratio(profile: Profile, *, models: Models) -> float:
-    """Smallest slice ratio that the cycle fits with, in steps of 0.0001; above 1 there is none."""
-    needed_us, period_us = required_us(profile, models=models), profile.cycle.period_us
+def smallest_ratio(profile: Profile) -> float:
+    """Smallest slice ratio that the cycle is shown to fit with, in steps of 0.0001; above 1 there is none."""
+    needed_us, period_us = safe_required_us(profile), profile.cycle.period_us
     steps = _smallest(
         needed_us / period_us * RATIO_STEPS,
         fits=lambda number: fits_in(needed_us, available_us=number / RATIO_STEPS * period_us),
@@ -59,10 +52,8 @@ def smallest_ratio(profile: Profile, *, models: Models) -> float:
     return steps / RATIO_STEPS
 
 
-def smallest_period(
-    profile: Profile, *, models: Models, circle: Circle | None = None, max_circles: int = MAX_CIRCLES
-) -> PeriodSearch:
-    """Find the smallest period that the cycle fits in and that passes the circle.
+def smallest_period(profile: Profile, *, circle: Circle | None = None, max_circles: int = MAX_CIRCLES) -> PeriodSearch:
+    """Find the smallest period that the cycle is shown to fit in and that passes the circle.
 
     For the bus alone there is a closed form, rounded up to whole us. The circle asks for multiples of the servo's step,
     and each one from there on is tested: the first to pass is the smallest. After `max_circles` of them the strides
@@ -72,14 +63,12 @@ def smallest_period(
     ----------
     profile
         The network; its own period plays no part.
-    models
-        Timing models that it must fit under.
     circle
         The circle test; without it no circle is run.
     max_circles
         How many periods in a row are tested, 1 or more [1].
     """
-    needed_us, ratio = required_us(profile, models=models), profile.cycle.slice_ratio
+    needed_us, ratio = safe_required_us(profile), profile.cycle.slice_ratio
     step_us = 1.0 if circle is None else profile.servo.step_us
     first = _smallest(
         needed_us / ratio / step_us,
@@ -96,8 +85,8 @@ def smallest_period(
     raise AssertionError("the numbers never end")
 
 
-def largest_payload(profile: Profile, *, model: str) -> Largest:
-    """Largest payload of read and write alike that fits the period, in the steps of the bus [bytes].
+def largest_payload(profile: Profile) -> Largest:
+    """Largest payload of read and write alike that is shown to fit the period, in the steps of the bus [bytes].
 
     Every size is tried from the largest one that the bus carries and the execution table knows.
     """
@@ -111,21 +100,9 @@ def largest_payload(profile: Profile, *, model: str) -> Largest:
         most = min(most, Largest(known, "execution"), key=lambda one: one.value)
     given_us = available_us(network)
     for size in range(most.value, smallest - 1, -step):
-        if fits_in(cycle_of(with_payload(profile, size), model=model).required_us, available_us=given_us):
+        if fits_in(safe_required_us(with_payload(profile, size)), available_us=given_us):
             return most if size == most.value else Largest(size, "time")
     return Largest(0, "execution" if most.value < smallest else "time")
-
-
-def most_nodes(profile: Profile, *, model: str) -> Largest:
-    """Largest number of nodes that fits the period, and that the bus as it is set is safe for."""
-    most, limit = largest_nodes(profile, model=model)
-    bus, network = bus_of(profile), network_of(profile)
-    for nodes in range(most, 0, -1):
-        unsafe = [one.key for one in bus.limits if one.is_safety and one.is_broken(network.with_nodes(nodes))]
-        if not unsafe:
-            return Largest(nodes, limit)
-        limit = unsafe[0]
-    return Largest(0, limit)
 
 
 def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:

@@ -1,4 +1,4 @@
-"""The cheapest change of a profile that makes it fit, or that makes room for more nodes.
+"""The cheapest change after which a profile is shown to fit, or that makes room for more nodes.
 
 Changes are tried from the cheapest: what the bus itself lets a plan turn; the slice ratio, which is computing time of
 the host; the period, which is what the machine is for. Each is put into the profile and computed again: what is
@@ -6,12 +6,14 @@ advised has been seen to work, and is safe for the nodes it is advised for.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import ceil
 from typing import Final, NamedTuple
 
-from busplan.analysis.capacity.cycle import TIME, available_us, cycle_of, fits_in
+from busplan.analysis.capacity.certainty import FITS, certainty
+from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.capacity.node_limit import safe_nodes
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
@@ -62,36 +64,32 @@ class Change(NamedTuple):
     nodes: int
     """Nodes that the change is made for."""
     figures: CapacityFigures
-    """The capacity after it, under the model it is made for that leaves the least."""
+    """The capacity after it, under the model that decides."""
 
 
-def change_to_fit(profile: Profile, *, models: Sequence[str]) -> Change | None:
-    """Find the cheapest change after which a profile fits under every one of some timing models.
+def change_to_fit(profile: Profile) -> Change | None:
+    """Find the cheapest change after which a profile is shown to fit on a bus that is set safely.
 
     Parameters
     ----------
     profile
-        A network that does not fit under one of them, or that is unsafe.
-    models
-        Timing models.
+        A network that is not shown to fit, or that is unsafe.
 
     Returns
     -------
     Change
         None when no single kind of change does.
     """
-    return next(changes_to_fit(profile, models=models), None)
+    return next(changes_to_fit(profile), None)
 
 
-def changes_to_fit(profile: Profile, *, models: Sequence[str]) -> Iterator[Change]:
-    """Find every kind of change after which a profile fits under every one of some timing models.
+def changes_to_fit(profile: Profile) -> Iterator[Change]:
+    """Find every kind of change after which a profile is shown to fit on a bus that is set safely.
 
     Parameters
     ----------
     profile
         The network.
-    models
-        Timing models.
 
     Yields
     ------
@@ -104,59 +102,57 @@ def changes_to_fit(profile: Profile, *, models: Sequence[str]) -> Iterator[Chang
         cured = override(profile, dict(cures))
     except BusplanError:  # a payload that the bus could carry and the execution table does not know
         return
-    for cure in ({}, *_time_cures(cured, nodes, models)):
-        after = _after(profile, {**cures, **cure}, models=models)
-        if after and all(one.fits and one.safe for one in after):
-            yield Change({**cures, **cure}, nodes, min(after, key=lambda one: one.margin_us))
+    for cure in ({}, *_time_cures(cured, nodes)):
+        after = _after(profile, {**cures, **cure})
+        if after is not None and after.verdict == FITS and after.safe:
+            yield Change({**cures, **cure}, nodes, after)
 
 
-def change_for_more(profile: Profile, *, model: str) -> Change | None:
-    """Find the cheapest change after which a fitting profile's period carries more nodes.
+def change_for_more(profile: Profile) -> Change | None:
+    """Find the cheapest change after which a fitting profile's period carries more safe nodes.
 
     Parameters
     ----------
     profile
         A network that fits.
-    model
-        Timing model.
 
     Returns
     -------
     Change
-        None when time is not what limits the nodes, or no single kind of change does.
+        None when neither time nor a setting limits the nodes, or no single kind of change does.
     """
-    now = figures(profile, model=model)
-    if now.limited_by != TIME:
+    most, limit = safe_nodes(profile)
+    bus = bus_of(profile)
+    bound = bus.limit(limit)
+    if bound is not None and not bound.is_safety:
         return None
-    best, setting = _best_setting(profile, model=model)
-    if best > now.max_nodes:
-        after = _after(profile, setting, models=[model])
-        if after and after[0].max_nodes >= best:
-            return Change(setting, best, after[0])
-    nodes = now.max_nodes + 1
-    if not bus_of(profile).is_safe(network_of(profile).with_nodes(nodes)):
+    best, setting = _best_setting(profile)
+    if best > most:
+        after = _after(profile, setting)
+        if after is not None and _carries(after, best):
+            return Change(setting, best, after)
+    nodes = most + 1
+    if not bus.is_safe(network_of(profile).with_nodes(nodes)):
         # What is safe for fewer nodes must not carry more.
         return None
-    for cure in _time_cures(profile, nodes, [model]):
-        after = _after(profile, cure, models=[model])
-        if after and after[0].max_nodes >= nodes:
-            return Change(cure, nodes, after[0])
+    for cure in _time_cures(profile, nodes):
+        after = _after(profile, cure)
+        if after is not None and _carries(after, nodes):
+            return Change(cure, nodes, after)
     return None
 
 
-def change_for_room(profile: Profile, *, model: str, nodes: int, utilisation: float = 1.0) -> Change | None:
-    """Find the cheapest change after which a bus carries some nodes, and its own use no more than a share of the slice.
+def change_for_room(profile: Profile, *, nodes: int, utilisation: float = 1.0) -> Change | None:
+    """Find the cheapest change after which a bus carries some safe nodes, and its own take a share of the slice.
 
     Parameters
     ----------
     profile
         A network that keeps the limits of its bus.
-    model
-        Timing model.
     nodes
         Nodes that the period must carry [1].
     utilisation
-        Share of the slice that they may use, 0..1 [1].
+        Share of the slice that the profile's own nodes may use, 0..1 [1].
 
     Returns
     -------
@@ -165,14 +161,32 @@ def change_for_room(profile: Profile, *, model: str, nodes: int, utilisation: fl
     """
     if utilisation < _SMALLEST_SHARE:
         return None
-    for cure in _time_cures(profile, nodes, [model], share=utilisation):
-        after = _after(profile, cure, models=[model])
-        if after and after[0].max_nodes >= nodes and after[0].utilisation <= utilisation:
-            return Change(cure, nodes, after[0])
+    for cure in _time_cures(profile, nodes, share=utilisation):
+        after = _after(profile, cure)
+        if after is not None and _carries(after, nodes) and after.utilisation <= utilisation:
+            return Change(cure, nodes, after)
     return None
 
 
-def _best_setting(profile: Profile, *, model: str) -> tuple[int, dict[str, Value]]:
+def _carries(after: CapacityFigures, nodes: int) -> bool:
+    return after.safe_nodes is not None and after.safe_nodes >= nodes
+
+
+def safe_required_us(profile: Profile, *, nodes: int | None = None) -> float:
+    """What the slice must give for a cycle to be shown to fit, with the reserve [us].
+
+    Parameters
+    ----------
+    profile
+        The network.
+    nodes
+        Nodes on the bus [1]; without it the profile's own number.
+    """
+    cycle = cycle_of(profile, model=bus_of(profile).deciding_model, nodes=nodes)
+    return float(certainty(cycle).safe_required_us)
+
+
+def _best_setting(profile: Profile) -> tuple[int, dict[str, Value]]:
     """The most nodes that one setting of the bus carries with a value that is safe for just them, and that value."""
     bus, network = bus_of(profile), network_of(profile)
     given_us = available_us(network)
@@ -180,8 +194,8 @@ def _best_setting(profile: Profile, *, model: str) -> tuple[int, dict[str, Value
     def fitting(nodes: int) -> dict[str, Value] | None:
         as_it_is: list[dict[str, Value]] = [{}] if bus.is_safe(network.with_nodes(nodes)) else []
         for setting in (*as_it_is, *_settings(profile, nodes)):
-            required_us = cycle_of(override(profile, dict(setting)), model=model, nodes=nodes).required_us
-            if fits_in(required_us, available_us=given_us):
+            needed_us = safe_required_us(override(profile, dict(setting)), nodes=nodes)
+            if fits_in(needed_us, available_us=given_us):
                 return setting
         return None
 
@@ -209,34 +223,37 @@ def _ceiling(profile: Profile) -> int:
     return bisect_right(range(1, most + 1), x=False, key=is_over)
 
 
-def _time_cures(
-    profile: Profile, nodes: int, models: Sequence[str], *, share: float = 1.0
-) -> Iterator[dict[str, Value]]:
+def _time_cures(profile: Profile, nodes: int, *, share: float = 1.0) -> Iterator[dict[str, Value]]:
     """Changes that win time for that many nodes to use a share of the slice, the cheapest first."""
-    own_us = _required_us(profile, nodes, models)
-    settings = [
-        one for one in _settings(profile, nodes) if _required_us(override(profile, dict(one)), nodes, models) < own_us
-    ]
+
+    def needed_us(setting: Mapping[str, Value]) -> float:
+        return _needed_us(override(profile, dict(setting)), nodes, share)
+
+    own_us = needed_us({})
+    settings = [one for one in _settings(profile, nodes) if needed_us(one) < own_us]
     yield from settings
     # A wider slice alone, then with a setting: one key is a smaller change than two.
     for before in ({}, *settings):
-        required_us = _required_us(override(profile, dict(before)), nodes, models) / share
-        ratio = ceil(required_us / profile.cycle.period_us * RATIO_STEPS) / RATIO_STEPS
+        ratio = ceil(needed_us(before) / profile.cycle.period_us * RATIO_STEPS) / RATIO_STEPS
         if ratio <= MAX_ADVISED_RATIO:
             yield {**before, "cycle.slice_ratio": ratio}
     for before in ({}, *settings):
-        required_us = _required_us(override(profile, dict(before)), nodes, models) / share
-        yield {**before, "cycle.period_us": ceil(required_us / profile.cycle.slice_ratio)}
+        yield {**before, "cycle.period_us": ceil(needed_us(before) / profile.cycle.slice_ratio)}
 
 
-def _required_us(profile: Profile, nodes: int, models: Sequence[str]) -> float:
-    return max(float(cycle_of(profile, model=model, nodes=nodes).required_us) for model in models)
+def _needed_us(profile: Profile, nodes: int, share: float) -> float:
+    """What the slice must give: to be shown to fit, and to use no more than a share of it [us]."""
+    shown_us = safe_required_us(profile, nodes=nodes)
+    if share >= 1:
+        return shown_us
+    cycle = cycle_of(profile, model=bus_of(profile).deciding_model, nodes=nodes)
+    return max(shown_us, float(cycle.required_us) / share)
 
 
-def _after(profile: Profile, changes: dict[str, Value], *, models: Sequence[str]) -> list[CapacityFigures]:
-    """Capacity after some changes under each model; empty where the profile's schema refuses them."""
+def _after(profile: Profile, changes: dict[str, Value]) -> CapacityFigures | None:
+    """Capacity after some changes under the model that decides; None where the profile's schema refuses them."""
     try:
         changed = override(profile, dict(changes))
     except BusplanError:
-        return []
-    return [figures(changed, model=model) for model in models]
+        return None
+    return figures(changed, model=bus_of(changed).deciding_model)

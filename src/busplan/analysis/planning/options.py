@@ -6,19 +6,19 @@ Every option is put into the profile and computed again.
 from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
+from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.cycle import broken_limits
 from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.capacity.node_limit import safe_nodes
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.best_values import (
     MAX_CIRCLES,
     Circle,
     largest_payload,
-    most_nodes,
-    required_us,
     smallest_period,
     smallest_ratio,
 )
-from busplan.analysis.planning.cures import changes_to_fit
+from busplan.analysis.planning.cures import changes_to_fit, safe_required_us
 from busplan.buses.bus import Setting, Value
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
@@ -54,9 +54,8 @@ class Option(NamedTuple):
 
     @property
     def is_plan(self) -> bool:
-        """Whether it fits under every model, the bus is safe, and the circle passes if it was run."""
-        fits = self.deciding.fits and all(other.fits for other in self.others)
-        return fits and self.deciding.safe and not self.circle_failures
+        """Whether it is shown to fit, the bus is safe, and the circle passes if it was run."""
+        return self.deciding.verdict == FITS and self.deciding.safe and not self.circle_failures
 
 
 class Impossible(NamedTuple):
@@ -100,9 +99,9 @@ def plan(
     """Find what to set.
 
     The recommended option is the first, in the order of `cures` (nothing, a setting of the bus, slice ratio, both,
-    period, period and a setting; with them what the limits of the bus demand), after which the goal fits under every
-    timing model on a bus that is set safely, and passes the circle test. It changes nothing that was asked for, and
-    never the number of nodes. The other options are found under the timing model that decides.
+    period, period and a setting; with them what the limits of the bus demand), after which the goal is shown to fit on
+    a bus that is set safely, and passes the circle test. It changes nothing that was asked for, and never the number of
+    nodes.
 
     Parameters
     ----------
@@ -163,8 +162,8 @@ def _differing(profile: Profile, changes: Changes) -> Changes:
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
 
 
-_CHEAPEST: Final = ("cheapest that fits", "cheapest that meets both models", "cheapest that meets every model")
-"""Title of the recommendation where it is none of the other options, for one timing model, for two and for more."""
+_CHEAPEST: Final = "cheapest that is shown to fit"
+"""Title of the recommendation where it is none of the other options."""
 
 
 class _Planner:
@@ -172,13 +171,12 @@ class _Planner:
 
     def __init__(self, goal: Profile, *, circle: Circle | None, max_circles: int) -> None:
         self.goal = goal
-        self.model = goal.bus.timing_model
-        self.models = model_names(goal)
+        self.model = bus_of(goal).deciding_model
         self.circle = circle
         self.max_circles = max_circles
 
     def options(self) -> Iterator[Option | Impossible]:
-        """The best value of each setting under the model that decides."""
+        """The best value of each setting."""
         goal = self.goal
         yield self.option("as it is", {})
         settings = bus_of(goal).settings(network_of(goal))
@@ -209,7 +207,7 @@ class _Planner:
 
     def recommended(self, *, keep: set[str]) -> Option | None:
         """The cheapest change that makes a plan, of those that leave some keys alone."""
-        for change in changes_to_fit(self.goal, models=self.models):
+        for change in changes_to_fit(self.goal):
             changes = dict(change.changes)
             if keep & set(changes):
                 continue
@@ -218,7 +216,6 @@ class _Planner:
                 del changes["cycle.period_us"]
                 found = smallest_period(
                     override(self.goal, dict(changes)),
-                    models=self.models,
                     circle=self.circle,
                     max_circles=self.max_circles,
                 )
@@ -226,8 +223,7 @@ class _Planner:
                     continue
                 changes["cycle.period_us"] = found.period_us
                 bounded_by, proven = found.bounded_by, found.proven
-            title = _CHEAPEST[min(len(self.models), len(_CHEAPEST)) - 1]
-            option = self.option(title, changes, bounded_by=bounded_by, proven=proven)
+            option = self.option(_CHEAPEST, changes, bounded_by=bounded_by, proven=proven)
             if option.is_plan:
                 return option._replace(recommended=True)
         return None
@@ -236,7 +232,7 @@ class _Planner:
         """Put changes into the goal and compute what they bring."""
         changed = override(self.goal, dict(changes))
         deciding = figures(changed, model=self.model)
-        others = (model for model in self.models if model != self.model)
+        others = (model for model in model_names(changed) if model != self.model)
         return Option(
             title=title,
             changes=changes,
@@ -244,7 +240,7 @@ class _Planner:
             deciding=deciding,
             others=tuple(figures(changed, model=model) for model in others),
             bounded_by=bounded_by,
-            circle_failures=self.circle(changed) if self.circle and deciding.fits else None,
+            circle_failures=self.circle(changed) if self.circle and deciding.verdict == FITS else None,
             proven=proven,
         )
 
@@ -259,7 +255,7 @@ class _Planner:
         changed = override(self.goal, dict(changes))
         if broken_limits(changed):
             return self.fitting(title, changes, bounded_by="time")
-        found = smallest_period(changed, models=[self.model], circle=self.circle, max_circles=self.max_circles)
+        found = smallest_period(changed, circle=self.circle, max_circles=self.max_circles)
         if found.period_us is None:
             too_long = f"it would be over {MAX_TIME_US / 1e6:g} s"
             reason = "no period passes the circle" if found.bounded_by == "circle" else too_long
@@ -268,14 +264,14 @@ class _Planner:
         return self.fitting(title, changes, bounded_by=found.bounded_by, proven=found.proven)
 
     def ratio(self, title: str) -> Option | Impossible:
-        ratio = smallest_ratio(self.goal, models=[self.model])
+        ratio = smallest_ratio(self.goal)
         if ratio > 1:
-            needed_us = required_us(self.goal, models=[self.model])
-            return Impossible(title, f"the cycle needs {needed_us:.3f} us, more than the whole period")
+            needed_us = safe_required_us(self.goal)
+            return Impossible(title, f"the cycle needs {needed_us:.3f} us to be shown to fit, over the period")
         return self.fitting(title, {"cycle.slice_ratio": ratio}, bounded_by="time")
 
     def payload(self, title: str) -> Option | Impossible:
-        size, bounded_by = largest_payload(self.goal, model=self.model)
+        size, bounded_by = largest_payload(self.goal)
         if not size:
             reason = (
                 "the execution table holds no whole step of the payload"
@@ -287,7 +283,7 @@ class _Planner:
         return self.fitting(title, changes, bounded_by=bounded_by)
 
     def nodes(self, title: str, profile: Profile, *, setting: Setting | None = None) -> Option | Impossible:
-        nodes, bounded_by = most_nodes(profile, model=self.model)
+        nodes, bounded_by = safe_nodes(profile)
         if not nodes:
             reason = "no node fits" if bounded_by == "time" else f"limited by {bounded_by}"
             return Impossible(title, reason)

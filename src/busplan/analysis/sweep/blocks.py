@@ -10,12 +10,14 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from busplan.analysis.capacity.certainty import VERDICTS, certainty, limits_to_be_safe, verdict_code
 from busplan.analysis.capacity.cycle import TIME, fits_in, limits_with_time
-from busplan.analysis.capacity.figures import numeric_figures
-from busplan.analysis.capacity.node_limit import most_nodes
+from busplan.analysis.capacity.figures import certainty_numbers, numeric_figures
+from busplan.analysis.capacity.node_limit import MostNodes, most_nodes
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
-from busplan.buses.figure import Sort
+from busplan.buses.bus import BusCycle
+from busplan.buses.figure import CERTAINTY, Sort
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
@@ -23,9 +25,10 @@ from busplan.sections.profile import Profile
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays stay in the processor's cache."""
 
-Word: TypeAlias = str | float | list[str]
-"""What stands in a column that is no array of numbers: a word, a value of a key that also takes words, or a list."""
-Cell: TypeAlias = Word | None
+Word: TypeAlias = str | float | list[str] | None
+"""What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
+nothing."""
+Cell: TypeAlias = Word
 """One figure of one row."""
 
 _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bool}
@@ -157,20 +160,50 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     flags = [late if limit.key == TIME else limit.is_broken(network) for limit in limits]
     bits = np.min_scalar_type((1 << len(flags)) - 1)
     exceeded: Number = sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags))
-    most = most_nodes(network, model=model)
+    most = most_nodes(network, limits)
     numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)
+    own = _certainty(cycle, most) if model == bus.deciding_model else dict.fromkeys(_UNDECIDED, _NOTHING)
     words = {
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
         "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
         "limited_by": Column(np.asarray(most.limit, np.uint8), keys),
         "exceeded": Column(exceeded, _combinations(keys)),
+        **own,
     }
     found = {
         figure.key: words[figure.key] if figure.key in words else Column(_typed(numbers[figure.key], figure.sort))
         for figure in bus.capacity_figures
     }
     return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
+
+
+_UNDECIDED: Final = tuple(figure.key for figure in CERTAINTY)
+_NOTHING: Final = Column(np.zeros((), np.uint8), (None,))
+"""A figure that does not exist under a timing model."""
+
+
+def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:
+    """Figures of how sure the verdict is, of a cycle under the timing model that decides."""
+    network, bus = cycle.network, bus_of(cycle.network.profile)
+    found, limits = certainty(cycle), limits_to_be_safe(network)
+    # No more nodes are shown to fit than fit.
+    safe = most_nodes(network, limits, ceiling=int(np.max(most.nodes)))
+    broken: Number = False
+    for limit in bus.limits:
+        if not limit.is_safety:
+            broken = np.logical_or(broken, limit.is_broken(network))
+    sorts = {figure.key: figure.sort for figure in CERTAINTY}
+    numbers = {
+        **certainty_numbers(found, cycle),
+        "safe_nodes": safe.nodes,
+        "safe_axes": network.groups[0].axes * safe.nodes,
+    }
+    return {
+        **{key: _NOTHING if number is None else Column(_typed(number, sorts[key])) for key, number in numbers.items()},
+        "safe_limited_by": Column(np.asarray(safe.limit, np.uint8), tuple(limit.key for limit in limits)),
+        "verdict": Column(np.asarray(verdict_code(found, network, is_broken=broken), np.uint8), VERDICTS),
+    }
 
 
 @cache

@@ -1,14 +1,12 @@
-"""Circle tests over a grid: one for each point and timing model, in any order and in any process."""
+"""Circle tests over a grid: one for each point, in any order and in any process."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
-from busplan.analysis.network import model_names
 from busplan.analysis.sweep.blocks import Block, Column, figure_names
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
@@ -36,28 +34,16 @@ def all_columns(profile: Profile, grid: Grid, *, with_circle: bool) -> tuple[str
 
 
 class CircleTask(NamedTuple):
-    """One point's circle tests; a process can be handed it."""
+    """One point's circle test; a process can be handed it."""
 
     profile: Profile
     changes: dict[str, object]
-    timing_models: tuple[str, ...]
 
 
-def run_task(task: CircleTask) -> list[Figures]:
-    """Run the circle test of a point under each timing model, as if that model decided."""
-    found: dict[str, Figures] = {}
-    on_node: Figures | None = None
-    for model in task.timing_models:
-        profile = override(task.profile, {**task.changes, "bus.timing_model": model})
-        if on_node is not None and bus(profile).fits:
-            found[model] = on_node
-            continue
-        (result,) = circle_test(profile, explain=False).results
-        found[model] = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
-        if result.bus_fits and result.loop == "node":
-            # Such a loop knows nothing of the bus but whether it fits: the next model's circle is the same.
-            on_node = found[model]
-    return [found[model] for model in task.timing_models]
+def run_task(task: CircleTask) -> Figures:
+    """Run the circle test of a point."""
+    (result,) = circle_test(override(task.profile, task.changes), explain=False).results
+    return tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
 
 
 def require_circles(profile: Profile, grid: Grid) -> None:
@@ -73,22 +59,15 @@ def require_circles(profile: Profile, grid: Grid) -> None:
         changes = chunk.point(0)
         variant = override(profile, changes)
         try:
-            # No model carries it: it has an answer, but no circle.
-            carried = any(figures(variant, model=model).fits for model in model_names(variant))
-            _ = setup(variant) if carried else loop_timing(variant)
+            # What the bus does not carry has an answer, but no circle.
+            _ = setup(variant) if bus(variant).fits else loop_timing(variant)
         except BusplanError as error:
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
             raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None
 
 
-def with_circles(
-    profile: Profile,
-    block: Block,
-    *,
-    timing_models: Sequence[str],
-    run: Callable[[Iterable[CircleTask]], Iterable[list[Figures]]],
-) -> Block:
-    """Add the columns of circle tests to a block.
+def with_circles(profile: Profile, block: Block, *, run: Callable[[Iterable[CircleTask]], Iterable[Figures]]) -> Block:
+    """Add the columns of circle tests to a block: one test a point, the same beside every timing model.
 
     Parameters
     ----------
@@ -96,26 +75,15 @@ def with_circles(
         The network.
     block
         Its capacity.
-    timing_models
-        The models that it was computed under.
     run
         Runs `run_task` for each task, here or in other processes, and keeps their order.
     """
-    models = tuple(timing_models)
-    tasks = (CircleTask(profile, block.chunk.point(index), models) for index in range(block.chunk.points))
-    results = list(run(tasks))
-    return block._replace(
-        models=tuple(
-            {
-                **figures,
-                **{
-                    name: Column(_array([point[number][place] for point in results]).reshape(block.chunk.shape))
-                    for place, name in enumerate(CIRCLE_COLUMNS)
-                },
-            }
-            for number, figures in enumerate(block.models)
-        )
-    )
+    results = list(run(CircleTask(profile, block.chunk.point(index)) for index in range(block.chunk.points)))
+    circles = {
+        name: Column(_array([point[place] for point in results]).reshape(block.chunk.shape))
+        for place, name in enumerate(CIRCLE_COLUMNS)
+    }
+    return block._replace(models=tuple({**figures, **circles} for figures in block.models))
 
 
 def _array(values: Sequence[float | None]) -> Array:

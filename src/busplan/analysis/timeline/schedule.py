@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.network import bus_of, leading_model, network_of
 from busplan.buses.bus import IDLE, BusEvent
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
@@ -108,7 +108,7 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     profile
         The network.
     model
-        Timing model; without it the one that decides.
+        Timing model; without it the one whose figures lead.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
         limit = bus.limit("nodes")
         carries = "" if limit is None else f"; one bus carries {limit.most(network_of(profile)):g}"
         raise BusplanError(f"bus.nodes = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
-    model = profile.bus.timing_model if model is None else model
+    model = leading_model(profile) if model is None else model
     closed = figures(profile, model=model)
     events = list(_laid_out(cycle_of(profile, model=model).events()))
     end_us = events[-1].end_us

@@ -111,7 +111,7 @@ PHY_DELAY_TICKS: Final = Sourced(
     14,
     unit="gap clock ticks",
     grade="published",
-    source="eqs (4)-(6); at the base rate 0.142 us, the 144 ns PHY delay of P1394a",
+    source="eqs (4)-(6); at the base rate 0.142 us: TI TSB12LV41, p. 3-43, has 144 ns in the worst case",
     meaning="repeat delay of one PHY",
 )
 ARBITRATION_GAP_TICKS: Final = Sourced(
@@ -139,7 +139,7 @@ SUBACTION_GAP_TICKS: Final = Sourced(
     29,
     unit="gap clock ticks",
     grade="derived",
-    source="eq (10) taken apart: 82 + 48 g = (29 + 16 g) + (53 + 32 g)",
+    source="eq (10) taken apart: 82 + 48 g = (29 + 16 g) + (53 + 32 g); a threshold of idle bus, TI TSB12LV01B, p. 7-6",
     meaning="constant part of the subaction gap",
 )
 SUBACTION_GAP_TICKS_PER_COUNT: Final = Sourced(
@@ -184,6 +184,41 @@ EQ15_CONSTANT_US: Final = Sourced(
     grade="published",
     source="eq (15)",
     meaning="eqs (4)-(6) at one hop, gap count 63 and S400, each rounded to two decimals and added",
+)
+
+# --- cycle starts ------------------------------------------------------------------------------------------
+
+CYCLE_US: Final = Sourced(
+    125,
+    unit="us",
+    grade="published",
+    source="Linux, drivers/firewire/core.h: 8000 cycles a second",
+    meaning="time from one cycle start to the next",
+    symbol="T_iso",
+)
+CYCLE_START_BYTES: Final = Sourced(
+    20,
+    unit="bytes",
+    grade="published",
+    source="the header formats of IEEE 1394: 160 bits, sent at S100",
+    meaning="cycle start packet on the wire",
+)
+SYNC_PACKET_BYTES: Final = Sourced(
+    QUADLET_WRITE_REQUEST_BYTES,
+    unit="bytes",
+    grade="derived",
+    source="a broadcast quadlet write: paper, section III-C, and the header formats of IEEE 1394",
+    meaning="synchronous packet on the wire",
+)
+
+# --- how well the model is known --------------------------------------------------------------------------
+
+PHY_DELAY_HALF_WIDTH_US: Final = Sourced(
+    0.020,
+    unit="us",
+    grade="assumed",
+    source="chosen: PHYs repeat faster than the worst case of 144 ns",
+    meaning="half of the range that the repeat delay of a PHY lies in",
 )
 
 # --- measured and set on the paper's bench: what a profile has that does not say otherwise ------------------

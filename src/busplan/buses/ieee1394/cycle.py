@@ -1,111 +1,36 @@
 """One communication cycle on an IEEE 1394 bus: as terms, as events, and the figures that go with it."""
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property
-from typing import Final, NamedTuple
+from functools import cached_property, reduce
+from typing import Final
 
-from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Limit, Term
+from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.figure import AVAILABLE
-from busplan.buses.ieee1394 import equations, figures
+from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
+    CYCLE_START_BYTES,
+    CYCLE_US,
     DATA_RATE_MBIT_S,
-    MAX_HOPS,
-    MAX_NODES,
-    MAX_PAYLOAD_BYTES,
+    SYNC_PACKET_BYTES,
     safe_gap_count,
 )
-from busplan.buses.ieee1394.timing import (
-    TIMING_MODELS,
-    Link,
-    Phases,
-    TimingModelName,
-    transaction,
-)
-from busplan.buses.network import TRANSACTION_KINDS, Group, Network, TransactionKind
+from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingModelName, delays
+from busplan.buses.ieee1394.transactions import Exchange, events, exchange, link_of, parts
+from busplan.buses.network import TRANSACTION_KINDS, Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, SpecialNumber, alike, named, total, worded
+from busplan.elementwise import Number, choose, is_one, larger, named, rounded_down, total
 
-_LATENCY_SYMBOLS: Final = {figure.key: figure.symbol for figure in figures.LATENCY}
-
-
-def hops_of(network: Network) -> Number:
-    """Most cable hops [1].
-
-    In a chain they lie between the host and the farthest node. In a tree they are `max_hops`, which the host's own way
-    to a node never exceeds.
-    """
-    most = network.profile.bus.max_hops
-    return worded(network.nodes, "N: a chain with the host at its end") if most is None else most
-
-
-def gap_count_of(network: Network) -> Number:
-    """Gap count in force [1]."""
-    given = network.profile.bus.gap_count
-    if not isinstance(given, str):
-        return given
-    return worded(safe_gap_count(hops_of(network)), 'g_safe, for bus.gap_count is "optimal"')
-
-
-def link_of(network: Network) -> Link:
-    """Rate, gap count and distance of the farthest node."""
-    bus = network.profile.bus
-    return Link(
-        data_rate_mbit_s=alike(DATA_RATE_MBIT_S[bus.speed], network.nodes),
-        gap_count=named(gap_count_of(network), "gap_count", "g"),
-        hops=named(hops_of(network), "hops", "H"),
-        cable_length_m=bus.cable_length_m,
-    )
-
-
-class Exchange(NamedTuple):
-    """The same transaction with each node of a group."""
-
-    kind: TransactionKind
-    nodes: Number
-    payload_bytes: Number
-    phases: Phases
-
-
-def exchange(
-    network: Network, group: Group, kind: TransactionKind, *, model: TimingModelName, link: Link, suffix: str = ""
-) -> Exchange:
-    """Take the transaction of a group apart.
-
-    Parameters
-    ----------
-    network
-        The network.
-    group
-        One of its groups.
-    kind
-        "read" or "write".
-    model
-        Timing model.
-    link
-        The way of the packets.
-    suffix
-        What tells its symbols from those of other transactions in a derivation.
-    """
-    is_read = kind == "read"
-    size = group.read_bytes if is_read else group.write_bytes
-    phases = transaction(
-        kind,
-        model=TIMING_MODELS[model],
-        link=link,
-        payload_bytes=size,
-        overhead_bytes=network.profile.payload.overhead_bytes,
-        execution_us=group.read_execution_us if is_read else group.write_execution_us,
-    )
-    return Exchange(kind, group.nodes, size, _with_names(phases, suffix))
-
-
-def _with_names(phases: Phases, suffix: str) -> Phases:
-    """The same phases, each with its symbol if they are traced numbers."""
-    if not isinstance(phases.latency_us, SpecialNumber):
-        return phases
-    return Phases(
-        **{key: named(value, key, f"{_LATENCY_SYMBOLS[key]}{suffix}") for key, value in phases._asdict().items()}
-    )
+_OF_TRANSACTIONS: Final = (
+    "cycle_arbitration_us",
+    "cycle_data_us",
+    "cycle_acknowledge_us",
+    "cycle_hold_us",
+    "cycle_execution_us",
+    "cycle_worst_extra_us",
+    "cycle_idle_us",
+    "cycle_host_us",
+)
+"""Terms that add up the parts of all transactions."""
 
 
 class Ieee1394Cycle(BusCycle):
@@ -117,6 +42,8 @@ class Ieee1394Cycle(BusCycle):
     ----------
     Paper, section III-C and equations (2)-(11), Figs. 4, 5 and 7.
     """
+
+    model: TimingModelName
 
     def __init__(self, network: Network, model: TimingModelName) -> None:
         self.network = network
@@ -134,23 +61,108 @@ class Ieee1394Cycle(BusCycle):
         )
 
     @cached_property
+    def _delays(self) -> Delays:
+        return delays(self.link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes))
+
+    @cached_property
     def sync_us(self) -> Number:
-        """CTS, the synchronous packet that opens the cycle [us]."""
-        sync = self.network.profile.cycle.sync
-        return sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
+        """CTS, the synchronous packet that opens the cycle [us].
+
+        In `paper` its measured latency; in `standard` a broadcast write without an acknowledge, the host's first packet
+        of the interval.
+        """
+        if self.model == "paper":
+            sync = self.network.profile.cycle.sync
+            return sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
+        own, link = self._delays, self.link
+        data_us = equations.data_phase_us(
+            link.hops, hop_us=own.hop_us, packet_bytes=SYNC_PACKET_BYTES, data_rate_mbit_s=link.data_rate_mbit_s
+        )
+        return own.arbitration_us + data_us + own.gaps.arbitration_reset_us
+
+    @cached_property
+    def retries_us(self) -> Number:
+        """Busy retries of the longest request, each with an arbitration reset gap [us]."""
+        retries = self.network.profile.cycle.retries
+        if isinstance(retries, int) and not retries:
+            return 0.0
+        own = self._delays
+        longest_us = reduce(larger, (one.phases.request_data_us for one in self.exchanges))
+        return retries * (own.arbitration_us + longest_us + own.acknowledge_us + own.gaps.arbitration_reset_us)
+
+    @cached_property
+    def cycle_start_us(self) -> Number:
+        """What one cycle start costs: it destroys idle time already run, and goes at S100 [us]."""
+        own, link = self._delays, self.link
+        data_us = equations.data_phase_us(
+            link.hops, hop_us=own.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
+        )
+        isochronous_us = self.network.profile.bus.isochronous_us
+        return own.gaps.arbitration_reset_us + own.arbitration_us + data_us + isochronous_us
+
+    def starts(self, others_us: Number) -> Number:
+        """Number of cycle starts in a cycle whose other terms take some time [1].
+
+        The smallest whole n with n > (others + n start) / 125 us. Where a start takes 125 us or more there is none:
+        then it is the number in the other terms alone.
+
+        Parameters
+        ----------
+        others_us
+            All other terms [us]; of any sort.
+        """
+        left_us = CYCLE_US - self.cycle_start_us
+        return rounded_down(others_us / choose(left_us > 0, left_us, CYCLE_US)) + 1
+
+    @property
+    def _has_starts(self) -> bool:
+        return self.model != "paper" and bool(self.network.profile.bus.cycle_master)
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
-        own = [(one.nodes, one.phases) for one in self.exchanges]
-        return (
+        of_parts = [(one.nodes, part) for one in self.exchanges for part in parts(one)]
+        own = {key: total(nodes * part.us for nodes, part in of_parts if part.term == key) for key in _OF_TRANSACTIONS}
+        retries_us = 0.0 if self.model == "paper" else self.retries_us
+        others = (
             Term("sync_us", self.sync_us),
-            Term("cycle_arbitration_us", total(nodes * (2 * half.arbitration_us) for nodes, half in own)),
-            Term("cycle_data_us", total(nodes * (half.request_data_us + half.response_data_us) for nodes, half in own)),
-            Term("cycle_acknowledge_us", total(nodes * (2 * half.acknowledge_us) for nodes, half in own)),
-            Term("cycle_execution_us", total(nodes * half.execution_us for nodes, half in own)),
-            Term("cycle_gaps_us", total(nodes * half.gaps_us for nodes, half in own)),
+            *(Term(key, us) for key, us in own.items()),
+            Term("retries_us", retries_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),
         )
+        starts_us: Number = 0.0
+        if self._has_starts:
+            starts_us = self.starts(total(one.us for one in others)) * self.cycle_start_us
+        return (Term("cycle_starts_us", starts_us), *others)
+
+    def required_with(self, extra_us: Number) -> Number:
+        """What the cycle needs if its transactions take longer: then there are more cycle starts, too [us]."""
+        _, *others = self.terms
+        others_us = total(one.us for one in others)
+        if not self._has_starts:
+            return others_us + extra_us
+        return others_us + extra_us + self.starts(others_us + extra_us) * self.cycle_start_us
+
+    def bias_us(self) -> Number | None:
+        """What the transactions take beyond the model, on the mean [us]."""
+        if not self._is_known:
+            return None
+        return doubts.bias_us(self.exchanges, self.network, gap_count=self.link.gap_count)
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What is not known exactly."""
+        if not self._is_known:
+            return ()
+        starts = self.starts(total(one.us for one in self.terms[1:])) if self._has_starts else 0
+        # The hops of the synchronous packet, of retries and of cycle starts; those of transactions come to them.
+        hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * starts
+        return doubts.of_cycle(
+            self.exchanges, self.network, link=self.link, gaps=self._delays.gaps, hop_delays=hop_delays
+        )
+
+    @property
+    def _is_known(self) -> bool:
+        """Whether the error of the model is known: of the one that decides."""
+        return self.model == "standard"
 
     def figures(self) -> Mapping[str, Number]:
         """How the bus is set, the latencies, and the number of nodes as the paper has it."""
@@ -166,6 +178,8 @@ class Ieee1394Cycle(BusCycle):
             "write_latency_us": write.latency_us,
             "read_latency_with_gaps_us": read.latency_with_gaps_us,
             "write_latency_with_gaps_us": write.latency_with_gaps_us,
+            "read_transaction_us": read.transaction_us,
+            "write_transaction_us": write.transaction_us,
             "gaps_us": read.gaps_us,
             "subaction_gap_us": read.subaction_gap_us,
             "arbitration_reset_gap_us": read.arbitration_reset_gap_us,
@@ -188,79 +202,47 @@ class Ieee1394Cycle(BusCycle):
         return tuple(BusLatency(one.kind, one.payload_bytes, {**setup, **one.phases._asdict()}) for one in found)
 
     def events(self) -> Iterator[BusEvent]:
-        """The cycle in the order of its protocol, node by node."""
-        yield BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")
+        """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
+        starts = self.starts(total(one.us for one in self.terms[1:])) if self._has_starts else 0
+        sent, now_us = 0, 0.0
+        start = BusEvent("cycle_start", "cycle_starts_us", self.cycle_start_us if starts else 0.0, "cycle start")
+        for stretch in self._stretches():
+            while sent < starts and now_us >= sent * CYCLE_US:
+                yield start
+                sent, now_us = sent + 1, now_us + start.us
+            for event in stretch:
+                yield event
+                now_us += event.us
+        for _ in range(int(starts) - sent):
+            yield start
+
+    def _stretches(self) -> Iterator[list[BusEvent]]:
+        """What no cycle start interrupts."""
+        yield [BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")]
         for kind in TRANSACTION_KINDS:
             node = 0
             for one in self.exchanges:
                 for _ in range(one.nodes if one.kind == kind else 0):
                     node += 1
-                    for part in _parts(one.phases):
-                        yield part._replace(node=node, transaction=kind)
-        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")
+                    yield [part._replace(node=node, transaction=kind) for part in events(one, model=self.model)]
+        retries = 0 if self.model == "paper" else self.network.profile.cycle.retries
+        for _ in range(retries):
+            yield [BusEvent("retry", "retries_us", self.retries_us / retries, "busy retry of the longest request")]
+        yield [BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")]
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        """What the cycle could have and does not say."""
+        profile = self.network.profile
+        is_split = "split" in (profile.node.read_response, profile.node.write_response)
+        found = []
+        if not profile.host.transaction_us:
+            found.append(LeftOut("host time", "host.transaction_us"))
+        if is_split and not profile.node.execution.worst_extra_us:
+            found.append(LeftOut("the slowest execution", "node.execution.worst_extra_us"))
+        return tuple(found)
 
 
 def _one_of_each(exchanges: tuple[Exchange, ...]) -> tuple[Phases, Phases]:
     """Phases of the read and of the write of the one group."""
     read, write = exchanges
     return read.phases, write.phases
-
-
-def _parts(phases: Phases) -> Iterator[BusEvent]:
-    """One asynchronous transaction and the gaps behind it, equations (3)-(10)."""
-    arbitration, data, acknowledge, gaps = (
-        f"cycle_{name}_us" for name in ("arbitration", "data", "acknowledge", "gaps")
-    )
-    request = (
-        BusEvent("arbitration", arbitration, phases.arbitration_us, "host arbitration"),
-        BusEvent("request_data", data, phases.request_data_us, "host data"),
-        BusEvent("acknowledge", acknowledge, phases.acknowledge_us, "node acknowledge"),
-    )
-    response = (
-        BusEvent("arbitration", arbitration, phases.arbitration_us, "node arbitration"),
-        BusEvent("response_data", data, phases.response_data_us, "node data"),
-        BusEvent("acknowledge", acknowledge, phases.acknowledge_us, "host acknowledge"),
-    )
-    yield from (event._replace(packet="request") for event in request)
-    yield BusEvent("execution", "cycle_execution_us", phases.execution_us, "node execution")
-    yield from (event._replace(packet="response") for event in response)
-    yield BusEvent("subaction_gap", gaps, phases.subaction_gap_us, "subaction gap")
-    yield BusEvent("arbitration_reset_gap", gaps, phases.arbitration_reset_gap_us, "arbitration reset gap")
-
-
-def _most_payload(network: Network) -> Number:
-    return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
-
-
-LIMITS: Final = (
-    Limit(
-        "payload",
-        "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
-        lambda network: network.largest_payload_bytes,
-        _most_payload,
-        way_out="the payload fits no packet",
-        failure="payload_bytes",
-    ),
-    Limit(
-        "nodes",
-        "{value:.0f} nodes are over the {most:.0f} of one bus",
-        lambda network: network.nodes,
-        lambda _network: MAX_NODES,
-        way_out=f"a second bus has {MAX_NODES:g} more",
-    ),
-    Limit(
-        "hops",
-        "{value:.0f} hops are over the {most:.0f} of one bus",
-        hops_of,
-        lambda _network: MAX_HOPS,
-        way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
-    ),
-    Limit(
-        "gap table",
-        "gap count {most:.0f} is unsafe for the hops; the smallest safe one is {value:.0f}",
-        lambda network: safe_gap_count(hops_of(network)),
-        gap_count_of,
-        is_safety=True,
-    ),
-)
-"""The standard's own limits. A gap count below the table fits, but is not safe."""

@@ -30,6 +30,7 @@ from busplan.buses.ieee1394.constants import (
     SUBACTION_GAP_TICKS,
     SUBACTION_GAP_TICKS_PER_COUNT,
 )
+from busplan.elementwise import Number
 from busplan.sourced import SYMBOLS, published
 
 SYMBOLS.update(
@@ -41,6 +42,8 @@ SYMBOLS.update(
         "response_acknowledge_us": "T_ack2",
         "execution_us": "T_exec",
         "cable_length_m": "L",
+        "phy_delay_us": "T_phy",
+        "hop_us": "hop",
         "hops": "H",
         "gap_count": "g",
         "data_rate_mbit_s": "R",
@@ -62,13 +65,13 @@ SYMBOLS.update(
 
 @published(3, symbol="T_lant", section="III-E")
 def transaction_latency_us(
-    request_us: float,
+    request_us: Number,
     *,
-    request_acknowledge_us: float,
-    execution_us: float,
-    response_us: float,
-    response_acknowledge_us: float,
-) -> float:
+    request_acknowledge_us: Number,
+    execution_us: Number,
+    response_us: Number,
+    response_acknowledge_us: Number,
+) -> Number:
     """Latency of one asynchronous transaction from its five parts.
 
     Parameters
@@ -99,6 +102,33 @@ def transaction_latency_us(
     return request_us + request_acknowledge_us + execution_us + response_us + response_acknowledge_us
 
 
+@published(4, 5, 6, symbol="T_phy", section="III-E", part="14 / Bandwidth, in the clock of the gaps")
+def phy_delay_us(gap_clock_mbit_s: Number) -> Number:
+    """Repeat delay of one PHY.
+
+    Parameters
+    ----------
+    gap_clock_mbit_s
+        Clock that PHY delays are counted in [Mbit/s]; float or array.
+
+    Returns
+    -------
+    float
+        T_phy = 14 / C [us]; the shape of the argument.
+
+    Raises
+    ------
+    ZeroDivisionError
+        `gap_clock_mbit_s` is zero.
+
+    Examples
+    --------
+    >>> round(phy_delay_us(98.304), 6)
+    0.142415
+    """
+    return PHY_DELAY_TICKS / gap_clock_mbit_s
+
+
 @published(
     4,
     5,
@@ -107,55 +137,48 @@ def transaction_latency_us(
     section="III-E",
     part="their bracket, for a cable of 4.5 m; in proportion to the length for others",
 )
-def hop_delay_us(cable_length_m: float, *, gap_clock_mbit_s: float) -> float:
+def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
     """Delay of one hop, cable and PHY.
 
     Parameters
     ----------
     cable_length_m
         Length of one cable [m]; float or array.
-    gap_clock_mbit_s
-        Clock that PHY delays are counted in [Mbit/s]; float or array.
+    phy_delay_us
+        Repeat delay of one PHY [us]; float or array.
 
     Returns
     -------
     float
-        hop = 0.023 L / 4.5 + 14 / C [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+        hop = 0.023 L / 4.5 + T_phy [us]; the broadcast shape of the arguments.
 
     Examples
     --------
-    >>> round(hop_delay_us(4.5, gap_clock_mbit_s=98.304), 6)
-    0.165415
+    >>> hop_delay_us(4.5, phy_delay_us=0.144)
+    0.167
     """
-    return CABLE_DELAY_US * cable_length_m / REFERENCE_CABLE_M + PHY_DELAY_TICKS / gap_clock_mbit_s
+    return CABLE_DELAY_US * cable_length_m / REFERENCE_CABLE_M + phy_delay_us
 
 
 @published(4, symbol="ArbP", section="III-E")
-def arbitration_phase_us(
-    hops: float, *, gap_count: float, gap_clock_mbit_s: float, cable_length_m: float = REFERENCE_CABLE_M
-) -> float:
+def arbitration_phase_us(hops: Number, *, hop_us: Number, gap_count: Number, gap_clock_mbit_s: Number) -> Number:
     """Arbitration phase of a packet.
 
     Parameters
     ----------
     hops
         Cable hops between the two nodes, N in the paper's chain [1]; float or array.
+    hop_us
+        Delay of one hop [us]; float or array.
     gap_count
         Gap count of the bus, 0..63 [1]; float or array.
     gap_clock_mbit_s
-        Clock that gaps and PHY delays are counted in [Mbit/s]; float or array.
-    cable_length_m
-        Length of one cable [m]; float or array.
+        Clock that gaps are counted in [Mbit/s]; float or array.
 
     Returns
     -------
     float
-        ArbP = (0.023 L / 4.5 + 14 / C) H + 4 g / C + 1.63 [us]; the broadcast shape of the arguments.
+        ArbP = hop H + 4 g / C + 1.63 [us]; the broadcast shape of the arguments.
 
     Raises
     ------
@@ -164,89 +187,71 @@ def arbitration_phase_us(
 
     Examples
     --------
-    >>> round(arbitration_phase_us(1, gap_count=63, gap_clock_mbit_s=393.216), 4)
+    >>> round(arbitration_phase_us(1, hop_us=0.0586, gap_count=63, gap_clock_mbit_s=393.216), 4)
     2.3295
     """
-    hop_us = hop_delay_us(cable_length_m, gap_clock_mbit_s=gap_clock_mbit_s)
     return hop_us * hops + ARBITRATION_GAP_TICKS * gap_count / gap_clock_mbit_s + ARBITRATION_HOLD_US
 
 
 @published(5, symbol="DTP", section="III-E")
-def data_phase_us(
-    hops: float,
-    *,
-    packet_bytes: float,
-    data_rate_mbit_s: float,
-    gap_clock_mbit_s: float,
-    cable_length_m: float = REFERENCE_CABLE_M,
-) -> float:
+def data_phase_us(hops: Number, *, hop_us: Number, packet_bytes: Number, data_rate_mbit_s: Number) -> Number:
     """Data-transfer phase of a packet.
 
     Parameters
     ----------
     hops
         Cable hops between the two nodes [1]; float or array.
+    hop_us
+        Delay of one hop [us]; float or array.
     packet_bytes
         Packet size DataSize, payload and overhead [bytes]; float or array.
     data_rate_mbit_s
         Data rate of the packet [Mbit/s]; float or array.
-    gap_clock_mbit_s
-        Clock that PHY delays are counted in [Mbit/s]; float or array.
-    cable_length_m
-        Length of one cable [m]; float or array.
 
     Returns
     -------
     float
-        DTP = (0.023 L / 4.5 + 14 / C) H + 8 B / R [us]; the broadcast shape of the arguments.
+        DTP = hop H + 8 B / R [us]; the broadcast shape of the arguments.
 
     Raises
     ------
     ZeroDivisionError
-        A rate is zero.
+        The rate is zero.
 
     Examples
     --------
-    >>> round(data_phase_us(1, packet_bytes=32, data_rate_mbit_s=393.216, gap_clock_mbit_s=393.216), 4)
+    >>> round(data_phase_us(1, hop_us=0.0586, packet_bytes=32, data_rate_mbit_s=393.216), 4)
     0.7096
     """
-    hop_us = hop_delay_us(cable_length_m, gap_clock_mbit_s=gap_clock_mbit_s)
     return hop_us * hops + BITS_PER_BYTE * packet_bytes / data_rate_mbit_s
 
 
 @published(6, symbol="AckP", section="III-E")
-def acknowledge_phase_us(hops: float, *, gap_clock_mbit_s: float, cable_length_m: float = REFERENCE_CABLE_M) -> float:
+def acknowledge_phase_us(hops: Number, *, hop_us: Number) -> Number:
     """Acknowledge phase of a packet.
 
     Parameters
     ----------
     hops
         Cable hops between the two nodes [1]; float or array.
-    gap_clock_mbit_s
-        Clock that PHY delays are counted in [Mbit/s]; float or array.
-    cable_length_m
-        Length of one cable [m]; float or array.
+    hop_us
+        Delay of one hop [us]; float or array.
 
     Returns
     -------
     float
-        AckP = (0.023 L / 4.5 + 14 / C) H + 0.25 [us]; the broadcast shape of the arguments.
-
-    Raises
-    ------
-    ZeroDivisionError
-        `gap_clock_mbit_s` is zero.
+        AckP = hop H + 0.25 [us]; the broadcast shape of the arguments.
 
     Examples
     --------
-    >>> round(acknowledge_phase_us(1, gap_clock_mbit_s=393.216), 4)
+    >>> round(acknowledge_phase_us(1, hop_us=0.0586), 4)
     0.3086
     """
-    return hop_delay_us(cable_length_m, gap_clock_mbit_s=gap_clock_mbit_s) * hops + DATA_END_US
+    return hop_us * hops + DATA_END_US
 
 
 @published(7, symbol="T_req", section="III-E")
-def request_us(arbitration_us: float, *, data_us: float) -> float:
+def request_us(arbitration_us: Number, *, data_us: Number) -> Number:
     """Request time of a transaction.
 
     Parameters
@@ -270,7 +275,7 @@ def request_us(arbitration_us: float, *, data_us: float) -> float:
 
 
 @published(8, symbol="T_resp", section="III-E")
-def response_us(arbitration_us: float, *, data_us: float) -> float:
+def response_us(arbitration_us: Number, *, data_us: Number) -> Number:
     """Response time of a transaction.
 
     Parameters
@@ -294,7 +299,7 @@ def response_us(arbitration_us: float, *, data_us: float) -> float:
 
 
 @published(9, symbol="T_ack1 = T_ack2", section="III-E")
-def acknowledge_us(acknowledge_phase_us: float) -> float:
+def acknowledge_us(acknowledge_phase_us: Number) -> Number:
     """Acknowledge time of either half of a transaction.
 
     Parameters
@@ -316,7 +321,7 @@ def acknowledge_us(acknowledge_phase_us: float) -> float:
 
 
 @published(10, symbol="T_sub", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
-def subaction_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
+def subaction_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Subaction gap.
 
     Parameters
@@ -345,7 +350,7 @@ def subaction_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
 
 
 @published(10, symbol="T_reset", section="III-E", part="its part of 82 + 48 g, as IEEE 1394 has it")
-def arbitration_reset_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
+def arbitration_reset_gap_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Arbitration reset gap.
 
     Parameters
@@ -374,7 +379,7 @@ def arbitration_reset_gap_us(gap_count: float, *, gap_clock_mbit_s: float) -> fl
 
 
 @published(10, symbol="T_sum", section="III-E")
-def gaps_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
+def gaps_us(gap_count: Number, *, gap_clock_mbit_s: Number) -> Number:
     """Subaction gap and arbitration reset gap together.
 
     Parameters
@@ -403,7 +408,7 @@ def gaps_us(gap_count: float, *, gap_clock_mbit_s: float) -> float:
 
 
 @published(11, symbol="N", section="III-E")
-def published_nodes(available_us: float, *, sync_us: float, latency_us: float, gaps_us: float) -> float:
+def published_nodes(available_us: Number, *, sync_us: Number, latency_us: Number, gaps_us: Number) -> Number:
     """Number of nodes as the paper publishes it.
 
     T_lant and CTS hold N themselves, so this is exact only where they were taken at the answer. It is reported
@@ -439,7 +444,7 @@ def published_nodes(available_us: float, *, sync_us: float, latency_us: float, g
 
 
 @published(12, symbol="T_lant", section="IV-A")
-def interval_latency_us(t1_us: float, *, t2_us: float, t3_us: float, t4_us: float, t5_us: float) -> float:
+def interval_latency_us(t1_us: Number, *, t2_us: Number, t3_us: Number, t4_us: Number, t5_us: Number) -> Number:
     """Latency of one transaction from the five intervals of the bench.
 
     Parameters
@@ -465,7 +470,7 @@ def interval_latency_us(t1_us: float, *, t2_us: float, t3_us: float, t4_us: floa
 
 
 @published(13, symbol="T1 + T2", section="IV-A")
-def request_and_acknowledge_us(request_us: float, *, acknowledge_us: float) -> float:
+def request_and_acknowledge_us(request_us: Number, *, acknowledge_us: Number) -> Number:
     """First half of a transaction, T1 + T2 of the bench.
 
     Parameters
@@ -489,7 +494,7 @@ def request_and_acknowledge_us(request_us: float, *, acknowledge_us: float) -> f
 
 
 @published(14, symbol="T4 + T5", section="IV-A")
-def response_and_acknowledge_us(response_us: float, *, acknowledge_us: float) -> float:
+def response_and_acknowledge_us(response_us: Number, *, acknowledge_us: Number) -> Number:
     """Second half of a transaction, T4 + T5 of the bench.
 
     Parameters
@@ -513,7 +518,7 @@ def response_and_acknowledge_us(response_us: float, *, acknowledge_us: float) ->
 
 
 @published(15, symbol="T1 + T2", section="IV-A")
-def published_request_and_acknowledge_us(payload_bytes: float) -> float:
+def published_request_and_acknowledge_us(payload_bytes: Number) -> Number:
     """First half of a transaction as Table I's theory column has it.
 
     The rounded form of equation (13) at one hop, gap count 63 and S400. The terms of equations (4)-(6) add up

@@ -55,16 +55,32 @@ SYNC: Final = Figure(
 
 
 def _term(name: str, reference: str, meaning: str, ink: Ink, letter: str) -> Figure:
-    return Figure(f"cycle_{name}_us", name, reference, meaning, name, ink=ink, letter=letter)
+    words = name.replace("_", " ")
+    return Figure(f"cycle_{name}_us", words, reference, meaning, words, ink=ink, letter=letter)
 
 
 TERMS: Final = (
+    Figure(
+        "cycle_starts_us",
+        "cycle starts",
+        "cycle",
+        "cycle start packets, and the isochronous traffic behind them",
+        "cycle starts",
+        ink="sync",
+        letter="C",
+    ),
     SYNC,
     _term("arbitration", by(eq.arbitration_phase_us), "all arbitration of a cycle", "contention", "A"),
     _term("data", by(eq.data_phase_us), "all packets of a cycle", "request", "D"),
     _term("acknowledge", _ACKNOWLEDGE, "all acknowledges of a cycle", "acknowledge", "K"),
+    _term("hold", "profile", "bus held from acknowledges to concatenated responses", "response", "B"),
     _term("execution", "profile", "all execution of a cycle", "work", "E"),
-    _term("gaps", _GAPS, "all gaps of a cycle", "long-gap", "G"),
+    _term("worst_extra", "profile", "what the slowest executions take beyond the execution time", "work", "X"),
+    _term("idle", "idle", "all idle bus of the gaps, beside execution", "long-gap", "G"),
+    _term("host", "profile", "the host's own time beyond the gaps", "contention", "H"),
+    Figure(
+        "retries_us", "retries", "profile", "busy retries of the longest request", "retries", ink="request", letter="T"
+    ),
     NONPERIODIC,
 )
 """In the order of the wire."""
@@ -104,18 +120,39 @@ NODES_EQ11: Final = Figure(
     "nodes",
     decimals=2,
 )
+READ_TRANSACTION: Final = Figure(
+    "read_transaction_us",
+    "T_read",
+    "idle",
+    "what a read takes of the cycle",
+    "read, with idle bus",
+    better="less",
+)
+WRITE_TRANSACTION: Final = Figure(
+    "write_transaction_us",
+    "T_write",
+    "idle",
+    "what a write takes of the cycle",
+    "write, with idle bus",
+    better="less",
+)
 _PLAIN: Final = (SYNC, NONPERIODIC)
 _DOCUMENT_TERMS: Final = (*_PLAIN, *(one for one in TERMS if one not in _PLAIN))
 """In the order of the document, which is older than that of the wire."""
 CAPACITY: Final = capacity_figures(
     _DOCUMENT_TERMS,
     setup=SETUP,
-    own=(READ_LATENCY, WRITE_LATENCY, BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+    own=(
+        *(READ_LATENCY, WRITE_LATENCY, READ_TRANSACTION, WRITE_TRANSACTION),
+        *(BOTH_GAPS, _SUBACTION_GAP, _RESET_GAP),
+    ),
     counted=(NODES_EQ11,),
 )
 TABLE: Final = (
     READ_LATENCY,
     WRITE_LATENCY,
+    READ_TRANSACTION,
+    WRITE_TRANSACTION,
     BOTH_GAPS._replace(label="gaps T_sum, each transaction"),
     NODES_EQ11,
     SAFE_GAP_COUNT,
@@ -127,19 +164,21 @@ COMPARED: Final = (
         "read_latency_with_gaps_us",
         "T_full,read",
         by(eq.transaction_latency_us, eq.gaps_us),
-        "what a read takes of the cycle",
+        "a read and both gaps",
         "read T_lant + T_sum",
         better="less",
     ),
+    READ_TRANSACTION,
     WRITE_LATENCY,
     Figure(
         "write_latency_with_gaps_us",
         "T_full,write",
         by(eq.transaction_latency_us, eq.gaps_us),
-        "what a write takes of the cycle",
+        "a write and both gaps",
         "write T_lant + T_sum",
         better="less",
     ),
+    WRITE_TRANSACTION,
 )
 LATENCY: Final = (
     *(TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COUNT),
@@ -158,6 +197,13 @@ LATENCY: Final = (
         _ACKNOWLEDGE,
         "acknowledge of either packet, T_ack1 = T_ack2",
         "acknowledge, each",
+    ),
+    Figure(
+        "hold_us",
+        "hold",
+        "profile",
+        "bus held from the acknowledge to a concatenated response",
+        "held for the response",
     ),
     Figure("execution_us", "T_exec", "profile", "execution in the node, T3 of the bench", "execution T_exec = T3"),
     Figure(
@@ -188,8 +234,24 @@ LATENCY: Final = (
         "latency_with_gaps_us",
         "T_full",
         by(eq.transaction_latency_us, eq.gaps_us),
-        "what the transaction takes of the cycle, T_lant + T_sum",
+        "the transaction and both gaps",
         "T_lant + T_sum",
+    ),
+    Figure(
+        "worst_extra_us",
+        "T_extra",
+        "profile",
+        "what the slowest execution takes beyond T_exec",
+        "slowest execution",
+    ),
+    Figure("idle_us", "idle", "idle", "idle bus of the gaps, beside execution", "idle bus"),
+    Figure("host_us", "host", "profile", "the host's own time beyond the gaps", "host"),
+    Figure(
+        "transaction_us",
+        "T_trans",
+        "idle",
+        "what the transaction takes of the cycle",
+        "takes of the cycle",
     ),
 )
 """In the order of the document, which is that of the phases of a transaction."""
@@ -205,6 +267,7 @@ LATENCY_TABLE: Final = tuple(
         "request_us",
         "response_us",
         "request_and_acknowledge_us",
+        "hold_us",
         "execution_us",
         "response_and_acknowledge_us",
         "latency_us",
@@ -212,6 +275,10 @@ LATENCY_TABLE: Final = tuple(
         "arbitration_reset_gap_us",
         "gaps_us",
         "latency_with_gaps_us",
+        "worst_extra_us",
+        "idle_us",
+        "host_us",
+        "transaction_us",
     )
 )
 """In the order of the bench: T1+T2, T3, T4+T5, and the gaps behind them."""

@@ -19,8 +19,10 @@ from busplan.buses.ieee1394.constants import (
     SLICE_RATIO,
     safe_gap_count,
 )
-from busplan.buses.ieee1394.cycle import LIMITS, Ieee1394Cycle, gap_count_of, hops_of, link_of
-from busplan.buses.ieee1394.timing import TIMING_MODELS, transaction
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.limits import LIMITS
+from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
+from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.sourced import Sourced
@@ -43,8 +45,9 @@ class Ieee1394(Bus):
     title = "IEEE 1394"
     timing_models = (
         TimingModel("paper", "the paper's equations as published"),
-        TimingModel("standard", "the standard's clock and packets"),
+        TimingModel("standard", "the standard's clock and packets, and the gaps as the bus runs them"),
     )
+    deciding_model = "standard"
     term_figures = figures.TERMS
     capacity_figures = figures.CAPACITY
     setup_figures = figures.SETUP
@@ -60,14 +63,20 @@ class Ieee1394(Bus):
     limits_of = "standard"
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     event_kinds = (
+        EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
         EventKind("sync", "synchronous packet", figures.SYNC.reference, "S", "sync"),
         _kind("arbitration", "arbitration", "arbitration_us", "a", "contention"),
         _kind("request_data", "request data", "request_data_us", ">", "request"),
         _kind("acknowledge", "acknowledge", "acknowledge_us", "k", "acknowledge"),
+        _kind("hold", "bus held for the response", "hold_us", "h", "response"),
         _kind("execution", "execution", "execution_us", "=", "work"),
+        _kind("worst_extra", "slowest execution", "worst_extra_us", "x", "work"),
         _kind("response_data", "response data", "response_data_us", "<", "response"),
         _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
         _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
+        EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
+        _kind("host", "host", "host_us", "o", "contention"),
+        EventKind("retry", "busy retry", "profile", "r", "request"),
         EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
     )
     stretch_kinds = (
@@ -117,6 +126,20 @@ class Ieee1394(Bus):
         """Of `latency`, in the order of its document."""
         return figures.LATENCY
 
+    def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:
+        """Keys that the paper's equations have no term for."""
+        profile = network.profile
+        own = {
+            "bus.cycle_master": profile.bus.cycle_master,
+            "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
+            "cycle.retries": profile.cycle.retries,
+            "host.transaction_us": profile.host.transaction_us,
+            "node.read_response": profile.node.read_response != "split",
+            "node.write_response": profile.node.write_response != "split",
+            "node.execution.worst_extra_us": profile.node.execution.worst_extra_us,
+        }
+        return tuple(key for key, is_set in own.items() if is_set) if model == "paper" else ()
+
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""
         nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
@@ -130,7 +153,7 @@ class Ieee1394(Bus):
             link=link_of(network),
             payload_bytes=payload_bytes,
             overhead_bytes=network.profile.payload.overhead_bytes,
-            execution_us=0.0,
+            responder=Responder(0.0),
         )
         return Halves(phases.latency_us, phases.request_and_acknowledge_us)
 

@@ -12,8 +12,9 @@ from busplan.buses.ieee1394.constants import (
     DATA_RATE_MBIT_S,
     REFERENCE_CABLE_M,
 )
-from busplan.buses.ieee1394.cycle import exchange, link_of
+from busplan.buses.ieee1394.table_1 import TABLE_1
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases
+from busplan.buses.ieee1394.transactions import exchange, link_of
 from busplan.buses.network import Network
 from busplan.buses.published import Comparison, PaperSection
 
@@ -36,9 +37,9 @@ def bus_sections(bench: Network, published: Published) -> tuple[PaperSection, ..
     Paper, Tables I and II, section IV-A, equations (3)-(15).
     """
     return (
-        _theory(published),
-        _first_half(bench, published),
-        _latency(bench, published),
+        _theory(),
+        _first_half(bench),
+        _latency(bench),
         *_ratios(bench, published),
         _can(bench, published),
         _equation_15(published),
@@ -55,54 +56,55 @@ def _write_phases(bench: Network, payload_bytes: int) -> Iterator[tuple[str, Pha
         yield f"{model} model", exchange(bench, changed, "write", model=model, link=link_of(bench)).phases
 
 
-def _theory(published: Published) -> PaperSection:
+def _theory() -> PaperSection:
     title = "Table I: T1+T2, theory"
-    table = published["table_1"]
-    rows = zip(table["payload_bytes"], table["request_and_acknowledge_theory_us"], strict=True)
     return PaperSection(
         title,
         "Equation (15), not rounded; the table prints two decimals.",
         tuple(
             Comparison(
                 title,
-                f"{size} bytes",
+                f"{row.payload_bytes} bytes",
                 "us",
-                value,
+                row.theory_us,
                 "eq (15)",
-                equations.published_request_and_acknowledge_us(size),
+                equations.published_request_and_acknowledge_us(row.payload_bytes),
             )
-            for size, value in rows
+            for row in TABLE_1
         ),
     )
 
 
-def _first_half(bench: Network, published: Published) -> PaperSection:
+def _first_half(bench: Network) -> PaperSection:
     title = "Table I: T1+T2, measured"
-    table = published["table_1"]
-    rows = zip(table["payload_bytes"], table["request_and_acknowledge_us"], strict=True)
     return PaperSection(
         title,
         "Equation (13) under either timing model; nothing here is fitted.",
         tuple(
-            Comparison(title, f"{size} bytes", "us", value, method, one.request_and_acknowledge_us)
-            for size, value in rows
-            for method, one in _write_phases(bench, size)
+            Comparison(
+                title,
+                f"{row.payload_bytes} bytes",
+                "us",
+                row.request_and_acknowledge_us,
+                method,
+                one.request_and_acknowledge_us,
+            )
+            for row in TABLE_1
+            for method, one in _write_phases(bench, row.payload_bytes)
         ),
     )
 
 
-def _latency(bench: Network, published: Published) -> PaperSection:
+def _latency(bench: Network) -> PaperSection:
     title = "Table I: T_lant, measured"
-    table = published["table_1"]
-    rows = zip(table["payload_bytes"], table["latency_us"], strict=True)
     return PaperSection(
         title,
-        "Equation (3). T_exec is derived from the same table, T_lant - 2 (T1+T2) as measured: the residual is that "
-        "of the two halves alone, and no test of T_exec.",
+        "Equation (3). T_exec is derived from the same table, T_lant less both halves as measured, the second without "
+        "a payload: the residual is that of the halves alone, and no test of T_exec.",
         tuple(
-            Comparison(title, f"{size} bytes", "us", value, method, one.latency_us)
-            for size, value in rows
-            for method, one in _write_phases(bench, size)
+            Comparison(title, f"{row.payload_bytes} bytes", "us", row.latency_us, method, one.latency_us)
+            for row in TABLE_1
+            for method, one in _write_phases(bench, row.payload_bytes)
         ),
     )
 
@@ -144,7 +146,9 @@ def _equation_15(published: Published) -> PaperSection:
     given = published["equation_15"]
     title = "Equation (15): its constant"
     rate_mbit_s = DATA_RATE_MBIT_S["S400"]
-    hop_us = given["nodes"] * equations.hop_delay_us(REFERENCE_CABLE_M, gap_clock_mbit_s=rate_mbit_s)
+    hop_us = given["nodes"] * equations.hop_delay_us(
+        REFERENCE_CABLE_M, phy_delay_us=equations.phy_delay_us(rate_mbit_s)
+    )
     terms_us = (
         *(hop_us, ARBITRATION_GAP_TICKS * given["gap_count"] / rate_mbit_s, ARBITRATION_HOLD_US),
         *(hop_us, BITS_PER_BYTE * given["overhead_bytes"] / rate_mbit_s),

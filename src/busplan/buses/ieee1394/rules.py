@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from busplan.buses.ieee1394.constants import (
+    MAX_GAP_COUNT,
     MAX_HOPS,
     MAX_NODES,
     MAX_PAYLOAD_BYTES,
@@ -22,15 +23,25 @@ def _bus(subject: RuleSubject) -> "Ieee1394Bus":
     return bus  # type: ignore[no-any-return]
 
 
-def other_model_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The cycle fits under the deciding model alone."""
-    if "time" not in subject.deciding.exceeded and subject.others_overrun:
-        deciding = subject.deciding
-        for other in subject.others:
-            cure = subject.cure(deciding.timing_model, other.timing_model)
+def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The paper's equations say otherwise."""
+    one = subject.deciding
+    for model, fits in subject.others_fit:
+        if fits != (one.verdict == "fits") and not set(one.exceeded) - {"time"}:
+            story = "says that it fits" if fits else "says that it does not"
+            yield RuleProblem("cycle.period_us", f"{one.verdict}, and the {model} timing {story}")
+
+
+def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The plan rests on a gap count that a bus reset takes away."""
+    one = subject.deciding
+    if one.verdict == "fits" and one.gap_count < MAX_GAP_COUNT:
+        after = subject.after({"bus.gap_count": MAX_GAP_COUNT})
+        if after.verdict != "fits":
             yield RuleProblem(
-                "cycle.period_us",
-                f"fits the {deciding.timing_model}'s timing, not the {other.timing_model}'s: {overrun(other)}; {cure}",
+                "bus.gap_count",
+                f"fits with gap count {one.gap_count} alone: with the {MAX_GAP_COUNT} of a bus after its reset it is "
+                f"{after.verdict}, {overrun(after)}; have the bus manager write the gap count after each reset",
             )
 
 
@@ -98,7 +109,7 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     one = subject.deciding
     if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
         after = subject.after({"bus.gap_count": "optimal"})
-        won = after.max_nodes - one.max_nodes
+        won = (after.safe_nodes or 0) - (one.safe_nodes or 0)
         yield RuleProblem(
             "bus.gap_count",
             f"gap count {one.gap_count} is above the {one.safe_gap_count} that {one.hops} hops need; "
@@ -112,11 +123,20 @@ RULES: Final = (
         "BP102",
         "other-model-overrun",
         "warning",
-        "the cycle fits under one timing model only",
-        "The plan fits the paper, not the standard (or the other way round). The paper counts gaps in the data "
-        "rate, the wire counts them at the base rate, four times slower at S400: a plan that fits the paper alone "
-        "is likely to fail on the machine.",
-        other_model_overrun,
+        "the paper's equations say otherwise",
+        "The verdict is by the standard's timing, and the paper's equations contradict it. The paper counts gaps in "
+        "the data rate, and adds up those of a transaction; the wire counts them at the base rate, four times slower "
+        "at S400, as thresholds of an idle period. A plan that fits the paper alone is likely to fail on the machine.",
+        paper_disagrees,
+    ),
+    Rule(
+        "BP113",
+        "fits-only-until-bus-reset",
+        "warning",
+        "the cycle fits at its own gap count alone",
+        "After a bus reset the gap count is 63 until the bus manager writes it again (TI SLLS423I, p. 41). A plan that "
+        "fits with a smaller one alone stops working then: write the gap count after each reset, or plan with 63.",
+        fits_only_until_bus_reset,
     ),
     Rule(
         "BP106",

@@ -5,6 +5,8 @@ from typing import Annotated, Literal, Self
 from pydantic import BeforeValidator, Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
 from busplan.buses.ieee1394.constants import (
+    ARBITRATION_HOLD_US,
+    CYCLE_US,
     MAX_GAP_COUNT,
     PACKET_OVERHEAD_BYTES,
     PING_PER_NODE_US,
@@ -14,8 +16,10 @@ from busplan.buses.ieee1394.constants import (
     Speed,
 )
 from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.sections.base import Bytes, Count, Problem, Section, TimeUs, refused
-from busplan.sections.cycle import BusSection, CycleSection, PayloadSection, SliceRatio
+from busplan.elementwise import Number
+from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
+from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection, SliceRatio
+from busplan.sections.execution import UNKNOWN_SHARE, LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
 
@@ -65,8 +69,21 @@ class Ieee1394Bus(BusSection):
     )
     timing_model: TimingModelName = Field(
         default="standard",
-        description="Timing model that decides, paper or standard; reports show both",
+        description="Timing model whose figures lead the tables, paper or standard; the verdict is always by standard",
         examples=["standard"],
+    )
+    cycle_master: bool = Field(
+        default=False,
+        description="Whether a node sends cycle start packets, one each 125 us; an OHCI host does by default",
+        examples=[True],
+    )
+    isochronous_us: Annotated[float, Field(ge=0, le=float(CYCLE_US), allow_inf_nan=False)] = Field(
+        default=0.0, description="Isochronous traffic behind each cycle start [us]", examples=[20]
+    )
+    phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="Repeat delay of one PHY; without it 14 ticks of the base rate, 0.142 us [us]",
+        examples=[0.144],
     )
 
     @model_validator(mode="after")
@@ -77,6 +94,18 @@ class Ieee1394Bus(BusSection):
                     f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
                     f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number",
                     key="bus.gap_count",
+                    kind="inconsistent",
+                )
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _isochronous_needs_a_master(self) -> Self:
+        if self.isochronous_us and not self.cycle_master:
+            raise refused(
+                Problem(
+                    "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true",
+                    key="bus.isochronous_us",
                     kind="inconsistent",
                 )
             )
@@ -103,6 +132,9 @@ class Ieee1394CycleSection(CycleSection):
     """Section [cycle]: the communication period and what of it is for communication."""
 
     slice_ratio: SliceRatio = float(SLICE_RATIO)
+    retries: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
+        default=0, description="Busy retries that a cycle must have time for", examples=[1]
+    )
     sync: Sync = Field(default_factory=Sync, description="The synchronous packet that opens a cycle")
 
 
@@ -116,9 +148,74 @@ class Ieee1394Payload(PayloadSection):
     )
 
 
+class Residual(Section):
+    """What an execution time that was fitted against a timing model holds of that model's error."""
+
+    residual: Literal["none", "paper", "standard"] = Field(
+        default="none",
+        description="Timing model whose packets were taken off the latency; none where their time was measured",
+        examples=["standard"],
+    )
+    measured_gap_count: Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] = Field(
+        default=MAX_GAP_COUNT, description="Gap count of the bus that the latency was measured on", examples=[63]
+    )
+
+
+class Ieee1394LinearExecution(LinearExecution, Residual):
+    """Section [node.execution] of kind "linear": base_us + per_byte_us * payload."""
+
+
+class Ieee1394TableExecution(TableExecution, Residual):
+    """Section [node.execution] of kind "table": measured times, linear between them, nothing beyond them."""
+
+
+class Ieee1394Node(NodeSection):
+    """Section [node]: one distributed node, and how it answers."""
+
+    execution: Annotated[Ieee1394LinearExecution | Ieee1394TableExecution, Field(discriminator="kind")] = Field(
+        description="Execution time T_exec in the node, measured"
+    )
+    read_response: Literal["split", "concatenated"] = Field(
+        default="split",
+        description="How a node answers a read: split, it arbitrates for its response; concatenated, the response "
+        "follows its acknowledge",
+        examples=["split"],
+    )
+    write_response: Literal["split", "unified"] = Field(
+        default="split",
+        description="How a node answers a write: split, it sends a response; unified, its acknowledge is the answer",
+        examples=["unified"],
+    )
+    response_us: Annotated[float, Field(ge=0, le=float(ARBITRATION_HOLD_US), allow_inf_nan=False)] = Field(
+        default=float(ARBITRATION_HOLD_US),
+        description="Time from the acknowledge to a concatenated response; slower hardware answers split [us]",
+        examples=[0.5],
+    )
+
+
+class Host(Section):
+    """Section [host]: the host that sends the requests."""
+
+    transaction_us: TimeUs = Field(
+        default=0.0, description="The host's own time between a response and its next request [us]", examples=[5]
+    )
+    uncertainty_us: TimeUs | None = Field(
+        default=None,
+        description="Standard uncertainty of transaction_us; without it 10 % of it [us]",
+        examples=[0.5],
+    )
+
+    @property
+    def standard_uncertainty_us(self) -> Number:
+        """Standard uncertainty u(host) [us]."""
+        return UNKNOWN_SHARE * self.transaction_us if self.uncertainty_us is None else self.uncertainty_us
+
+
 class Ieee1394Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
+    node: Ieee1394Node = Field(description="One distributed node")
+    host: Host = Field(default_factory=Host, description="The host that sends the requests")
     bus: Ieee1394Bus = Field(description="The bus")
     cycle: Ieee1394CycleSection = Field(description="The communication cycle")
     payload: Ieee1394Payload = Field(description="What travels in a cycle")

@@ -3,6 +3,7 @@
 `paper` takes the equations as they are published: gaps and PHY delays are counted in the data rate, and both
 packets of a transaction carry the payload and one overhead. `standard` counts gaps and PHY delays in the base
 rate, as the gap tables of three independent stacks show, and gives every packet its real size on the wire.
+Gaps are added up in `paper`, and are thresholds of an idle period in `standard` (`busplan.buses.ieee1394.idle`).
 Operators only, as in `equations`: floats in, floats out; arrays in, arrays out.
 """
 
@@ -23,8 +24,9 @@ from busplan.buses.ieee1394.constants import (
     WRITE_RESPONSE_BYTES,
     padded_bytes,
 )
+from busplan.buses.ieee1394.idle import Answer, Gaps, IdleTime, gaps_added_up, gaps_as_thresholds
 from busplan.buses.network import TransactionKind
-from busplan.elementwise import Number, alike, choose, worded
+from busplan.elementwise import Number, alike, choose, named, worded
 
 TimingModelName = Literal["paper", "standard"]
 
@@ -32,8 +34,8 @@ TimingModelName = Literal["paper", "standard"]
 class PacketSizes(NamedTuple):
     """Bytes on the wire of a transaction's two packets [bytes]."""
 
-    request_bytes: float
-    response_bytes: float
+    request_bytes: Number
+    response_bytes: Number
 
 
 class PacketTiming(NamedTuple):
@@ -47,11 +49,14 @@ class PacketTiming(NamedTuple):
         From the data rate [Mbit/s] to the clock of gaps and PHY delays [Mbit/s].
     packets
         From transaction kind, payload [bytes] and the profile's overhead [bytes] to the packet sizes.
+    idle
+        Idle bus around a transaction.
     """
 
     name: TimingModelName
-    gap_clock_mbit_s: Callable[[float], float]
-    packets: Callable[[TransactionKind, int, int], PacketSizes]
+    gap_clock_mbit_s: Callable[[Number], Number]
+    packets: Callable[[TransactionKind, Number, Number], PacketSizes]
+    idle: Callable[..., IdleTime]
 
 
 class Link(NamedTuple):
@@ -67,34 +72,72 @@ class Link(NamedTuple):
         Cable hops H between host and node [1].
     cable_length_m
         Length of one cable [m].
+    phy_delay_us
+        Repeat delay of one PHY [us]; None for the one of the equations, 14 ticks of the gap clock.
     """
 
-    data_rate_mbit_s: float
-    gap_count: float
-    hops: float
-    cable_length_m: float
+    data_rate_mbit_s: Number
+    gap_count: Number
+    hops: Number
+    cable_length_m: Number
+    phy_delay_us: Number | None = None
+
+
+class Responder(NamedTuple):
+    """How a node answers a transaction, and how fast the host goes on.
+
+    Parameters
+    ----------
+    execution_us
+        Execution time T_exec of a split transaction [us].
+    answer
+        How the node answers.
+    worst_extra_us
+        What the slowest execution takes beyond T_exec [us].
+    hold_us
+        Time from the acknowledge to a concatenated response [us]; the bus stays busy.
+    host_us
+        The host's own time between a response and its next request [us].
+    """
+
+    execution_us: Number
+    answer: Answer = "split"
+    worst_extra_us: Number = 0.0
+    hold_us: Number = 0.0
+    host_us: Number = 0.0
 
 
 class Phases(NamedTuple):
-    """Every phase of one transaction [us]; the equation behind each stands in `busplan.buses.ieee1394.figures`."""
+    """Every phase of one transaction [us]; the equation behind each stands in `busplan.buses.ieee1394.figures`.
 
-    request_bytes: float
-    response_bytes: float
-    arbitration_us: float
-    request_data_us: float
-    response_data_us: float
-    request_us: float
-    response_us: float
-    acknowledge_us: float
-    execution_us: float
-    latency_us: float
-    request_and_acknowledge_us: float
-    response_and_acknowledge_us: float
-    subaction_gap_us: float
-    arbitration_reset_gap_us: float
-    gaps_us: float
-    latency_with_gaps_us: float
-    """What the transaction takes of the cycle, T_lant + T_sum."""
+    What an answer does not have is 0: a unified one has no response, one that is not split has no execution time.
+    """
+
+    request_bytes: Number
+    response_bytes: Number
+    arbitration_us: Number
+    """Of either packet that arbitrates."""
+    request_data_us: Number
+    response_data_us: Number
+    request_us: Number
+    response_us: Number
+    acknowledge_us: Number
+    """Of either packet that is acknowledged."""
+    hold_us: Number
+    execution_us: Number
+    worst_extra_us: Number
+    latency_us: Number
+    request_and_acknowledge_us: Number
+    response_and_acknowledge_us: Number
+    subaction_gap_us: Number
+    arbitration_reset_gap_us: Number
+    gaps_us: Number
+    latency_with_gaps_us: Number
+    """T_lant + T_sum."""
+    idle_us: Number
+    host_us: Number
+    transaction_us: Number
+    """What the transaction takes of the cycle."""
 
 
 def _paper_packets(_kind: TransactionKind, payload_bytes: Number, overhead_bytes: Number) -> PacketSizes:
@@ -118,11 +161,50 @@ def _standard_packets(kind: TransactionKind, payload_bytes: Number, _overhead_by
 
 TIMING_MODELS: Final[Mapping[TimingModelName, PacketTiming]] = MappingProxyType(
     {
-        "paper": PacketTiming("paper", lambda data_rate_mbit_s: data_rate_mbit_s, _paper_packets),
-        "standard": PacketTiming("standard", lambda _data_rate_mbit_s: BASE_RATE_MBIT_S, _standard_packets),
+        "paper": PacketTiming("paper", lambda data_rate_mbit_s: data_rate_mbit_s, _paper_packets, gaps_added_up),
+        "standard": PacketTiming(
+            "standard", lambda _data_rate_mbit_s: BASE_RATE_MBIT_S, _standard_packets, gaps_as_thresholds
+        ),
     }
 )
 """The timing models by name, in the order reports show them."""
+
+
+class Delays(NamedTuple):
+    """What does not depend on the packet [us]."""
+
+    hop_us: Number
+    arbitration_us: Number
+    acknowledge_us: Number
+    gaps: Gaps
+
+
+def delays(link: Link, *, model: PacketTiming, alone: Number) -> Delays:
+    """Arbitration, acknowledge and gaps of any transaction, equations (4), (6), (9) and (10).
+
+    Parameters
+    ----------
+    link
+        Rate, gap count and distance.
+    model
+        Timing model, of `TIMING_MODELS`.
+    alone
+        Whether one node alone answers on the bus.
+    """
+    clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
+    phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
+    hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+    arbitration_us = equations.arbitration_phase_us(
+        link.hops, hop_us=hop_us, gap_count=link.gap_count, gap_clock_mbit_s=clock_mbit_s
+    )
+    acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(link.hops, hop_us=hop_us))
+    gaps = Gaps(
+        equations.subaction_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
+        equations.arbitration_reset_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
+        equations.gaps_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
+        alone,
+    )
+    return Delays(hop_us, arbitration_us, acknowledge_us, gaps)
 
 
 def transaction(
@@ -130,9 +212,10 @@ def transaction(
     *,
     model: PacketTiming,
     link: Link,
-    payload_bytes: int,
-    overhead_bytes: int,
-    execution_us: float,
+    payload_bytes: Number,
+    overhead_bytes: Number,
+    responder: Responder,
+    alone: Number = False,
 ) -> Phases:
     """Take one asynchronous transaction apart, equations (3)-(10), (13) and (14).
 
@@ -148,8 +231,10 @@ def transaction(
         Payload [bytes]; integer or integer array.
     overhead_bytes
         Overhead of each packet in the `paper` model [bytes]; `standard` knows the real sizes.
-    execution_us
-        Execution time T_exec in the node [us]; float or array.
+    responder
+        How the node answers, and how fast the host goes on.
+    alone
+        Whether one node alone answers on the bus.
 
     Returns
     -------
@@ -174,60 +259,61 @@ def transaction(
     ...     link=link,
     ...     payload_bytes=4,
     ...     overhead_bytes=20,
-    ...     execution_us=36.7,
+    ...     responder=Responder(36.8),
     ... )
     >>> phases.request_bytes, phases.response_bytes
     (20.0, 16.0)
     >>> round(phases.request_and_acknowledge_us, 3)
     5.347
     """
-    clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
+    answer = responder.answer
+    is_split, has_response = answer == "split", answer != "unified"
+    hop_us, arbitration_us, acknowledge_us, gaps = delays(link, model=model, alone=alone)
     packets = model.packets(kind, payload_bytes, overhead_bytes)
 
-    def data_us(packet_bytes: float) -> float:
+    def data_us(packet_bytes: Number) -> Number:
         return equations.data_phase_us(
-            link.hops,
-            packet_bytes=packet_bytes,
-            data_rate_mbit_s=link.data_rate_mbit_s,
-            gap_clock_mbit_s=clock_mbit_s,
-            cable_length_m=link.cable_length_m,
+            link.hops, hop_us=hop_us, packet_bytes=packet_bytes, data_rate_mbit_s=link.data_rate_mbit_s
         )
 
-    arbitration_us = equations.arbitration_phase_us(
-        link.hops,
-        gap_count=link.gap_count,
-        gap_clock_mbit_s=clock_mbit_s,
-        cable_length_m=link.cable_length_m,
-    )
-    acknowledge_us = equations.acknowledge_us(
-        equations.acknowledge_phase_us(link.hops, gap_clock_mbit_s=clock_mbit_s, cable_length_m=link.cable_length_m)
-    )
-    request_data_us, response_data_us = data_us(packets.request_bytes), data_us(packets.response_bytes)
+    request_data_us = data_us(packets.request_bytes)
+    response_data_us = data_us(packets.response_bytes) if has_response else 0.0
     request_us = equations.request_us(arbitration_us, data_us=request_data_us)
-    response_us = equations.response_us(arbitration_us, data_us=response_data_us)
+    response_us = equations.response_us(arbitration_us if is_split else 0.0, data_us=response_data_us)
+    response_acknowledge_us = acknowledge_us if has_response else 0.0
+    execution_us = responder.execution_us if is_split else 0.0
+    worst_extra_us = responder.worst_extra_us if is_split else 0.0
+    hold_us = responder.hold_us if answer == "concatenated" else 0.0
     latency_us = equations.transaction_latency_us(
         request_us,
         request_acknowledge_us=acknowledge_us,
-        execution_us=execution_us,
+        execution_us=execution_us if is_split else hold_us,
         response_us=response_us,
-        response_acknowledge_us=acknowledge_us,
+        response_acknowledge_us=response_acknowledge_us,
     )
-    gaps_us = equations.gaps_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s)
+    idle = model.idle(answer, gaps=gaps, execution_us=execution_us + worst_extra_us, host_us=responder.host_us)
     return Phases(
         request_bytes=packets.request_bytes,
-        response_bytes=packets.response_bytes,
+        response_bytes=packets.response_bytes if has_response else 0,
         arbitration_us=arbitration_us,
         request_data_us=request_data_us,
         response_data_us=response_data_us,
         request_us=request_us,
         response_us=response_us,
         acknowledge_us=acknowledge_us,
+        hold_us=hold_us,
         execution_us=execution_us,
+        worst_extra_us=worst_extra_us,
         latency_us=latency_us,
         request_and_acknowledge_us=equations.request_and_acknowledge_us(request_us, acknowledge_us=acknowledge_us),
-        response_and_acknowledge_us=equations.response_and_acknowledge_us(response_us, acknowledge_us=acknowledge_us),
-        subaction_gap_us=equations.subaction_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
-        arbitration_reset_gap_us=equations.arbitration_reset_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
-        gaps_us=gaps_us,
-        latency_with_gaps_us=latency_us + gaps_us,
+        response_and_acknowledge_us=equations.response_and_acknowledge_us(
+            response_us, acknowledge_us=response_acknowledge_us
+        ),
+        subaction_gap_us=gaps.subaction_us,
+        arbitration_reset_gap_us=gaps.arbitration_reset_us,
+        gaps_us=gaps.both_us,
+        latency_with_gaps_us=latency_us + gaps.both_us,
+        idle_us=idle.idle_us,
+        host_us=idle.host_us,
+        transaction_us=latency_us + worst_extra_us + idle.idle_us + idle.host_us,
     )

@@ -1,0 +1,93 @@
+"""How sure it is that a cycle fits: the bias of the timing model, and the uncertainty of what it rests on.
+
+References
+----------
+JCGM 100 (GUM): the combined standard uncertainty of independent inputs (5.1), and its expansion (6.2).
+"""
+
+from typing import Final, Literal, NamedTuple
+
+from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME, available_us, fits_in
+from busplan.analysis.network import bus_of
+from busplan.buses.bus import BusCycle, Doubt, Limit
+from busplan.buses.network import Network
+from busplan.elementwise import Number, choose, named, total
+
+VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
+FITS: Final[VerdictWord] = "fits"
+NOT_SHOWN: Final[VerdictWord] = "not shown to fit"
+DOES_NOT_FIT: Final[VerdictWord] = "does not fit"
+VERDICTS: Final = (FITS, NOT_SHOWN, DOES_NOT_FIT)
+COVERAGE: Final = 2
+"""Expanded by it, a standard uncertainty covers at least 95 %, on one side."""
+
+
+class Certainty(NamedTuple):
+    """A cycle with its bias and its uncertainty [us]. The numbers may be of any sort."""
+
+    bias_us: Number | None
+    """What the bus takes beyond the timing model; None where nobody has measured it."""
+    margin_corrected_us: Number
+    """What is left of the slice, less the bias."""
+    uncertainty_us: Number
+    """U, two standard uncertainties."""
+    safe_required_us: Number
+    """What the slice must give for the cycle to be shown to fit, with the reserve."""
+    doubts: tuple[Doubt, ...]
+
+
+def certainty(cycle: BusCycle) -> Certainty:
+    """Weigh a cycle: its corrected margin, its uncertainty, and what it needs to be shown to fit.
+
+    Parameters
+    ----------
+    cycle
+        A cycle under the timing model that decides. Its numbers may be of any sort.
+
+    References
+    ----------
+    JCGM 100 (GUM), 5.1.2 and 6.2.1.
+    """
+    network, bias_us, doubts = cycle.network, cycle.bias_us(), cycle.doubts()
+    extra_us: Number = 0.0 if bias_us is None else bias_us
+    combined_us = total(one.us * one.us for one in doubts) ** 0.5
+    expanded_us = COVERAGE * named(combined_us, "combined_uncertainty_us", "u_c")
+    biased_us = cycle.required_with(extra_us)
+    bounded_us = cycle.required_with(extra_us + expanded_us)
+    return Certainty(
+        bias_us=None if bias_us is None else biased_us - cycle.required_us,
+        margin_corrected_us=available_us(network) - biased_us,
+        uncertainty_us=bounded_us - biased_us,
+        safe_required_us=bounded_us / (1 - network.profile.limits.reserve),
+        doubts=doubts,
+    )
+
+
+def verdict_code(found: Certainty, network: Network, *, is_broken: Number) -> Number:
+    """The place of the verdict among `VERDICTS`.
+
+    Parameters
+    ----------
+    found
+        The certainty of the network's cycle.
+    network
+        The network.
+    is_broken
+        Whether it breaks a limit of its bus.
+    """
+    given_us = available_us(network)
+    is_shown = fits_in(found.safe_required_us, available_us=given_us)
+    is_out = found.margin_corrected_us + found.uncertainty_us < -FIT_ROUNDING * given_us
+    return choose(is_broken, 2, choose(is_shown, 0, choose(is_out, 2, 1)))
+
+
+def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
+    """Every limit that a network must keep to be shown to fit on a bus that is set safely; time is the last."""
+    bus = bus_of(network.profile)
+    time = Limit(
+        TIME,
+        "{value:.3f} us needed of {most:.3f} us",
+        lambda one: certainty(bus.cycle(one, model=bus.deciding_model)).safe_required_us,
+        lambda one: available_us(one) * (1 + FIT_ROUNDING),
+    )
+    return (*bus.limits, time)

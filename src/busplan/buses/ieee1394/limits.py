@@ -1,0 +1,60 @@
+"""What the standard forbids, and what leaves no time. A gap count below the table fits, but is not safe."""
+
+from math import nextafter
+from typing import Final
+
+from busplan.buses.bus import Limit
+from busplan.buses.ieee1394.constants import CYCLE_US, MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, safe_gap_count
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
+from busplan.buses.network import Network
+from busplan.elementwise import Number
+
+
+def _most_payload(network: Network) -> Number:
+    return MAX_PAYLOAD_BYTES[network.profile.bus.speed]
+
+
+def _cycle_start_us(network: Network) -> Number:
+    is_sent = network.profile.bus.cycle_master
+    return Ieee1394Cycle(network, "standard").cycle_start_us if is_sent else 0.0
+
+
+LIMITS: Final = (
+    Limit(
+        "payload",
+        "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
+        lambda network: network.largest_payload_bytes,
+        _most_payload,
+        way_out="the payload fits no packet",
+        failure="payload_bytes",
+    ),
+    Limit(
+        "nodes",
+        "{value:.0f} nodes are over the {most:.0f} of one bus",
+        lambda network: network.nodes,
+        lambda _network: MAX_NODES,
+        way_out=f"a second bus has {MAX_NODES:g} more",
+    ),
+    Limit(
+        "hops",
+        "{value:.0f} hops are over the {most:.0f} of one bus",
+        hops_of,
+        lambda _network: MAX_HOPS,
+        way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
+    ),
+    Limit(
+        "cycle starts",
+        "a cycle start takes {value:.3f} us of the {most:.3f} us between two, so no time is left for the nodes",
+        _cycle_start_us,
+        lambda _network: nextafter(CYCLE_US, 0.0),
+        way_out="less bus.isochronous_us, or no cycle master, leaves time",
+    ),
+    Limit(
+        "gap table",
+        "gap count {most:.0f} is unsafe for the hops; the smallest safe one is {value:.0f}",
+        lambda network: safe_gap_count(hops_of(network)),
+        gap_count_of,
+        is_safety=True,
+    ),
+)

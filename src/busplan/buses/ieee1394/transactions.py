@@ -1,0 +1,221 @@
+"""The transactions of a cycle: each with its phases, and the stretches of bus time that it is made of."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+
+from busplan.buses.bus import BusEvent
+from busplan.buses.ieee1394 import figures
+from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, safe_gap_count
+from busplan.buses.ieee1394.timing import (
+    TIMING_MODELS,
+    Link,
+    Phases,
+    Responder,
+    TimingModelName,
+    transaction,
+)
+from busplan.buses.network import Group, Network, TransactionKind
+from busplan.elementwise import Number, SpecialNumber, alike, is_one, named, worded
+
+if TYPE_CHECKING:
+    from busplan.buses.ieee1394.idle import Answer
+
+_LATENCY_SYMBOLS: Final = {figure.key: figure.symbol for figure in figures.LATENCY}
+
+
+def hops_of(network: Network) -> Number:
+    """Most cable hops [1].
+
+    In a chain they lie between the host and the farthest node. In a tree they are `max_hops`, which the host's own way
+    to a node never exceeds.
+    """
+    most = network.profile.bus.max_hops
+    return worded(network.nodes, "N: a chain with the host at its end") if most is None else most
+
+
+def gap_count_of(network: Network) -> Number:
+    """Gap count in force [1]."""
+    given = network.profile.bus.gap_count
+    if not isinstance(given, str):
+        return given
+    return worded(safe_gap_count(hops_of(network)), 'g_safe, for bus.gap_count is "optimal"')
+
+
+def link_of(network: Network) -> Link:
+    """Rate, gap count and distance of the farthest node."""
+    bus = network.profile.bus
+    return Link(
+        data_rate_mbit_s=alike(DATA_RATE_MBIT_S[bus.speed], network.nodes),
+        gap_count=named(gap_count_of(network), "gap_count", "g"),
+        hops=named(hops_of(network), "hops", "H"),
+        cable_length_m=bus.cable_length_m,
+        phy_delay_us=bus.phy_delay_us,
+    )
+
+
+class Exchange(NamedTuple):
+    """The same transaction with each node of a group."""
+
+    kind: TransactionKind
+    nodes: Number
+    payload_bytes: Number
+    responder: Responder
+    execution_uncertainty_us: Number
+    """Standard uncertainty of the execution time [us]."""
+    phases: Phases
+
+
+def exchange(
+    network: Network, group: Group, kind: TransactionKind, *, model: TimingModelName, link: Link, suffix: str = ""
+) -> Exchange:
+    """Take the transaction of a group apart.
+
+    Parameters
+    ----------
+    network
+        The network.
+    group
+        One of its groups.
+    kind
+        "read" or "write".
+    model
+        Timing model.
+    link
+        The way of the packets.
+    suffix
+        What tells its symbols from those of other transactions in a derivation.
+    """
+    is_read, node = kind == "read", network.profile.node
+    size = group.read_bytes if is_read else group.write_bytes
+    answer: Answer = node.read_response if is_read else node.write_response
+    responder = Responder(
+        execution_us=group.read_execution_us if is_read else group.write_execution_us,
+        answer=answer,
+        worst_extra_us=group.worst_extra_us,
+        hold_us=node.response_us,
+        host_us=network.profile.host.transaction_us,
+    )
+    phases = transaction(
+        kind,
+        model=TIMING_MODELS[model],
+        link=link,
+        payload_bytes=size,
+        overhead_bytes=network.profile.payload.overhead_bytes,
+        responder=responder,
+        alone=is_one(network.nodes),
+    )
+    uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
+    return Exchange(kind, group.nodes, size, responder, uncertainty_us, _with_names(phases, suffix))
+
+
+def _with_names(phases: Phases, suffix: str) -> Phases:
+    """The same phases, each with its symbol if they are traced numbers."""
+    if not isinstance(phases.latency_us, SpecialNumber):
+        return phases
+    return Phases(
+        **{key: named(value, key, f"{_LATENCY_SYMBOLS[key]}{suffix}") for key, value in phases._asdict().items()}
+    )
+
+
+Who = Literal["host", "node"]
+PACKET_PARTS: Final = ("cycle_arbitration_us", "cycle_data_us", "cycle_acknowledge_us")
+"""Terms whose parts are one packet's way over the hops."""
+
+
+def parts(one: Exchange) -> tuple[BusEvent, ...]:
+    """What one transaction is made of, in the order of the wire; what the answer does not have is not there.
+
+    The idle bus of the gaps is one part here; `events` divides it.
+    """
+    phases, answer = one.phases, one.responder.answer
+    found = [
+        *_packet(phases, "request", "host", arbitrates=True),
+        *(
+            (
+                BusEvent("execution", "cycle_execution_us", phases.execution_us, "node execution"),
+                BusEvent("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution"),
+            )
+            if answer == "split"
+            else ()
+        ),
+        *(
+            (BusEvent("hold", "cycle_hold_us", phases.hold_us, "node holds the bus"),)
+            if answer == "concatenated"
+            else ()
+        ),
+        *(() if answer == "unified" else _packet(phases, "response", "node", arbitrates=answer == "split")),
+        BusEvent("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps"),
+        BusEvent("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps"),
+    ]
+    return tuple(found)
+
+
+def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[BusEvent]:
+    receiver: Who = "node" if sender == "host" else "host"
+    data_us = phases.request_data_us if packet == "request" else phases.response_data_us
+    if arbitrates:
+        yield BusEvent(
+            "arbitration",
+            "cycle_arbitration_us",
+            phases.arbitration_us,
+            f"{sender} arbitration",
+            packet=packet,
+        )
+    yield BusEvent(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
+    yield BusEvent(
+        "acknowledge", "cycle_acknowledge_us", phases.acknowledge_us, f"{receiver} acknowledge", packet=packet
+    )
+
+
+def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
+    """The parts of one transaction, of plain numbers; its idle bus is divided by idle period and gap."""
+    before, behind = _added_up(one.phases) if model == "paper" else _by_idle_period(one)
+    for part in parts(one):
+        if part.kind == "idle":
+            yield from behind
+        else:
+            yield part
+            if part.kind == "worst_extra":
+                yield from before
+
+
+_Divided = tuple[tuple[BusEvent, ...], tuple[BusEvent, ...]]
+"""Idle bus of a transaction before its response, and behind it."""
+
+
+def _gap(kind: str, us: float, label: str) -> BusEvent:
+    return BusEvent(kind, "cycle_idle_us", us, label)
+
+
+def _added_up(phases: Phases) -> _Divided:
+    """Both gaps behind the transaction."""
+    subaction = _gap("subaction_gap", phases.subaction_gap_us, "subaction gap")
+    return (), (subaction, _gap("arbitration_reset_gap", phases.arbitration_reset_gap_us, "arbitration reset gap"))
+
+
+def _by_idle_period(one: Exchange) -> _Divided:
+    """The gap that each idle period waits for, and what a faster node would take beyond."""
+    phases = one.phases
+    sub_us, reset_us = phases.subaction_gap_us, phases.arbitration_reset_gap_us
+    if one.responder.answer != "split":
+        return (), (_gap("arbitration_reset_gap", phases.idle_us, "arbitration reset gap behind the transaction"),)
+    execution_us = phases.execution_us + phases.worst_extra_us
+    before_us = max(sub_us - execution_us, 0.0)
+    behind_us = phases.idle_us - before_us
+    has_run = execution_us > reset_us
+    allowance_us = behind_us - (sub_us if has_run else reset_us)
+    allowance_us = allowance_us if allowance_us > _ROUNDING_US else 0.0
+    gap_us = behind_us - allowance_us
+    return (
+        (_gap("subaction_gap", before_us, "rest of the subaction gap before the response"),),
+        (
+            _gap("subaction_gap", gap_us, "subaction gap behind the response")
+            if has_run
+            else _gap("arbitration_reset_gap", gap_us, "arbitration reset gap behind the response"),
+            _gap("allowance", allowance_us, "allowance for a faster node"),
+        ),
+    )
+
+
+_ROUNDING_US: Final = 1e-9
+"""A difference of times below this is the rounding of floats."""
