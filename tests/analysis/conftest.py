@@ -17,14 +17,20 @@ GAP_COUNTS = [5, 7, 8, 10, 13, 16, 18, 21, 24, 26, 29, 32, 35, 37, 40, 43, 46, 4
 def exact_required_us(profile: Profile, model: str, nodes: int) -> Fraction:
     """Required time of a cycle in exact arithmetic, written from the equations and from nothing of busplan."""
     data = profile.model_dump()
-    bus, payload = data["bus"], data["payload"]
+    bus, payload, node, cycle = data["bus"], data["payload"], data["node"], data["cycle"]
     rate = {"S100": Fraction("98.304"), "S200": Fraction("196.608"), "S400": Fraction("393.216")}[bus["speed"]]
-    clock = rate if model == "paper" else Fraction("98.304")
+    base = Fraction("98.304")
+    clock = rate if model == "paper" else base
     hops = nodes if bus["max_hops"] is None else bus["max_hops"]
     gap = bus["gap_count"]
     if gap == "optimal":
         gap = GAP_COUNTS[hops - 1] if hops <= 23 else 63
-    hop_us = Fraction("0.023") * Fraction(bus["cable_length_m"]) / Fraction("4.5") + Fraction(14) / clock
+    phy_us = Fraction(14) / clock if bus["phy_delay_us"] is None else Fraction(bus["phy_delay_us"])
+    way_us = hops * (Fraction("0.023") * Fraction(bus["cable_length_m"]) / Fraction("4.5") + phy_us)
+    arbitration_us = way_us + Fraction(4 * gap) / clock + Fraction("1.63")
+    acknowledge_us = way_us + Fraction("0.25")
+    sub_us, reset_us = Fraction(29 + 16 * gap) / clock, Fraction(53 + 32 * gap) / clock
+    host_us = Fraction(data["host"]["transaction_us"])
 
     def packets(kind: str, size: int) -> tuple[int, int]:
         if model == "paper":
@@ -34,20 +40,44 @@ def exact_required_us(profile: Profile, model: str, nodes: int) -> Fraction:
             return (16, 20) if size == 4 else (20, 24 + padded)
         return (20, 16) if size == 4 else (24 + padded, 16)
 
-    def execution_us(size: int) -> Fraction:
-        execution = data["node"]["execution"]
-        return Fraction(execution["base_us"]) + Fraction(execution["per_byte_us"]) * size
+    def data_us(size: int) -> Fraction:
+        return way_us + Fraction(8 * size) / rate
 
-    total = Fraction(data["cycle"]["nonperiodic_us"])
-    total += Fraction(data["cycle"]["sync"]["ping_us"])
-    total += Fraction(data["cycle"]["sync"]["ping_per_node_us"]) * (nodes - 1)
-    for kind in ("read", "write"):
-        size = payload[f"{kind}_bytes"]
-        arbitration_us = hop_us * hops + Fraction(4 * gap) / clock + Fraction("1.63")
-        data_us = sum(hop_us * hops + 8 * Fraction(packet) / rate for packet in packets(kind, size))
-        acknowledge_us = hop_us * hops + Fraction("0.25")
-        gaps_us = Fraction(82 + 48 * gap) / clock
-        total += nodes * (2 * arbitration_us + data_us + 2 * acknowledge_us + execution_us(size) + gaps_us)
+    def transaction_us(kind: str) -> Fraction:
+        size, execution = payload[f"{kind}_bytes"], node["execution"]
+        execution_us = Fraction(execution["base_us"]) + Fraction(execution["per_byte_us"]) * size
+        request, response = packets(kind, size)
+        half_us = arbitration_us + data_us(request) + acknowledge_us
+        answer = node[f"{kind}_response"]
+        if model == "paper":
+            both_us = half_us + arbitration_us + data_us(response) + acknowledge_us
+            return both_us + execution_us + Fraction(82 + 48 * gap) / clock
+        if answer == "unified":
+            return half_us + max(reset_us, host_us)
+        if answer == "concatenated":
+            second_us = Fraction(node["response_us"]) + data_us(response) + acknowledge_us
+            return half_us + second_us + max(reset_us, host_us)
+        # Any faster node, too: the largest lies at an end or just below the arbitration reset gap.
+        most_us = execution_us + Fraction(execution["worst_extra_us"])
+        first_us = reset_us if nodes == 1 else max(sub_us, min(most_us, reset_us))
+        waits_us = max(first_us + max(reset_us, host_us), most_us + max(sub_us, host_us))
+        return half_us + arbitration_us + data_us(response) + acknowledge_us + waits_us
+
+    total = Fraction(cycle["nonperiodic_us"]) + nodes * (transaction_us("read") + transaction_us("write"))
+    if model == "paper":
+        sync = cycle["sync"]
+        return total + Fraction(sync["ping_us"]) + Fraction(sync["ping_per_node_us"]) * (nodes - 1)
+    total += arbitration_us + data_us(20) + reset_us
+    largest = max(packets(kind, payload[f"{kind}_bytes"])[0] for kind in ("read", "write"))
+    total += cycle["retries"] * (arbitration_us + data_us(largest) + acknowledge_us + reset_us)
+    if bus["cycle_master"]:
+        start_us = reset_us + arbitration_us + way_us + Fraction(160) / base + Fraction(bus["isochronous_us"])
+        starts = 1
+        if start_us > 124:  # no time is left: a broken limit, and any finite number
+            starts = total // 1 + 1
+        while start_us <= 124 and starts != (total + starts * start_us) // 125 + 1:
+            starts += 1
+        total += starts * start_us
     return total
 
 
@@ -72,8 +102,24 @@ def make_profile(**changes: Any) -> Profile:
 
 @st.composite
 def profiles(draw: st.DrawFn) -> Profile:
-    """Random profiles over the whole range that a plan may have."""
+    """Random profiles over the whole range that a plan may have; half of them with what the paper cannot express."""
+    master = draw(st.booleans())
+    own: dict[str, Any] = {
+        "bus__cycle_master": master,
+        "bus__isochronous_us": draw(st.floats(0.0, 125.0)) if master else 0.0,
+        "bus__phy_delay_us": draw(st.one_of(st.none(), st.floats(0.01, 0.2))),
+        "cycle__retries": draw(st.integers(0, 5)),
+        "host": {"transaction_us": draw(st.one_of(st.just(0.0), st.floats(0.0, 60.0)))},
+        "node__read_response": draw(st.sampled_from(["split", "concatenated"])),
+        "node__write_response": draw(st.sampled_from(["split", "unified"])),
+        "node__response_us": draw(st.floats(0.0, 1.63)),
+        "node__execution__worst_extra_us": draw(st.floats(0.0, 10.0)),
+    }
     return make_profile(
+        **(own if draw(st.booleans()) else {}),
+        node__execution__grade=draw(st.sampled_from([None, "measured", "derived", "assumed"])),
+        node__execution__residual=draw(st.sampled_from(["none", "paper", "standard"])),
+        node__execution__measured_gap_count=draw(st.integers(0, 63)),
         bus__speed=draw(st.sampled_from(["S100", "S200", "S400"])),
         bus__gap_count=draw(st.one_of(st.integers(0, 63), st.just("optimal"))),
         bus__nodes=draw(st.integers(1, 80)),

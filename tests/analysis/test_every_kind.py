@@ -8,8 +8,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from busplan.analysis.capacity.certainty import FITS, certainty, limits_to_be_safe
 from busplan.analysis.capacity.cycle import cycle_of, limits_with_time
-from busplan.analysis.capacity.node_limit import most_nodes
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.capacity.node_limit import most_nodes, safe_nodes
 from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial
 from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of, model_names, network_of
@@ -76,7 +78,7 @@ def test_the_most_nodes_are_those_that_a_count_finds(
     network = network_of(profile)
     for model in model_names(profile):
         limits = limits_with_time(network, model=model)
-        found = most_nodes(network, model=model)
+        found = most_nodes(network, limits)
         count = 0
         while not any(one.is_broken(network.with_nodes(count + 1)) for one in limits):
             count += 1
@@ -103,7 +105,8 @@ def test_a_traced_number_and_a_polynomial_have_the_same_value(
         except NoPolynomialError:
             continue  # then the most nodes are searched, and compared with a count above
         assert isinstance(whole, Polynomial)
-        assert whole.at(nodes) == pytest.approx(plain, rel=1e-12)
+        if nodes > 1:  # a polynomial is the cycle of two nodes or more
+            assert whole.at(nodes) == pytest.approx(plain, rel=1e-12)
 
 
 @KINDS
@@ -116,6 +119,45 @@ def test_what_a_cycle_needs_rests_on_neither_the_period_nor_the_slice_ratio(
     other = override(profile, {"cycle.period_us": 12_345.0, "cycle.slice_ratio": 0.123})
     for model in model_names(profile):
         assert cycle_of(profile, model=model).terms == cycle_of(other, model=model).terms
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_the_safe_nodes_are_those_that_a_count_finds(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    bus = bus_of(profile)
+
+    def is_safe(nodes: int) -> bool:
+        with_them = override(profile, {"bus.nodes": nodes})
+        one = figures(with_them, model=bus.deciding_model)
+        return one.verdict == FITS and one.safe
+
+    found, limit = safe_nodes(profile)
+    count = 0
+    while is_safe(count + 1):
+        count += 1
+    assert found == count
+    (broken,) = (one for one in limits_to_be_safe(network_of(profile)) if one.key == limit)
+    assert broken.is_broken(network_of(profile).with_nodes(count + 1))
+
+
+@KINDS
+@SOME
+@given(data=st.data())
+def test_the_certainty_of_an_array_is_that_of_each_number(
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
+) -> None:
+    profile = data.draw(profiles_by_kind[kind])
+    network, nodes, bus = network_of(profile), np.arange(1, 30), bus_of(profile)
+    together = certainty(bus.cycle(network.with_nodes(nodes), model=bus.deciding_model))
+    for index, count in enumerate(nodes.tolist()):
+        alone = certainty(cycle_of(profile, model=bus.deciding_model, nodes=count))
+        for name in ("margin_corrected_us", "uncertainty_us", "safe_required_us"):
+            found = np.broadcast_to(getattr(together, name), nodes.shape)[index]
+            assert found == pytest.approx(getattr(alone, name), rel=1e-12, abs=1e-9)
 
 
 def test_every_kind_is_tried(profiles_by_kind: Profiles) -> None:

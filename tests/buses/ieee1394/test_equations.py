@@ -23,9 +23,10 @@ def test_equation_15_gives_table_1_theory_to_its_two_decimals(payload_bytes: int
 def test_equations_4_to_6_fall_6_4_ns_short_of_equation_15() -> None:
     # By hand at N = 1, g = 63, 393.216 Mbit/s: three hops, the gap term, 20 bytes, and the two constants.
     by_hand_us = 3 * (0.023 + 14 / 393.216) + 252 / 393.216 + 160 / 393.216 + 1.63 + 0.25
-    arbitration_us = eq.arbitration_phase_us(1, gap_count=63, gap_clock_mbit_s=PAPER_CLOCK)
-    data_us = eq.data_phase_us(1, packet_bytes=20, data_rate_mbit_s=PAPER_CLOCK, gap_clock_mbit_s=PAPER_CLOCK)
-    acknowledge_us = eq.acknowledge_us(eq.acknowledge_phase_us(1, gap_clock_mbit_s=PAPER_CLOCK))
+    hop_us = eq.hop_delay_us(4.5, phy_delay_us=eq.phy_delay_us(PAPER_CLOCK))
+    arbitration_us = eq.arbitration_phase_us(1, hop_us=hop_us, gap_count=63, gap_clock_mbit_s=PAPER_CLOCK)
+    data_us = eq.data_phase_us(1, hop_us=hop_us, packet_bytes=20, data_rate_mbit_s=PAPER_CLOCK)
+    acknowledge_us = eq.acknowledge_us(eq.acknowledge_phase_us(1, hop_us=hop_us))
     computed_us = eq.request_and_acknowledge_us(
         eq.request_us(arbitration_us, data_us=data_us), acknowledge_us=acknowledge_us
     )
@@ -48,16 +49,16 @@ def test_equation_10_is_the_sum_of_its_two_gaps(gap_count: int, clock: float) ->
 
 
 def test_phases_by_hand_under_the_base_clock() -> None:
-    hop_us = 0.023 + 14 / 98.304
-    assert eq.hop_delay_us(4.5, gap_clock_mbit_s=BASE_CLOCK) == pytest.approx(hop_us, rel=1e-15)
-    assert eq.hop_delay_us(9.0, gap_clock_mbit_s=BASE_CLOCK) == pytest.approx(hop_us + 0.023, rel=1e-15)
-    assert eq.arbitration_phase_us(3, gap_count=8, gap_clock_mbit_s=BASE_CLOCK) == pytest.approx(
+    hop_us, phy_us = 0.023 + 14 / 98.304, eq.phy_delay_us(BASE_CLOCK)
+    assert eq.hop_delay_us(4.5, phy_delay_us=phy_us) == pytest.approx(hop_us, rel=1e-15)
+    assert eq.hop_delay_us(9.0, phy_delay_us=phy_us) == pytest.approx(hop_us + 0.023, rel=1e-15)
+    assert eq.arbitration_phase_us(3, hop_us=hop_us, gap_count=8, gap_clock_mbit_s=BASE_CLOCK) == pytest.approx(
         3 * hop_us + 32 / 98.304 + 1.63, rel=1e-15
     )
-    assert eq.data_phase_us(
-        3, packet_bytes=36, data_rate_mbit_s=PAPER_CLOCK, gap_clock_mbit_s=BASE_CLOCK
-    ) == pytest.approx(3 * hop_us + 288 / 393.216, rel=1e-15)
-    assert eq.acknowledge_phase_us(3, gap_clock_mbit_s=BASE_CLOCK) == pytest.approx(3 * hop_us + 0.25, rel=1e-15)
+    assert eq.data_phase_us(3, hop_us=hop_us, packet_bytes=36, data_rate_mbit_s=PAPER_CLOCK) == pytest.approx(
+        3 * hop_us + 288 / 393.216, rel=1e-15
+    )
+    assert eq.acknowledge_phase_us(3, hop_us=hop_us) == pytest.approx(3 * hop_us + 0.25, rel=1e-15)
 
 
 @given(st.lists(st.floats(0, 1e3), min_size=5, max_size=5))
@@ -94,10 +95,11 @@ ARRAY_CASES = {
         "response_us",
         "response_acknowledge_us",
     ),
-    "hop_delay_us": ("cable_length_m", "gap_clock_mbit_s"),
-    "arbitration_phase_us": ("hops", "gap_count", "gap_clock_mbit_s", "cable_length_m"),
-    "data_phase_us": ("hops", "packet_bytes", "data_rate_mbit_s", "gap_clock_mbit_s", "cable_length_m"),
-    "acknowledge_phase_us": ("hops", "gap_clock_mbit_s", "cable_length_m"),
+    "phy_delay_us": ("gap_clock_mbit_s",),
+    "hop_delay_us": ("cable_length_m", "phy_delay_us"),
+    "arbitration_phase_us": ("hops", "hop_us", "gap_count", "gap_clock_mbit_s"),
+    "data_phase_us": ("hops", "hop_us", "packet_bytes", "data_rate_mbit_s"),
+    "acknowledge_phase_us": ("hops", "hop_us"),
     "request_us": ("arbitration_us", "data_us"),
     "response_us": ("arbitration_us", "data_us"),
     "acknowledge_us": ("acknowledge_phase_us",),

@@ -9,6 +9,7 @@ from busplan.buses.ieee1394.timing import (
     TIMING_MODELS,
     Link,
     Phases,
+    Responder,
     TimingModelName,
     transaction,
 )
@@ -46,7 +47,7 @@ def phases_of(
         link=link,
         payload_bytes=payload_bytes,
         overhead_bytes=20,
-        execution_us=execution_us,
+        responder=Responder(execution_us),
     )
 
 
@@ -99,6 +100,9 @@ def test_every_phase_by_hand() -> None:
         "subaction_gap_us": (29 + 16 * 7) / 98.304,
         "arbitration_reset_gap_us": (53 + 32 * 7) / 98.304,
         "gaps_us": (82 + 48 * 7) / 98.304,
+        # The node executes for longer than the arbitration reset gap: a subaction gap is left to wait for.
+        "idle_us": (29 + 16 * 7) / 98.304,
+        "transaction_us": request_us + response_us + 2 * acknowledge_us + 30.0 + (29 + 16 * 7) / 98.304,
     }
     assert {key: getattr(phases, key) for key in expected} == pytest.approx(expected, rel=1e-14)
     assert phases.latency_with_gaps_us == pytest.approx(phases.latency_us + phases.gaps_us, rel=1e-15)
@@ -126,9 +130,9 @@ def test_arrays_give_what_scalars_give(
         kind,
         model=TIMING_MODELS[model],
         link=link,
-        payload_bytes=np.array(payload),  # type: ignore[arg-type]  # arrays broadcast; the annotation is the scalar's
+        payload_bytes=np.array(payload),
         overhead_bytes=20,
-        execution_us=12.5,
+        responder=Responder(12.5),
     )
     for index, size in enumerate(payload):
         one = phases_of(kind, model=model, payload_bytes=size, execution_us=12.5, link=link)

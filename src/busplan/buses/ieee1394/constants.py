@@ -203,6 +203,13 @@ CYCLE_START_BYTES: Final = Sourced(
     source="the header formats of IEEE 1394: 160 bits, sent at S100",
     meaning="cycle start packet on the wire",
 )
+LEAST_ASYNCHRONOUS_US: Final = Sourced(
+    1,
+    unit="us",
+    grade="assumed",
+    source="chosen: no packet is shorter",
+    meaning="time between two cycle starts below which none is left for asynchronous packets",
+)
 SYNC_PACKET_BYTES: Final = Sourced(
     QUADLET_WRITE_REQUEST_BYTES,
     unit="bytes",

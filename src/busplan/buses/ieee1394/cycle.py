@@ -11,6 +11,7 @@ from busplan.buses.ieee1394.constants import (
     CYCLE_START_BYTES,
     CYCLE_US,
     DATA_RATE_MBIT_S,
+    LEAST_ASYNCHRONOUS_US,
     SYNC_PACKET_BYTES,
     safe_gap_count,
 )
@@ -18,7 +19,7 @@ from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingM
 from busplan.buses.ieee1394.transactions import Exchange, events, exchange, link_of, parts
 from busplan.buses.network import TRANSACTION_KINDS, Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, choose, is_one, larger, named, rounded_down, total
+from busplan.elementwise import Number, is_one, larger, named, rounded_down, total
 
 _OF_TRANSACTIONS: Final = (
     "cycle_arbitration_us",
@@ -103,8 +104,8 @@ class Ieee1394Cycle(BusCycle):
     def starts(self, others_us: Number) -> Number:
         """Number of cycle starts in a cycle whose other terms take some time [1].
 
-        The smallest whole n with n > (others + n start) / 125 us. Where a start takes 125 us or more there is none:
-        then it is the number in the other terms alone.
+        The smallest whole n with n > (others + n start) / 125 us. Starts that leave less than 1 us to each other are
+        counted as if they left that: the number is finite, and the limit of cycle starts is broken.
 
         Parameters
         ----------
@@ -112,7 +113,7 @@ class Ieee1394Cycle(BusCycle):
             All other terms [us]; of any sort.
         """
         left_us = CYCLE_US - self.cycle_start_us
-        return rounded_down(others_us / choose(left_us > 0, left_us, CYCLE_US)) + 1
+        return rounded_down(others_us / larger(left_us, LEAST_ASYNCHRONOUS_US)) + 1
 
     @property
     def _has_starts(self) -> bool:

@@ -154,7 +154,7 @@ def hop_delay_us(cable_length_m: Number, *, phy_delay_us: Number) -> Number:
 
     Examples
     --------
-    >>> hop_delay_us(4.5, phy_delay_us=0.144)
+    >>> round(hop_delay_us(4.5, phy_delay_us=0.144), 6)
     0.167
     """
     return CABLE_DELAY_US * cable_length_m / REFERENCE_CABLE_M + phy_delay_us

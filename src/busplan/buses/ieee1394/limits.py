@@ -1,10 +1,16 @@
 """What the standard forbids, and what leaves no time. A gap count below the table fits, but is not safe."""
 
-from math import nextafter
 from typing import Final
 
 from busplan.buses.bus import Limit
-from busplan.buses.ieee1394.constants import CYCLE_US, MAX_HOPS, MAX_NODES, MAX_PAYLOAD_BYTES, safe_gap_count
+from busplan.buses.ieee1394.constants import (
+    CYCLE_US,
+    LEAST_ASYNCHRONOUS_US,
+    MAX_HOPS,
+    MAX_NODES,
+    MAX_PAYLOAD_BYTES,
+    safe_gap_count,
+)
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
 from busplan.buses.network import Network
@@ -45,9 +51,9 @@ LIMITS: Final = (
     ),
     Limit(
         "cycle starts",
-        "a cycle start takes {value:.3f} us of the {most:.3f} us between two, so no time is left for the nodes",
+        "a cycle start takes {value:.3f} us, over {most:.3f} us: no time is left for the nodes until the next one",
         _cycle_start_us,
-        lambda _network: nextafter(CYCLE_US, 0.0),
+        lambda _network: CYCLE_US - LEAST_ASYNCHRONOUS_US,
         way_out="less bus.isochronous_us, or no cycle master, leaves time",
     ),
     Limit(
