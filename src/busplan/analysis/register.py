@@ -10,9 +10,9 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import VERDICT_FIGURES, Figure, by_key
 from busplan.errors import BusplanError
 
-Command = Literal["latency", "capacity", "circle-test"]
+CommandName = Literal["latency", "capacity", "circle-test"]
 
-_HOLDERS: Final[Mapping[str, tuple[Command, str]]] = MappingProxyType(
+_HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
     {
         "changes": ("capacity", "cheapest_change"),
         **dict.fromkeys(("name", "value", "limit"), ("circle-test", "failures")),
@@ -22,7 +22,7 @@ _HOLDERS: Final[Mapping[str, tuple[Command, str]]] = MappingProxyType(
 """Keys that stand inside a figure, by that figure: they are derived with it."""
 
 
-def figures_of(bus: Bus) -> dict[Command, dict[str, Figure]]:
+def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
     """Figures by command and key. A key that several commands give is the first one's, where no command is named."""
     return {
         "capacity": by_key((*bus.capacity_figures, *VERDICT_FIGURES)),
@@ -31,7 +31,7 @@ def figures_of(bus: Bus) -> dict[Command, dict[str, Figure]]:
     }
 
 
-def figure_named(name: str, *, bus: Bus) -> tuple[Command, Figure]:
+def figure_named(name: str, *, bus: Bus) -> tuple[CommandName, Figure]:
     """Find the figure that a name means.
 
     Parameters

@@ -7,11 +7,22 @@ from typing import Final
 from busplan.analysis.derivation.formulas import formula_of
 from busplan.analysis.derivation.origin import DIGITS, Input
 from busplan.analysis.network import bus_of
-from busplan.analysis.register import Command, figures_of
+from busplan.analysis.register import CommandName, figures_of
 from busplan.answers.documents import document
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Cell, Code, Document, Record, Report, Sentence, Table, TableColumn, TableRow, Value
+from busplan.forms.blocks import (
+    Cell,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+)
 from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 
@@ -96,7 +107,7 @@ def constant_rows(bus: Bus) -> list[Record]:
     ]
 
 
-def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> JsonDocument:
     """Document of `busplan explain PROFILE --format json`: what the figures rest on, and the whole registry."""
     return document(
         "explain",
@@ -110,7 +121,7 @@ def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Docu
 
 def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
     """Cells of an input, by its place in the JSON document."""
-    value = Value(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
+    value = ShownValue(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
     return Code(one.name), value, one.unit, one.grade, one.source
 
 
@@ -121,5 +132,5 @@ def _figure_table(bus: Bus) -> Table:
     return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
 
 
-def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
+def _all_figures(bus: Bus) -> Iterator[tuple[CommandName, Figure]]:
     yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())

@@ -13,7 +13,7 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -137,7 +137,7 @@ def calibration_records(result: Calibration) -> list[Record]:
     return [fit._asdict() for fit in result.payloads]
 
 
-def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> Document:
+def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> JsonDocument:
     """Document of `busplan calibrate --format json`."""
     bus, cycle = bus_of(result.profile), cycle_of(result.profile, model=result.timing_model)
     figures = cycle.figures()

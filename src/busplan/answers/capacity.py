@@ -16,7 +16,7 @@ from busplan.buses.figure import Figure
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -95,7 +95,7 @@ def capacity_records(result: Capacity) -> list[Record]:
     return [{**figures.by_key(), "exceeded": list(figures.exceeded)} for figures in result.results]
 
 
-def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> Document:
+def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
     """Document of `busplan capacity --format json`."""
     return document(
         "capacity",
@@ -105,7 +105,7 @@ def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> Document
     )
 
 
-def _verdict(verdict: Verdict, result: Capacity) -> Document:
+def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
     change = verdict.change
     return {
         "period_us": verdict.period_us,

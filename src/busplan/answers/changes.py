@@ -6,8 +6,8 @@ from operator import eq
 from typing import Final
 
 from busplan.analysis.comparison.difference import KeyDifference
-from busplan.forms.blocks import Cell, Code, Document, Sentence, Table, TableColumn, TableRow, Value
-from busplan.forms.numbers import MISSING, written
+from busplan.forms.blocks import Cell, Code, JsonDocument, Sentence, ShownValue, Table, TableColumn, TableRow
+from busplan.forms.numbers import MISSING, figure_text
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
@@ -40,13 +40,13 @@ def _cell(key: str, value: KeyValue | None, other: KeyValue | None, *, at: str) 
     if value is None:
         return MISSING
     own, beside = value.value, None if other is None else other.value
-    shown: Value | Code
+    shown: ShownValue | Code
     if isinstance(own, int | float) and not isinstance(own, bool):
-        shown = Value(own, key, at=at)
+        shown = ShownValue(own, key, at=at)
         if (
             own != beside
             and isinstance(beside, int | float)
-            and written(shown) == written(shown._replace(value=beside))
+            and figure_text(shown) == figure_text(shown._replace(value=beside))
         ):
             shown = shown._replace(digits=_ALL_DIGITS)
     else:
@@ -106,7 +106,7 @@ def _text(text: str, other: str) -> str:
     return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
 
 
-def change_document(one: KeyDifference) -> Document:
+def change_document(one: KeyDifference) -> JsonDocument:
     """Write a difference as plain data: both values in full."""
     return {
         "key": one.key,

@@ -5,7 +5,7 @@ from functools import partial
 
 from busplan.answers.documents import document
 from busplan.answers.gate.plain import finding_parts
-from busplan.forms.blocks import Code, Document, Record, Report, Sentence, State, count_value, joined, sentence
+from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
 from busplan.forms.numbers import nouns
 from busplan.rules.report import CheckReport
 
@@ -56,7 +56,7 @@ def check_records(report: CheckReport) -> list[Record]:
     return [{"path": one.path, **one.finding._asdict()} for one in report.located]
 
 
-def check_document(report: CheckReport) -> Document:
+def check_document(report: CheckReport) -> JsonDocument:
     """Document of `busplan check --format json`."""
     files = []
     for one in report.files:

@@ -17,17 +17,17 @@ from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
+    attribute_value,
     joined,
     sentence,
-    value_of,
 )
 from busplan.forms.numbers import period
 from busplan.sections.profile import Profile
@@ -142,8 +142,10 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
     rows = []
     for number, one in enumerate(ranked):
         place = f"{at}/contributions/{number}"
-        takes = Value(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
-        left = (value_of(_FIGURES[key], one, at=place) for key in ("max_contour_error_mm", "circular_deviation_mm"))
+        takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
+        left = (
+            attribute_value(_FIGURES[key], one, at=place) for key in ("max_contour_error_mm", "circular_deviation_mm")
+        )
         rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (
         TableColumn("source", kind="words"),
@@ -181,7 +183,7 @@ def circle_chart(
     if scale is None:
         return None
     caption = sentence("Contour error at constant speed, at {} and {}", *setup_values(result, at=at))
-    tolerance = Value(tolerance_mm, "max_contour_error_mm", "um")
+    tolerance = ShownValue(tolerance_mm, "max_contour_error_mm", "um")
     limit = (
         sentence("the profile has no tolerance of the largest contour error.")
         if tolerance_mm is None
@@ -191,8 +193,8 @@ def circle_chart(
     )
     magnified = sentence(
         "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; ",
-        Value(scale.times(result.radius_mm), decimals=0),
-        Value(scale.ring_um, unit="um"),
+        ShownValue(scale.times(result.radius_mm), decimals=0),
+        ShownValue(scale.ring_um, unit="um"),
     )
     return Chart(drawing, caption, joined(magnified, limit, by=""))
 
@@ -213,7 +215,7 @@ def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record
     return records
 
 
-def circle_document(test: CircleTest, *, with_contributions: bool) -> Document:
+def circle_document(test: CircleTest, *, with_contributions: bool) -> JsonDocument:
     """Document of `busplan circle-test --format json`."""
     results = []
     for result in test.results:

@@ -7,7 +7,7 @@ from busplan.analysis.circle.failures import Stated
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
 from busplan.buses.figure import by_key
-from busplan.forms.blocks import Code, Part, Sentence, Value, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, figure_value, joined, sentence
 from busplan.forms.numbers import period_value
 
 _FIGURES: Final = by_key(CIRCLE_FIGURES)
@@ -46,13 +46,13 @@ def circle_sentences(
         yield sentence(
             f"Attack {source_words(source.source)} first: without it the {label} is {{}}, {{}} less.",
             figure_value(_FIGURES[measure], getattr(source, measure), at=left),
-            Value(removed_mm, "removed_mm", "um", 3),
+            ShownValue(removed_mm, "removed_mm", "um", 3),
         )
     elif result.contributions is not None:
         yield Sentence((f"No single error source of the profile explains the {label}.",))
 
 
-def setup_values(result: CircleFigures, *, at: str) -> tuple[Value, Value]:
+def setup_values(result: CircleFigures, *, at: str) -> tuple[ShownValue, ShownValue]:
     """The period and the feed of a test.
 
     Parameters
@@ -84,7 +84,7 @@ def _part(part: str | Stated, result: CircleFigures, *, at: str) -> Part:
     if isinstance(part, str):
         return part
     known = getattr(result, part.key, None) == part.value
-    return Value(part.value, part.key, part.unit, part.decimals, at=f"{at}/{part.key}" if known else "")
+    return ShownValue(part.value, part.key, part.unit, part.decimals, at=f"{at}/{part.key}" if known else "")
 
 
 def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:

@@ -12,14 +12,14 @@ from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
     count_value,
     figure_value,
@@ -72,7 +72,7 @@ def diff_report(found: Difference, *, arguments: Arguments) -> Report:
     )
 
 
-def diff_document(found: Difference, *, arguments: Arguments) -> Document:
+def diff_document(found: Difference, *, arguments: Arguments) -> JsonDocument:
     """Document of `busplan diff --format json`.
 
     Parameters
@@ -171,14 +171,14 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
 def _row(one: ComparedFigure, at: str) -> TableRow:
     figure = one.figure
     a, b, difference = (figure_value(figure, getattr(one, key), at=f"{at}/{key}") for key in ("a", "b", "difference"))
-    relative = Value(
+    relative = ShownValue(
         one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
     )
     judged = Words(one.judgement, STATES[one.judgement])
     return TableRow((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
 
 
-def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> Document:
+def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> JsonDocument:
     return {
         "argument": argument,
         "profile": profile.name,

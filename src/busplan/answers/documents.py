@@ -6,12 +6,12 @@ Keys carry their units and are stable between releases; new ones may be added.
 from collections.abc import Sequence
 from typing import Final
 
-from busplan.forms.blocks import Document, Record
+from busplan.forms.blocks import JsonDocument, Record
 
 JSON_SCHEMA: Final = 1
 
 
-def document(command: str, **content: object) -> Document:
+def document(command: str, **content: object) -> JsonDocument:
     """Put a command's answer into the frame that all JSON documents share."""
     return {"schema": JSON_SCHEMA, "command": command, **content}
 

@@ -17,19 +17,19 @@ from busplan.forms.blocks import (
     Calculation,
     Chapter,
     Code,
-    Document,
+    JsonDocument,
     Part,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
     joined,
 )
-from busplan.forms.numbers import period_value, written
+from busplan.forms.numbers import figure_text, period_value
 from busplan.printable import json_text
 
 _NONE: Final = Words("none")
@@ -68,7 +68,7 @@ def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
     return one._replace(value=value, steps=(*before, last._replace(value=value)))
 
 
-def _explain_document(explanation: Explanation) -> Document:
+def _explain_document(explanation: Explanation) -> JsonDocument:
     return document(
         "explain",
         profile=explanation.profile.name,
@@ -76,7 +76,7 @@ def _explain_document(explanation: Explanation) -> Document:
     )
 
 
-def _derivation(one: Derivation) -> Document:
+def _derivation(one: Derivation) -> JsonDocument:
     return {
         "command": one.command,
         "figure": one.figure.key,
@@ -135,22 +135,22 @@ def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
     """The result in a sentence: one figure, or what a change sets."""
     if isinstance(one.value, dict):
         settings = (
-            Sentence((Code(key), " = ", Value(new, key, at=f"{at}/value/changes/{key}")))
+            Sentence((Code(key), " = ", ShownValue(new, key, at=f"{at}/value/changes/{key}")))
             for key, new in one.value["changes"].items()
         )
         return joined(*settings, by=", ").parts
     found = _result(one.value, one.figure.key, one.figure.unit, at=f"{at}/value")
-    return (found if isinstance(found, Value) else found.text,)
+    return (found if isinstance(found, ShownValue) else found.text,)
 
 
-def _result(value: object, key: str, unit: str, *, at: str) -> Value | Words:
+def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Words:
     if value is None or value == []:
         return _NONE
     if isinstance(value, dict):
         return Words(", ".join(f"{changed} = {new}" for changed, new in value["changes"].items()))
     if isinstance(value, list) and _has_names(value):
         return Words(", ".join(str(one.get("name", one.get("source"))) for one in value))
-    return Value(value, key, unit, digits=DIGITS, at=at)
+    return ShownValue(value, key, unit, digits=DIGITS, at=at)
 
 
 def _has_names(value: object) -> bool:
@@ -161,7 +161,7 @@ def _has_names(value: object) -> bool:
 def _step(step: Step, at: str) -> blocks.CalculationStep:
     """A line in symbols, and one in numbers where it says more than the one before or after it."""
     result = _result(step.value, step.key, step.unit, at=f"{at}/value")
-    said = written(result) if isinstance(result, Value) else result.text
+    said = figure_text(result) if isinstance(result, ShownValue) else result.text
     formula = "" if step.formula == step.symbol else step.formula
     numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
     return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, value_of
+from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, attribute_value
 
 
 class Owner(NamedTuple):
@@ -40,4 +40,4 @@ def figure_table(
 
 def _row(figure: Figure, level: int, owners: Sequence[Owner], *, unit: bool) -> TableRow:
     words = (figure.label, figure.reference, figure.column or figure.unit)[: 3 if unit else 2]
-    return TableRow((*words, *(value_of(figure, owner.figures, at=owner.at) for owner in owners)), level)
+    return TableRow((*words, *(attribute_value(figure, owner.figures, at=owner.at) for owner in owners)), level)

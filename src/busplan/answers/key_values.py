@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 
 from busplan.buses import bus
-from busplan.forms.blocks import Part, Sentence, Value, joined
+from busplan.forms.blocks import Part, Sentence, ShownValue, joined
 
-Changes = Mapping[str, bus.Value]
+NewValues = Mapping[str, bus.Value]
 """New values of a profile by dotted key."""
 
 
-def settings_sentence(changes: Changes, *, meanings: Mapping[str, str], at: str, quotes: bool = True) -> Sentence:
+def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: str, quotes: bool = True) -> Sentence:
     """Write each key with its value, and what that means.
 
     Parameters
@@ -32,9 +32,9 @@ def settings_sentence(changes: Changes, *, meanings: Mapping[str, str], at: str,
     )
 
 
-def key_value(key: str, value: bus.Value, *, at: str) -> Value:
+def key_value(key: str, value: bus.Value, *, at: str) -> ShownValue:
     """The value of one key, with its place among the changes."""
-    return Value(value, key, at=f"{at}/{key}" if at else "")
+    return ShownValue(value, key, at=f"{at}/{key}" if at else "")
 
 
 def _part(key: str, value: bus.Value, at: str, quotes: bool) -> tuple[Part, ...]:

@@ -10,7 +10,7 @@ from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
 from busplan.answers.verdict import execution_sentence, warning_sentences
 from busplan.buses.figure import REQUIRED
-from busplan.forms.blocks import Block, Code, Document, Record, Report, Sentence, Table, TableColumn
+from busplan.forms.blocks import Block, Code, JsonDocument, Record, Report, Sentence, Table, TableColumn
 from busplan.sections.profile import Profile
 
 
@@ -85,6 +85,6 @@ def _record(transaction: Transaction) -> Record:
     return {**record, **phases}
 
 
-def latency_document(result: LatencyResult) -> Document:
+def latency_document(result: LatencyResult) -> JsonDocument:
     """Document of `busplan latency --format json`."""
     return document("latency", profile=result.profile, transactions=latency_records(result))

@@ -8,19 +8,19 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.documents import document, with_profile
-from busplan.answers.key_values import Changes, settings_sentence
+from busplan.answers.key_values import NewValues, settings_sentence
 from busplan.answers.plan_options import option_margins, options_table
 from busplan.answers.verdict import warning_sentences
 from busplan.buses.figure import AXES, NODES, UTILISATION
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Part,
     Record,
     Report,
     Sentence,
-    Value,
+    ShownValue,
     figure_value,
     sentence,
 )
@@ -58,14 +58,14 @@ def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
         yield Sentence(("? not proven: the search for a smaller period was cut short (--max-circles).",))
     for number, one in enumerate(plan.impossible):
         proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        reason = Value(one.reason, "reason", at=f"/impossible/{number}/reason")
+        reason = ShownValue(one.reason, "reason", at=f"/impossible/{number}/reason")
         yield sentence(f"{one.title.capitalize()}: none, {{}}{proven}.", reason)
 
 
 # --- sentences ------------------------------------------------------------------------------------------------
 
 
-def settings(profile: Profile, changes: Changes) -> str:
+def settings(profile: Profile, changes: NewValues) -> str:
     """Write changes as a profile has them.
 
     Examples
@@ -77,7 +77,7 @@ def settings(profile: Profile, changes: Changes) -> str:
     return sentence_text(_settings(profile, changes))
 
 
-def _settings(profile: Profile, changes: Changes, *, at: str = "") -> Sentence:
+def _settings(profile: Profile, changes: NewValues, *, at: str = "") -> Sentence:
     # A number of nodes is what was asked for, never what a second bus would leave.
     meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings, at=at)
@@ -193,7 +193,7 @@ def plan_records(plan: Plan) -> list[Record]:
     ]
 
 
-def plan_document(plan: Plan) -> Document:
+def plan_document(plan: Plan) -> JsonDocument:
     """Document of `busplan plan --format json`."""
     recommended = None if plan.recommended is None else plan.all_changes(plan.recommended)
     return document(

@@ -9,7 +9,7 @@ from busplan.buses.rule import Rule
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -70,7 +70,7 @@ def _blocks(rule: Rule) -> Iterator[Block]:
         yield Snippet((f"# busplan: ignore[{rule.code}] reason",))
 
 
-def _document(rules: Sequence[Rule]) -> Document:
+def _document(rules: Sequence[Rule]) -> JsonDocument:
     return document("rule", rules=_records(rules))
 
 

@@ -17,19 +17,19 @@ from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Swatch,
     Table,
     TableColumn,
     TableRow,
-    Value,
+    attribute_value,
     joined,
     sentence,
     state_of,
-    value_of,
     with_values,
 )
 from busplan.forms.columns import sentence_text
@@ -98,13 +98,13 @@ def totals_table(plan: Schedule) -> Table:
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(plan, number, one) for number, one in enumerate(totals(plan))),
-        sentence(f"What takes {part}, {{}}", Value(plan.to_us - plan.from_us, "duration_us", "us", 3)),
+        sentence(f"What takes {part}, {{}}", ShownValue(plan.to_us - plan.from_us, "duration_us", "us", 3)),
     )
 
 
 def _total_row(plan: Schedule, number: int, one: Total) -> TableRow:
     kind = kind_of(plan.profile, one.kind)
-    values = (value_of(figure, one, at=f"/totals/{number}") for figure in _TOTAL_FIGURES)
+    values = (attribute_value(figure, one, at=f"/totals/{number}") for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
@@ -120,7 +120,7 @@ def _warnings(plan: Schedule) -> list[str]:
     return warnings(plan.profile, nodes=plan.figures.nodes, most=0)
 
 
-def _facts(plan: Schedule) -> Document:
+def _facts(plan: Schedule) -> JsonDocument:
     """What the document says of the whole cycle, and the window."""
     figures = plan.figures
     return document(
@@ -142,7 +142,7 @@ def _facts(plan: Schedule) -> Document:
     )
 
 
-def timeline_document(plan: Schedule) -> Document:
+def timeline_document(plan: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
     return {**_facts(plan), "events": _event_records(plan), "totals": [one._asdict() for one in totals(plan)]}
 

@@ -9,7 +9,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import AVAILABLE, MARGIN, MAX_AXES, MAX_NODES, REQUIRED, UTILISATION
-from busplan.forms.blocks import Code, Part, Sentence, Value, count_value, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
 
@@ -38,7 +38,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     largest = max(figures.terms, key=lambda term: term.us)
     yield sentence(
         f"Largest term: {figures.binding_term}, {{}} of {{}}.",
-        Value(largest.us, largest.key, "us", 3, at=_place(at, largest.key)),
+        ShownValue(largest.us, largest.key, "us", 3, at=_place(at, largest.key)),
         figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
     )
     yield _carries(verdict, places)
@@ -120,7 +120,7 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
             available,
         ).parts
     needed = figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key))
-    short = Value(-figures.margin_us, MARGIN.key, "us", 3)
+    short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
     broken = (bus_of(profile).limit(key) for key in figures.exceeded)
     reasons = (
         sentence("{} short, {} needed of {}", short, needed, available)

@@ -10,7 +10,7 @@ import numpy as np
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
-from busplan.analysis.sweep.blocks import Block, Column
+from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.circles import (
     MOST_CIRCLES_UNASKED,
     CircleTask,
@@ -62,7 +62,7 @@ class SweepAnswer(Answer):
     grid: Grid
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]
-    blocks: tuple[Block, ...]
+    blocks: tuple[SweepBlock, ...]
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
@@ -98,7 +98,7 @@ class SweepAnswer(Answer):
         )
 
 
-def _rows(block: Block, name: str) -> Array:
+def _rows(block: SweepBlock, name: str) -> Array:
     """One column of a block, words spelled out."""
     parts = [np.broadcast_to(_spelled(column), block.chunk.shape).ravel() for column in block.columns(name)]
     return np.stack(parts, axis=1).ravel()

@@ -14,8 +14,8 @@ from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     BUS_OPTIONS,
     NO_CHANGES,
-    Changes,
     FormatOption,
+    KeyChanges,
     OutputOption,
     ProfileArgument,
     takes_bus_options,
@@ -61,7 +61,7 @@ def calibrate_command(
             "through these medians instead of least squares.",
         ),
     ] = False,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
         typer.Option(

@@ -9,8 +9,8 @@ from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
     NO_CHANGES,
-    Changes,
     FormatOption,
+    KeyChanges,
     OutputOption,
     PeriodsOption,
     ProfileArgument,
@@ -53,7 +53,7 @@ def explain_command(
         ),
     ] = None,
     period: PeriodsOption = None,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
         typer.Option(

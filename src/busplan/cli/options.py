@@ -99,9 +99,9 @@ BUS_OPTIONS: Final = {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"}
 """What the profile's keys are called on the command line."""
 
 
-Changes = dict[str, object]
+KeyChanges = dict[str, object]
 """New values of a profile by dotted key."""
-NO_CHANGES: Final[Changes] = {}
+NO_CHANGES: Final[KeyChanges] = {}
 
 
 def takes_bus_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -132,7 +132,7 @@ def takes_bus_options(command: Callable[..., None]) -> Callable[..., None]:
     return with_changes
 
 
-def load_changed(argument: str, changes: Changes) -> "Profile":
+def load_changed(argument: str, changes: KeyChanges) -> "Profile":
     """Read a profile and put the values of options into it.
 
     Raises

@@ -13,7 +13,7 @@ from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.blocks import Block
+    from busplan.analysis.sweep.blocks import SweepBlock
     from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.cli.sweep_job import SweepJob
     from busplan.drawings.sweep_plot import FigureData
@@ -51,7 +51,7 @@ def run_sweep(job: "SweepJob") -> None:
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
             sink = sink_for(job, file, tally)
-            takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
+            takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
             lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
@@ -71,7 +71,7 @@ def run_sweep(job: "SweepJob") -> None:
 
 def _work(
     job: "SweepJob",
-    takers: "Sequence[Callable[[Block], None]]",
+    takers: "Sequence[Callable[[SweepBlock], None]]",
     *,
     progress: Callable[[], tuple[int, int]],
     stopped: Callable[[], bool],
@@ -111,7 +111,7 @@ def _require_circles(job: "SweepJob") -> None:
 
 
 @contextmanager
-def _blocks(job: "SweepJob") -> "Iterator[Iterable[Block]]":
+def _blocks(job: "SweepJob") -> "Iterator[Iterable[SweepBlock]]":
     """Blocks of a size that suits what is done with them."""
     from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
     from busplan.answers.sweep.rows import TEXT_POINTS

@@ -12,7 +12,7 @@ from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     NO_CHANGES,
-    Changes,
+    KeyChanges,
     ProfileArgument,
     form_of_file,
     load_changed,
@@ -81,7 +81,7 @@ def timeline_command(
             show_default=False,
         ),
     ] = None,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
         typer.Option(
@@ -149,7 +149,7 @@ def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
     return chosen
 
 
-def _network(profile: str, changes: Changes, period: str | None) -> "Profile":
+def _network(profile: str, changes: KeyChanges, period: str | None) -> "Profile":
     from busplan.profile.toml import override
 
     plan = load_changed(profile, changes)

@@ -14,13 +14,13 @@ from busplan.cli.interrupt import ENDING
 from busplan.errors import WorkerLostError
 
 Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
 
 class Map(Protocol):
     """The built-in `map`, by other processes."""
 
-    def __call__(self, function: Callable[[Task], Answer], tasks: Iterable[Task], /) -> list[Answer]:
+    def __call__(self, function: Callable[[Task], Result], tasks: Iterable[Task], /) -> list[Result]:
         """Give the answers in the order of the tasks."""
 
 
@@ -56,10 +56,10 @@ def _started(crew: ExitStack) -> Connection:
     return ours
 
 
-def _shared(pipes: list[Connection], function: Callable[[Task], Answer], tasks: Iterable[Task]) -> list[Answer]:
+def _shared(pipes: list[Connection], function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Result]:
     """Give each worker one task at a time."""
     left = enumerate(tasks)
-    found: dict[int, Answer] = {}
+    found: dict[int, Result] = {}
     free, busy = list(pipes), dict[Connection, int]()
     while True:
         # First a worker, then a task: each task that is taken is handed out.
@@ -99,7 +99,7 @@ def _work(pipe: Connection) -> None:
             pipe.send(_tried(function, task))
 
 
-def _tried(function: Callable[[Task], Answer], task: Task) -> tuple[Answer | None, Exception | None]:
+def _tried(function: Callable[[Task], Result], task: Task) -> tuple[Result | None, Exception | None]:
     """The answer, or the error, which the one that hands the work out tells."""
     try:
         return function(task), None

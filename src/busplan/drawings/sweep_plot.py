@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from busplan.analysis.sweep.blocks import Block
+from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.drawings.circle_plot import metadata, require_matplotlib
 from busplan.errors import BusplanError
@@ -42,7 +42,7 @@ class FigureData:
         self._grid, self._figure, self._models = grid, figure, timing_models
         self._values = np.full((grid.points, len(timing_models)), np.nan)
 
-    def add(self, block: Block) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Take one more block."""
         start = block.chunk.start
         rows = block.rows(self._figure).reshape(-1, len(self._models))

@@ -12,15 +12,15 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 from busplan.buses.figure import Figure, Ink
 from busplan.forms.lines import Line
 
-Made = TypeVar("Made")
+BlockOrPart = TypeVar("BlockOrPart")
 State = Literal["passes", "fails", "warns", "neutral"]
 """What something says of the plan."""
-Document = dict[str, Any]
+JsonDocument = dict[str, Any]
 Record = dict[str, Any]
 """One row of plain data, by column."""
 
 
-class Value(NamedTuple):
+class ShownValue(NamedTuple):
     """One figure: exact, with what it takes to write it."""
 
     value: Any
@@ -80,7 +80,7 @@ class Swatch(NamedTuple):
 class Bar(NamedTuple):
     """A value as a bar on a scale that it shares with the rows above and below; zero is on the scale."""
 
-    value: Value
+    value: ShownValue
     least: float
     most: float
 
@@ -95,7 +95,7 @@ class Command(NamedTuple):
     """Id that values refer to."""
 
 
-Part = str | Value | Code
+Part = str | ShownValue | Code
 """A piece of a sentence."""
 
 
@@ -106,7 +106,7 @@ class Sentence(NamedTuple):
     state: State = "neutral"
 
 
-Cell = str | Value | Words | Code | SectionLink | Swatch | Bar | Command | Sentence
+Cell = str | ShownValue | Words | Code | SectionLink | Swatch | Bar | Command | Sentence
 
 
 class TableColumn(NamedTuple):
@@ -125,7 +125,7 @@ class TableRow(NamedTuple):
     cells: tuple[Cell, ...]
     level: int = 0
     """1 for a part of the row above it."""
-    sought: bool = False
+    highlighted: bool = False
     """Whether it is the row that a reader looks for."""
 
 
@@ -142,7 +142,7 @@ class Table(NamedTuple):
 class Facts(NamedTuple):
     """Figures with their names, in a row."""
 
-    items: tuple[tuple[str, Value | Code], ...]
+    items: tuple[tuple[str, ShownValue | Code], ...]
 
 
 class Drawing(ABC):
@@ -188,7 +188,7 @@ class CalculationStep(NamedTuple):
     symbol: str
     formula: str
     numbers: str
-    result: Value | Words
+    result: ShownValue | Words
 
 
 class Calculation(NamedTuple):
@@ -207,7 +207,7 @@ class Question(NamedTuple):
     at: str = ""
     """Place of the sentences, joined, in the JSON document; empty where they have none."""
     command: str = ""
-    """As for `Value`."""
+    """As for `ShownValue`."""
 
 
 class Chapter(NamedTuple):
@@ -274,16 +274,16 @@ def joined(*sentences: Sentence, by: str = " ") -> Sentence:
     return Sentence(tuple(parts), sentences[0].state)
 
 
-def figure_value(figure: Figure, value: Any, *, at: str = "") -> Value:
+def figure_value(figure: Figure, value: Any, *, at: str = "") -> ShownValue:
     """A value of a registered figure, as tables write it; a truth that should be and is not fails."""
     fails = figure.sort == "truth" and figure.better == "more" and value is False
     decimals = figure.decimals if figure.sort == "number" else None
-    return Value(
+    return ShownValue(
         value, figure.key, figure.column or figure.unit, decimals, at=at, state="fails" if fails else "neutral"
     )
 
 
-def value_of(figure: Figure, owner: object, *, at: str) -> Value:
+def attribute_value(figure: Figure, owner: object, *, at: str) -> ShownValue:
     """The value that an owner has of a registered figure, under its key.
 
     Parameters
@@ -298,9 +298,9 @@ def value_of(figure: Figure, owner: object, *, at: str) -> Value:
     return figure_value(figure, getattr(owner, figure.key), at=f"{at}/{figure.key}")
 
 
-def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> Value:
+def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> ShownValue:
     """A number of things."""
-    return Value(value, key, at=at, grouped=grouped)
+    return ShownValue(value, key, at=at, grouped=grouped)
 
 
 def state_of(passes: object) -> State:
@@ -308,16 +308,16 @@ def state_of(passes: object) -> State:
     return "passes" if passes else "fails"
 
 
-def values_in(item: object) -> Iterator[Value]:
+def values_in(item: object) -> Iterator[ShownValue]:
     """Every figure of a block, or of several, in reading order."""
-    if isinstance(item, Value):
+    if isinstance(item, ShownValue):
         yield item
     elif isinstance(item, tuple):
         for one in item:
             yield from values_in(one)
 
 
-def with_values(item: Made, change: Callable[[Value], Value]) -> Made:
+def with_values(item: BlockOrPart, change: Callable[[ShownValue], ShownValue]) -> BlockOrPart:
     """Copy a block with every figure of it changed.
 
     Parameters
@@ -327,7 +327,7 @@ def with_values(item: Made, change: Callable[[Value], Value]) -> Made:
     change
         From a figure to the one in its place.
     """
-    if isinstance(item, Value):
+    if isinstance(item, ShownValue):
         return change(item)  # type: ignore[return-value]
     if not isinstance(item, tuple):
         return item

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from busplan.forms.blocks import Bar, Cell, Sentence, Swatch, Table, TableColumn, TableRow, Value, Words
+from busplan.forms.blocks import Bar, Cell, Sentence, ShownValue, Swatch, Table, TableColumn, TableRow, Words
 from busplan.forms.lines import Line, Mark, Tone
-from busplan.forms.numbers import with_unit, written
+from busplan.forms.numbers import figure_text, with_unit
 from busplan.printable import printable
 
 
@@ -14,8 +14,8 @@ def cell_text(cell: Cell) -> str:
     match cell:
         case str():
             return cell
-        case Value():
-            return written(cell)
+        case ShownValue():
+            return figure_text(cell)
         case Swatch():
             return f"{cell.letter} {cell.text}"
         case Bar():
@@ -28,7 +28,7 @@ def cell_text(cell: Cell) -> str:
 
 def sentence_text(sentence: Sentence) -> str:
     """Write a sentence in plain characters."""
-    return "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in sentence.parts)
+    return "".join(with_unit(part) if isinstance(part, ShownValue) else cell_text(part) for part in sentence.parts)
 
 
 def table_lines(table: Table) -> list[Line]:
@@ -77,7 +77,7 @@ def _laid(cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]) -> 
 def _marks(
     row: TableRow, shown: Sequence[int], cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]
 ) -> Iterator[Mark]:
-    """Where the cells stand that have a state; the row that is sought is one mark."""
+    """Where the cells stand that have a state; the row that is highlighted is one mark."""
     start = 0
     for number, cell, width, words in zip(shown, cells, widths, left, strict=True):
         tone = _tone(row.cells[number])
@@ -85,9 +85,9 @@ def _marks(
             begin = start if words else start + width - len(cell)
             yield Mark(begin, begin + len(cell), tone)
         start += width + 2
-    if row.sought:
+    if row.highlighted:
         yield Mark(0, start, "heading")
 
 
 def _tone(cell: Cell) -> Tone:
-    return cell.state if isinstance(cell, Value | Words | Sentence) else "neutral"
+    return cell.state if isinstance(cell, ShownValue | Words | Sentence) else "neutral"

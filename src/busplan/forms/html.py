@@ -13,11 +13,11 @@ from busplan.forms import blocks as made_of
 from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
 from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.inks import DARK, fills
-from busplan.forms.numbers import unit_text, written
+from busplan.forms.numbers import figure_text, unit_text
 from busplan.forms.signed_bar import signed_bar
 from busplan.printable import json_text, printable_lines
 
-_TYPES: Final = ("Value", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
+_TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
 _BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Chapter")
 
 
@@ -49,7 +49,7 @@ def page(report: Report) -> str:
     environment.filters |= {
         "exact": lambda value: json_text(value.value),
         "exact_unit": lambda value: unit_of(value.key),
-        "written": written,
+        "figure_text": figure_text,
         "unit": unit_text,
         "plain": sentence_text,
         "runs": lambda found: list(_runs(found)),
@@ -109,6 +109,6 @@ def _groups(table: Table) -> list[tuple[str, int]]:
 
 
 def _bar(bar: Bar) -> Markup:
-    title = f"{written(bar.value)} {bar.value.unit}"
+    title = f"{figure_text(bar.value)} {bar.value.unit}"
     drawn = signed_bar(float(bar.value.value), least=bar.least, most=bar.most, title=title)
     return Markup(drawn)  # noqa: S704 - an SVG of ours

@@ -18,10 +18,10 @@ from busplan.forms.blocks import (
     Report,
     SectionLink,
     Sentence,
+    ShownValue,
     Snippet,
     Swatch,
     Table,
-    Value,
     Words,
 )
 from busplan.forms.columns import cell_text
@@ -103,7 +103,7 @@ def _sentence(sentence: Sentence) -> str:
         if is_code:
             pieces += map(_part, run)
         else:
-            words = "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in run)
+            words = "".join(with_unit(part) if isinstance(part, ShownValue) else cell_text(part) for part in run)
             before, after = (" " if words[at : at + 1].isspace() else "" for at in (0, len(words) - 1))
             pieces.append(f"{before}{escaped(words)}{after}")
     return "".join(pieces).strip()
@@ -111,7 +111,7 @@ def _sentence(sentence: Sentence) -> str:
 
 def _part(part: Part) -> str:
     match part:
-        case Value():
+        case ShownValue():
             return escaped(with_unit(part))
         case Code():
             return code(part.text)
@@ -126,17 +126,17 @@ def _table(one: Table) -> list[str]:
         escaped(", ".join(filter(None, (" ".join(filter(None, (column.group, column.heading))), column.unit)))) or " "
         for column in columns
     ]
-    rows = ([_in_row(_cell(row.cells[number]), sought=row.sought) for number in shown] for row in one.rows)
+    rows = ([_in_row(_cell(row.cells[number]), highlighted=row.highlighted) for number in shown] for row in one.rows)
     return table(headings, rows, left=[column.kind == "words" for column in columns])
 
 
-def _in_row(words: str, *, sought: bool) -> str:
-    return f"**{words}**" if sought and words and not words.startswith("**") else words
+def _in_row(words: str, *, highlighted: bool) -> str:
+    return f"**{words}**" if highlighted and words and not words.startswith("**") else words
 
 
 def _cell(cell: Cell) -> str:
     match cell:
-        case Value() | Words() | Sentence():
+        case ShownValue() | Words() | Sentence():
             words = _sentence(cell) if isinstance(cell, Sentence) else escaped(cell_text(cell))
             return f"**{words}**" if cell.state == "fails" and words else words
         case SectionLink():
@@ -157,7 +157,7 @@ def _steps(steps: Calculation) -> list[str]:
             escaped(step.reference),
             code(f"{step.symbol} = {step.formula}" if step.formula else step.symbol),
             code(step.numbers) if step.numbers else "",
-            escaped(with_unit(step.result) if isinstance(step.result, Value) else step.result.text),
+            escaped(with_unit(step.result) if isinstance(step.result, ShownValue) else step.result.text),
         ]
         for number, step in enumerate(steps.steps, start=1)
     )

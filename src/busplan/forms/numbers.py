@@ -4,7 +4,7 @@ from math import isnan
 from typing import Final
 
 from busplan.buses.figure import unit_of
-from busplan.forms.blocks import Value
+from busplan.forms.blocks import ShownValue
 
 MISSING: Final = "-"
 _DIGITS: Final = 12
@@ -19,18 +19,18 @@ _ROUNDING_UM: Final = 1e-6
 """Smallest length, in um, that is more than rounding: a picometre."""
 
 
-def written(value: Value) -> str:
+def figure_text(value: ShownValue) -> str:
     """Write a figure without its unit.
 
     Examples
     --------
-    >>> written(Value(0.0036, "max_contour_error_mm", "um", 3)), written(Value(0.97, "utilisation", "%", 2))
-    ('3.600', '97.00')
-    >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("time", "nodes")))
-    ('-', 'yes', '16', 'time, nodes')
-    >>> written(Value([2.38808777, 4000.0], digits=4)), written(Value(-4e-16, decimals=3, fixed=True))
+    >>> figure_text(ShownValue(0.0036, "max_contour_error_mm", "um", 3))
+    '3.600'
+    >>> [figure_text(ShownValue(one)) for one in (None, True, 16.0, ("time", "nodes"))]
+    ['-', 'yes', '16', 'time, nodes']
+    >>> figure_text(ShownValue([2.38808777, 4000.0], digits=4)), figure_text(ShownValue(-4e-16, decimals=3, fixed=True))
     ('2.388, 4000', '0.000')
-    >>> written(Value(1234567)), written(Value(1234567, grouped=True))
+    >>> figure_text(ShownValue(1234567)), figure_text(ShownValue(1234567, grouped=True))
     ('1234567', '1,234,567')
     """
     match value.value:
@@ -41,24 +41,24 @@ def written(value: Value) -> str:
         case int() | float():
             return _number(value)
         case list() | tuple():
-            return ", ".join(written(value._replace(value=one)) for one in value.value) or MISSING
+            return ", ".join(figure_text(value._replace(value=one)) for one in value.value) or MISSING
     return str(value.value)
 
 
-def with_unit(value: Value) -> str:
+def with_unit(value: ShownValue) -> str:
     """Write a figure with its unit, as a sentence has it.
 
     Examples
     --------
-    >>> with_unit(Value(3.9691, "margin_us", "us", 3)), with_unit(Value(0.5, "utilisation", "%", 1))
+    >>> with_unit(ShownValue(3.9691, "margin_us", "us", 3)), with_unit(ShownValue(0.5, "utilisation", "%", 1))
     ('3.969 us', '50.0%')
     """
-    return f"{written(value)}{unit_text(value)}"
+    return f"{figure_text(value)}{unit_text(value)}"
 
 
-def unit_text(value: Value) -> str:
+def unit_text(value: ShownValue) -> str:
     """Write what stands behind a figure in a sentence."""
-    if value.unit in _SILENT or written(value) == MISSING:
+    if value.unit in _SILENT or figure_text(value) == MISSING:
         return ""
     return "%" if value.unit == "%" else f" {value.unit}"
 
@@ -77,7 +77,7 @@ def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
     return f"{sign}{number:.3g}"
 
 
-def period_value(period_us: float, *, at: str = "", command: str = "") -> Value:
+def period_value(period_us: float, *, at: str = "", command: str = "") -> ShownValue:
     """A communication period in the unit that people say it in.
 
     Examples
@@ -86,7 +86,7 @@ def period_value(period_us: float, *, at: str = "", command: str = "") -> Value:
     ['4 ms', '250 us', '1.2345 ms', '2 s']
     """
     unit = "s" if period_us >= _SECOND_US else "ms" if period_us >= _MILLISECOND_US else "us"
-    return Value(period_us, "period_us", unit, at=at, command=command)
+    return ShownValue(period_us, "period_us", unit, at=at, command=command)
 
 
 def period(period_us: float) -> str:
@@ -118,7 +118,7 @@ def nouns(number: int, noun: str) -> str:
     return f"{noun.removesuffix('is')}es" if noun.endswith("is") else f"{noun}s"
 
 
-def _number(value: Value) -> str:
+def _number(value: ShownValue) -> str:
     factor = _FACTORS.get((unit_of(value.key), value.unit), 1.0)
     number = value.value if factor == 1.0 else value.value * factor
     if isnan(number):

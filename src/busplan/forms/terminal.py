@@ -15,9 +15,9 @@ from busplan.forms.blocks import (
     Question,
     Report,
     Sentence,
+    ShownValue,
     Snippet,
     Table,
-    Value,
 )
 from busplan.forms.columns import cell_text, sentence_text, table_lines
 from busplan.forms.lines import BLANK, Line, plain_text, styled_text
@@ -100,13 +100,13 @@ def _caption(caption: Sentence | None) -> list[Line]:
 
 
 def _part(part: Part) -> str:
-    return with_unit(part) if isinstance(part, Value) else cell_text(part)
+    return with_unit(part) if isinstance(part, ShownValue) else cell_text(part)
 
 
 def _step(number: int, step: CalculationStep) -> Iterator[Line]:
     """A line in symbols, one in numbers and the result, each where it says more than the one before."""
     head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
-    result = with_unit(step.result) if isinstance(step.result, Value) else step.result.text
+    result = with_unit(step.result) if isinstance(step.result, ShownValue) else step.result.text
     distinct = (text for text in (step.formula, step.numbers, result) if text)
     if number > 1:
         yield BLANK

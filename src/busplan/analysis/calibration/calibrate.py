@@ -5,7 +5,15 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
-from busplan.analysis.calibration.execution_fit import METHODS, Form, Groups, Method, fit_execution, middles, theil_sen
+from busplan.analysis.calibration.execution_fit import (
+    METHODS,
+    ExecutionForm,
+    Groups,
+    Method,
+    fit_execution,
+    middles,
+    theil_sen,
+)
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Halves
 from busplan.errors import BusplanError
@@ -97,7 +105,7 @@ def calibrate(
     *,
     source: str,
     timing_model: str | None = None,
-    form: Form | None = None,
+    form: ExecutionForm | None = None,
     robust: bool = False,
     grade: Literal["measured", "derived"] = "measured",
 ) -> Calibration:
@@ -237,7 +245,7 @@ def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | 
     return tuple(found)
 
 
-def _outliers(residuals: Sequence[Residual], groups: Groups, form: Form) -> tuple[Residual, ...]:
+def _outliers(residuals: Sequence[Residual], groups: Groups, form: ExecutionForm) -> tuple[Residual, ...]:
     """Measurements that stand off the robust fit: of a table payload by payload, of a line over all."""
     sturdy_us = middles(groups, robust=True)
     if form == "linear":

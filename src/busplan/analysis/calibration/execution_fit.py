@@ -8,12 +8,12 @@ from typing import Final, Literal
 from busplan.errors import BusplanError
 from busplan.sections.execution import LinearExecution, TableExecution
 
-Form = Literal["table", "linear"]
+ExecutionForm = Literal["table", "linear"]
 Method = Literal["mean", "median", "least squares", "Theil-Sen"]
 Groups = Mapping[int, Sequence[float]]
 """T_exec of the measurements at each payload [us]."""
 
-METHODS: Final[Mapping[tuple[Form, bool], Method]] = {
+METHODS: Final[Mapping[tuple[ExecutionForm, bool], Method]] = {
     ("table", False): "mean",
     ("table", True): "median",
     ("linear", False): "least squares",
@@ -27,7 +27,7 @@ _PER_BYTE_DECIMALS: Final = 6
 
 
 def fit_execution(
-    groups: Groups, form: Form, *, robust: bool, grade: Literal["measured", "derived"], source: str
+    groups: Groups, form: ExecutionForm, *, robust: bool, grade: Literal["measured", "derived"], source: str
 ) -> LinearExecution | TableExecution:
     """Execution time that fits T_exec by payload, in whole nanoseconds.
 

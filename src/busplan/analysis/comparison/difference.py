@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures
 
 Judgement = Literal["better", "worse", "same", "neutral"]
-Circle = Callable[[Profile], "CircleFigures"]
+ComputeCircleFigures = Callable[[Profile], "CircleFigures"]
 """Runs the circle test of a profile."""
 
 ROUNDING: Final = 1e-9
@@ -164,7 +164,7 @@ def difference(
     b: Profile,
     *,
     timing_models: Sequence[str] | None = None,
-    circle: Circle | None = None,
+    circle: ComputeCircleFigures | None = None,
 ) -> Difference:
     """Compare two profiles.
 
@@ -208,7 +208,7 @@ def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
             yield KeyDifference(key, one, other)
 
 
-def _circle_side(profile: Profile, circle: Circle) -> CircleSide:
+def _circle_side(profile: Profile, circle: ComputeCircleFigures) -> CircleSide:
     try:
         result = circle(profile)
     except BusplanError as error:

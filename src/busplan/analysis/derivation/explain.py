@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
-from busplan.analysis.derivation.formulas import written
+from busplan.analysis.derivation.formulas import formula_text
 from busplan.analysis.derivation.latency import latency_figures, latency_names
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.analysis.network import bus_of, model_names
-from busplan.analysis.register import Command, figure_named, figures_of
+from busplan.analysis.register import CommandName, figure_named, figures_of
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -57,7 +57,7 @@ class Step(NamedTuple):
 class Derivation(NamedTuple):
     """A figure and the way to it."""
 
-    command: Command
+    command: CommandName
     figure: Figure
     timing_model: str
     transaction: str | None
@@ -171,7 +171,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
 
 def _traced(
     profile: Profile,
-    command: Command,
+    command: CommandName,
     key: str,
     *,
     model: str,
@@ -189,21 +189,21 @@ def _traced(
     return circle_figures(profile, with_contributions=key == "contributions", progress=progress)[key]
 
 
-def _steps(profile: Profile, traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
+def _steps(profile: Profile, traced: Traced, command: CommandName, figure: Figure) -> Iterator[Step]:
     for one in lines(traced):
         known = figure if one is traced else _known(profile, one.key, command)
         yield Step(
             key=known.key,
             symbol=figure.symbol if one is traced else one.symbol,
             reference=known.reference,
-            formula=written(one, in_numbers=False),
-            numbers=written(one, in_numbers=True),
+            formula=formula_text(one, in_numbers=False),
+            numbers=formula_text(one, in_numbers=True),
             value=one.value,
             unit=known.unit,
         )
 
 
-def _known(profile: Profile, key: str, command: Command) -> Figure:
+def _known(profile: Profile, key: str, command: CommandName) -> Figure:
     """What the registry says of a line; one that is no figure stands for itself."""
     register = figures_of(bus_of(profile))
     for figures in (register[command], *register.values()):

@@ -45,7 +45,7 @@ def less(left: float, right: float) -> str:
     return f"{left:.{digits}g} - {right:.{digits}g}"
 
 
-def written(operand: Operand, *, in_numbers: bool) -> str:
+def formula_text(operand: Operand, *, in_numbers: bool) -> str:
     """Write the expression behind a number, down to what has a name.
 
     Parameters
@@ -59,7 +59,7 @@ def written(operand: Operand, *, in_numbers: bool) -> str:
     --------
     >>> nodes = Traced(2, given=Input("N", "bus.nodes", 2, "", "given", "profile", "nodes"))
     >>> delay = 0.25 * (nodes + 1)
-    >>> written(delay, in_numbers=False), written(delay, in_numbers=True), delay.value
+    >>> formula_text(delay, in_numbers=False), formula_text(delay, in_numbers=True), delay.value
     ('0.25 (N + 1)', '0.25 * (2 + 1)', 0.75)
     """
     operand = _unwrapped(operand)
@@ -136,4 +136,4 @@ def formula_of(equation: Equation) -> str:
     # Any number but 0 and 1 will do: those are what a comparison gives.
     first, *others = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
     found = equation.function(first, **dict(zip(names[1:], others, strict=True)))
-    return found.symbol or written(found, in_numbers=False)
+    return found.symbol or formula_text(found, in_numbers=False)

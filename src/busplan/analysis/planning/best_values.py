@@ -20,7 +20,7 @@ from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
 
 Models = Sequence[str]
-Circle = Callable[[Profile], tuple[str, ...]]
+FindCircleFailures = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 
 MAX_CIRCLES: Final = 50
@@ -60,7 +60,7 @@ def smallest_ratio(profile: Profile, *, models: Models) -> float:
 
 
 def smallest_period(
-    profile: Profile, *, models: Models, circle: Circle | None = None, max_circles: int = MAX_CIRCLES
+    profile: Profile, *, models: Models, circle: FindCircleFailures | None = None, max_circles: int = MAX_CIRCLES
 ) -> PeriodSearch:
     """Find the smallest period that the cycle fits in and that passes the circle.
 

@@ -11,7 +11,7 @@ from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.best_values import (
     MAX_CIRCLES,
-    Circle,
+    FindCircleFailures,
     largest_payload,
     most_nodes,
     required_us,
@@ -94,7 +94,7 @@ def plan(
     profile: Profile,
     *,
     wanted: Mapping[str, Value] | None = None,
-    circle: Circle | None = None,
+    circle: FindCircleFailures | None = None,
     max_circles: int = MAX_CIRCLES,
 ) -> Plan:
     """Find what to set.
@@ -170,7 +170,7 @@ _CHEAPEST: Final = ("cheapest that fits", "cheapest that meets both models", "ch
 class _Planner:
     """Makes the options of one goal."""
 
-    def __init__(self, goal: Profile, *, circle: Circle | None, max_circles: int) -> None:
+    def __init__(self, goal: Profile, *, circle: FindCircleFailures | None, max_circles: int) -> None:
         self.goal = goal
         self.model = goal.bus.timing_model
         self.models = model_names(goal)

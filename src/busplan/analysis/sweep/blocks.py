@@ -49,7 +49,7 @@ class Column(NamedTuple):
     words: tuple[Word, ...] | None = None
 
 
-class Block(NamedTuple):
+class SweepBlock(NamedTuple):
     """The figures of a chunk."""
 
     chunk: Chunk
@@ -84,7 +84,7 @@ def sweep(
     *,
     timing_models: Sequence[str],
     chunk_points: int = CHUNK_POINTS,
-) -> Iterator[Block]:
+) -> Iterator[SweepBlock]:
     """Compute all figures of `capacity` over a grid.
 
     Parameters
@@ -100,7 +100,7 @@ def sweep(
 
     Yields
     ------
-    Block
+    SweepBlock
         One chunk after the other: memory stays flat however large the grid is.
 
     References
@@ -108,7 +108,7 @@ def sweep(
     Paper, equations (1)-(11).
     """
     for chunk in grid.chunks(chunk_points):
-        yield Block(
+        yield SweepBlock(
             chunk,
             {key: _varied(values) for key, values in chunk.values.items()},
             tuple(_figures(profile, chunk.values, model) for model in timing_models),

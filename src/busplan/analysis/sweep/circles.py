@@ -9,7 +9,7 @@ from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
 from busplan.analysis.network import model_names
-from busplan.analysis.sweep.blocks import Block, Column, figure_names
+from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -83,11 +83,11 @@ def require_circles(profile: Profile, grid: Grid) -> None:
 
 def with_circles(
     profile: Profile,
-    block: Block,
+    block: SweepBlock,
     *,
     timing_models: Sequence[str],
     run: Callable[[Iterable[CircleTask]], Iterable[list[Figures]]],
-) -> Block:
+) -> SweepBlock:
     """Add the columns of circle tests to a block.
 
     Parameters

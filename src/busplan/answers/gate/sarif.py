@@ -13,7 +13,7 @@ from urllib.parse import quote
 from busplan import __version__
 from busplan.answers.gate import GateFormat
 from busplan.buses.rule import Rule
-from busplan.forms.blocks import Document
+from busplan.forms.blocks import JsonDocument
 from busplan.printable import json_text
 from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport, Located
@@ -50,7 +50,7 @@ class Sarif(GateFormat):
         return json_text(document, indent=2) + "\n"
 
 
-def _rule(rule: Rule) -> Document:
+def _rule(rule: Rule) -> JsonDocument:
     return {
         "id": rule.code,
         "name": "".join(word.capitalize() for word in rule.name.split("-")),
@@ -61,7 +61,7 @@ def _rule(rule: Rule) -> Document:
     }
 
 
-def _result(one: Located) -> Document:
+def _result(one: Located) -> JsonDocument:
     finding = one.finding
     return {
         "ruleId": finding.code,

@@ -1,13 +1,13 @@
 """The parts of a page that the bus fills: verdict, timing models, timeline, terms, axes over the period."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.capacity import capacity_table
 from busplan.answers.latency import latency_tables
-from busplan.answers.page.commands import Source
+from busplan.answers.page.commands import Sources
 from busplan.answers.timeline import timeline_chart, totals_table
 from busplan.answers.verdict import places_of, verdict_sentences
 from busplan.buses.figure import (
@@ -29,19 +29,18 @@ from busplan.forms.blocks import (
     Facts,
     Question,
     Sentence,
+    ShownValue,
     Swatch,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
+    attribute_value,
     count_value,
     sentence,
-    value_of,
 )
 from busplan.forms.numbers import nouns
 
-Sources = Mapping[str, Source]
 _OVER_PERIOD: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
 
 
@@ -56,11 +55,11 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     places = places_of(results, start=0, change=0)
     facts = (
         *(
-            (f"{MARGIN.label} ({one.timing_model})", value_of(MARGIN, one, at=places[one.timing_model]))
+            (f"{MARGIN.label} ({one.timing_model})", attribute_value(MARGIN, one, at=places[one.timing_model]))
             for one in results
         ),
         *(
-            (figure.label, value_of(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
+            (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
             for figure in (UTILISATION, BINDING_TERM, MAX_AXES)
         ),
     )
@@ -128,10 +127,10 @@ def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
     return Chapter(Sentence(("Where the microseconds go",)), (chart, source.gives(table), source.line), "terms")
 
 
-def _of(term: Figure, answer: AllAnswers) -> Iterator[Value]:
+def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
     """A term under each timing model."""
     for number, one in enumerate(answer.capacity.results):
-        yield value_of(term, one, at=f"/results/{number}")
+        yield attribute_value(term, one, at=f"/results/{number}")
 
 
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
@@ -165,11 +164,11 @@ def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
     number = 0
     for results in answer.periods.periods:
         period_us = results[0].period_us
-        cells = [value_of(PERIOD, results[0], at=f"/results/{number}")]
+        cells = [attribute_value(PERIOD, results[0], at=f"/results/{number}")]
         for one in results:
-            cells += (value_of(figure, one, at=f"/results/{number}") for figure in _OVER_PERIOD)
+            cells += (attribute_value(figure, one, at=f"/results/{number}") for figure in _OVER_PERIOD)
             number += 1
-        yield TableRow(tuple(cells), sought=period_us == answer.profile.cycle.period_us)
+        yield TableRow(tuple(cells), highlighted=period_us == answer.profile.cycle.period_us)
 
 
 def _curves(answer: AllAnswers) -> str:

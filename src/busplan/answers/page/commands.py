@@ -2,6 +2,7 @@
 
 import os
 import shlex
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
@@ -11,7 +12,7 @@ from busplan.answers.capacity import capacity_document
 from busplan.answers.circle import circle_document
 from busplan.answers.latency import latency_document
 from busplan.answers.timeline import timeline_document
-from busplan.forms.blocks import Command, Document, Made, with_values
+from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
 from busplan.printable import commands
 
 
@@ -19,9 +20,9 @@ class Source(NamedTuple):
     """One command, and the document that it writes: what figures are taken from."""
 
     command: Command
-    document: Document
+    document: JsonDocument
 
-    def gives(self, block: Made) -> Made:
+    def gives(self, block: BlockOrPart) -> BlockOrPart:
         """Say of every figure of a block that it stands in this document."""
         return with_values(block, lambda value: value._replace(command=self.command.key if value.at else ""))
 
@@ -29,6 +30,10 @@ class Source(NamedTuple):
     def line(self) -> Command:
         """The command for a reader to type, where it is not explained."""
         return Command(self.command.line)
+
+
+Sources = Mapping[str, Source]
+"""The commands behind a profile's figures, by a short name."""
 
 
 def shell_word(text: str) -> str:
@@ -82,7 +87,7 @@ def sources(answer: AllAnswers, *, argument: str, key: str, other_period: bool) 
     each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
     found: dict[str, Source] = {}
 
-    def add(name: str, purpose: str, document: Document, *options: str) -> None:
+    def add(name: str, purpose: str, document: JsonDocument, *options: str) -> None:
         words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
         found[name] = Source(Command(" ".join(words), purpose, f"{key}-{name}"), document)
 

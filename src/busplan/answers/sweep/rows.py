@@ -9,10 +9,10 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from busplan.analysis.sweep.blocks import Block, Column
+from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.answers.documents import document
-from busplan.forms.blocks import Document
+from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
 
@@ -38,7 +38,7 @@ def json_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
     return facts.removesuffix("}") + ', "rows": [\n'
 
 
-def json_rows(block: Block, columns: Sequence[str]) -> str:
+def json_rows(block: SweepBlock, columns: Sequence[str]) -> str:
     """Write a block's rows for the JSON document, a line each: the lines of JSON lines, with commas between."""
     rows = block_text(block, columns, style="jsonl").removesuffix("\n").replace("\n", ",\n")
     return rows if block.chunk.start == 0 else ",\n" + rows
@@ -49,7 +49,7 @@ def json_footer(*, complete: bool) -> str:
     return f'\n], "complete": {json_text(complete)}}}\n'
 
 
-def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> Document:
+def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> JsonDocument:
     """What every JSON form of a sweep begins with."""
     return document(
         "sweep",
@@ -60,7 +60,7 @@ def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> Document:
     )
 
 
-def block_text(block: Block, columns: Sequence[str], *, style: Style) -> str:
+def block_text(block: SweepBlock, columns: Sequence[str], *, style: Style) -> str:
     """Write a block's rows, each with its line end.
 
     Parameters
@@ -79,7 +79,7 @@ def block_text(block: Block, columns: Sequence[str], *, style: Style) -> str:
     return "".join(rows)
 
 
-def _rows(block: Block, model: int, columns: Sequence[str], style: Style) -> Iterable[str]:
+def _rows(block: SweepBlock, model: int, columns: Sequence[str], style: Style) -> Iterable[str]:
     """Rows of one timing model."""
     separator, opening, closing = (", ", "{", "}\n") if style == "jsonl" else (",", "", "\n")
     cells: list[Array] = []

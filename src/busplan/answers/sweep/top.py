@@ -7,20 +7,20 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
-from busplan.analysis.sweep.blocks import Block
+from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Array
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.forms.blocks import (
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     count_value,
     figure_value,
     joined,
@@ -67,7 +67,7 @@ class Tally:
         """Rows so far: a point has one under each timing model."""
         return self.points * len(self._models)
 
-    def add(self, block: Block) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Count one more block."""
         points = block.chunk.points
         self.points += points
@@ -154,7 +154,7 @@ class TopRows:
         self._sort_by, self._top = sort_by, top
         self._sign = 1.0 if ascending else -1.0
 
-    def add(self, block: Block) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Take one more block."""
         if self._sort_by is None:
             rows = block.chunk.points * len(block.models)
@@ -169,7 +169,7 @@ class TopRows:
         self.kept += [self._row(block, int(index), rank=float(ranks[index])) for index in best]
         self.kept = sorted(self.kept, key=lambda row: row.rank)[: self._top]
 
-    def _row(self, block: Block, index: int, *, rank: float) -> TopRow:
+    def _row(self, block: SweepBlock, index: int, *, rank: float) -> TopRow:
         number = block.chunk.start * len(block.models) + index
         return TopRow(rank, number, block.row(index, self.columns))
 
@@ -181,7 +181,9 @@ class TopRows:
         return f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first"
 
 
-def sweep_report(top: TopRows, tally: Tally, *, name: str, expected: int, document: Callable[[], Document]) -> Report:
+def sweep_report(
+    top: TopRows, tally: Tally, *, name: str, expected: int, document: Callable[[], JsonDocument]
+) -> Report:
     """Answer the question of `sweep`, with a few of its rows.
 
     Parameters
@@ -230,13 +232,13 @@ def _column(name: str, figure: Figure | None) -> TableColumn:
     return TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures")
 
 
-def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
+def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:
     for name, own in row.record.items():
         at = f"/rows/{row.number}/{name}"
         value = None if isinstance(own, float) and isnan(own) else own
         figure = figures.get(name)
         if figure is None:
-            yield Value(value, name, at=at)
+            yield ShownValue(value, name, at=at)
         else:
             shown = figure_value(figure, value, at=at)
             # In the unit that the column's name says; a length in mm has the digits of one in um.

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.timeline.schedule import TOTAL, Event, Schedule
 from busplan.drawings.timeline.kinds import event_title
-from busplan.forms.blocks import Sentence, Value, count_value, figure_value, joined, sentence
-from busplan.forms.numbers import nouns, written
+from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, joined, sentence
+from busplan.forms.numbers import figure_text, nouns
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events are drawn in a row each; more of them in a row for each node. One node's whole cycle is 20."""
@@ -31,7 +31,7 @@ class Stretch(NamedTuple):
 
 def time_text(time_us: float) -> str:
     """Write a time as tables do, without its unit."""
-    return written(figure_value(TOTAL, time_us))
+    return figure_text(figure_value(TOTAL, time_us))
 
 
 def subject(plan: Schedule) -> Sentence:
@@ -41,8 +41,8 @@ def subject(plan: Schedule) -> Sentence:
     return sentence(
         f"{{}} {setup}; {{}} to {{}} of the cycle",
         count_value(nodes, "nodes"),
-        Value(plan.from_us, "from_us", "", TOTAL.decimals),
-        Value(plan.to_us, "to_us", "us", TOTAL.decimals),
+        ShownValue(plan.from_us, "from_us", "", TOTAL.decimals),
+        ShownValue(plan.to_us, "to_us", "us", TOTAL.decimals),
     )
 
 

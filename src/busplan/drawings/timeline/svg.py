@@ -25,7 +25,7 @@ from busplan.drawings.timeline.lanes import (
 from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import written
+from busplan.forms.numbers import figure_text
 from busplan.forms.svg import LINE, Scale, drawing, inside, markup, text_at
 
 _LINE_CHARACTERS: Final = 44
@@ -219,5 +219,5 @@ def _legend(body: Element, plan: Schedule, *, y: int) -> int:
         SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
         text_at(body, kind.label, x="20", y=y + 15)
         text_at(body, time_text(one.total_us), x="240", y=y + 15, anchor="end")
-        text_at(body, written(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
+        text_at(body, figure_text(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
     return y + LINE
