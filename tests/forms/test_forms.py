@@ -299,7 +299,9 @@ def test_json_and_csv_are_the_record() -> None:
 
 
 def test_what_is_no_one_table_has_no_csv() -> None:
-    with pytest.raises(BusplanError, match="CSV is one table, and this answer has several"):
+    with pytest.raises(
+        BusplanError, match="--format csv: this answer has several tables and CSV holds one; use --format json"
+    ):
         render(answer()._replace(records=None), "csv")
 
 

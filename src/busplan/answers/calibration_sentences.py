@@ -1,4 +1,4 @@
-"""What a calibration says of its fit, each figure with its place in the document of `calibrate`."""
+"""Sentences on the fit of a calibration, each figure with its place in the document of `calibrate`."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -14,7 +14,7 @@ _LINE_DIGITS: Final = 6
 _DECIMALS: Final = 3
 _MOST_LINES: Final = 10
 _LONG_EXECUTION_US: Final = 10_000.0
-"""An execution time that no motion node has; latencies in ns under a heading of us have it."""
+"""Longer than the execution time of any motion node: the latencies are probably in ns."""
 
 
 def time_value(value_us: float, key: str, *, at: str = "") -> ShownValue:
@@ -23,7 +23,7 @@ def time_value(value_us: float, key: str, *, at: str = "") -> ShownValue:
 
 
 def fit_sentences(result: Calibration) -> Iterator[Sentence]:
-    """How the execution time was found, in which form, how well it fits, and what the timing model leaves over."""
+    """Say how the execution time was found, its form, its fit, and what the timing model leaves unexplained."""
     yield _way(result)
     yield _form(result)
     yield _residual(result)
@@ -105,7 +105,7 @@ def _unexplained(result: Calibration) -> Iterator[Sentence]:
 
 
 def warning_sentences(result: Calibration) -> Iterator[Sentence]:
-    """What to look at before these figures are used."""
+    """Say what to check before using these figures."""
     if result.outliers:
         yield _outliers(result)
     execution, payload = result.execution, result.profile.payload

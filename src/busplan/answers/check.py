@@ -1,4 +1,4 @@
-"""Answer of `busplan check`, as a document and in sentences; `gate` has it for build services."""
+"""Answer of `busplan check` as sentences and as JSON; `gate` writes it for build services."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -11,7 +11,7 @@ from busplan.rules.report import CheckReport
 
 
 def check_report(report: CheckReport) -> Report:
-    """Answer the question of `check`."""
+    """Report of `check`."""
     return Report(
         Sentence(("Check of profiles",)),
         lambda: tuple(_sentences(report)),
@@ -21,7 +21,7 @@ def check_report(report: CheckReport) -> Report:
 
 
 def _sentences(report: CheckReport) -> Iterator[Sentence]:
-    """Each finding, what could not be checked, and what it adds up to."""
+    """Each finding, each file that could not be checked, and the summary."""
     for one in report.located:
         place, words = finding_parts(one.path, one.finding)
         yield Sentence((Code(place), f" {words}"), "fails" if one.finding.severity == "error" else "warns")
@@ -52,7 +52,7 @@ def _state(report: CheckReport) -> State:
 
 
 def check_records(report: CheckReport) -> list[Record]:
-    """One row a finding."""
+    """One row for each finding."""
     return [{"path": one.path, **one.finding._asdict()} for one in report.located]
 
 

@@ -1,4 +1,4 @@
-"""What a circle test says of the circle, in sentences that a person can act on."""
+"""The verdict of a circle test in sentences."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -16,7 +16,7 @@ _FIGURES: Final = by_key(CIRCLE_FIGURES)
 def circle_sentences(
     name: str, result: CircleFigures, *, at: str, with_contributions: bool = True
 ) -> Iterator[Sentence]:
-    """Say whether the circle holds, what it does not hold, and what to attack first.
+    """Say whether the circle holds its tolerances, what it does not hold, and which error source to attack first.
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ def circle_sentences(
     result
         The circle test at one period.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     with_contributions
-        Whether the document ranks the error sources, too.
+        If True, the document ranks the error sources.
     """
     period, feed = setup_values(result, at=at)
     subject = (Code(name), " at ", period, " and ", feed)
@@ -60,7 +60,7 @@ def setup_values(result: CircleFigures, *, at: str) -> tuple[ShownValue, ShownVa
     result
         The circle test at one period.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     feed = figure_value(_FIGURES["feed_mm_per_min"], result.feed_mm_per_min, at=f"{at}/feed_mm_per_min")
     return period_value(result.period_us, at=f"{at}/period_us"), feed
@@ -74,7 +74,7 @@ def failure_words(result: CircleFigures, *, at: str) -> Sentence:
     result
         The circle test at one period, which fails.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     each = (Sentence(tuple(_part(part, result, at=at) for part in one.parts())) for one in result.failures)
     return joined(*each, by=", and ")
@@ -88,7 +88,7 @@ def _part(part: str | Stated, result: CircleFigures, *, at: str) -> Part:
 
 
 def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
-    """Say how the servo values are known, wherever a figure is shown that rests on them; nothing without a simulation.
+    """Say how the servo values behind the figures are known; nothing without a simulation.
 
     Parameters
     ----------
@@ -101,5 +101,5 @@ def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
 
 
 def source_words(source: str) -> str:
-    """Name of an error source, as people write it."""
+    """Name of an error source in words."""
     return source.replace("_", " ")

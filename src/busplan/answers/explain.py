@@ -1,4 +1,4 @@
-"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and what it starts from."""
+"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and its inputs."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -37,7 +37,7 @@ _SYMBOL: Final = TableColumn("symbol", kind="words")
 
 
 def explain_report(explanation: Explanation) -> Report:
-    """Answer the question of `explain PROFILE FIGURE`: a section for each derivation.
+    """Report of `explain PROFILE FIGURE` with a section for each derivation.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def explain_report(explanation: Explanation) -> Report:
 
 
 def _in_words(explanation: Explanation) -> Explanation:
-    """Put the verdict's sentences, and its change as the document has it, where the figures behind them are derived."""
+    """Fill in the value of figures that are sentences or changes: the report of `capacity` makes them."""
     return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
 
 
@@ -95,7 +95,7 @@ def _derivation(one: Derivation) -> JsonDocument:
 
 
 def _step_records(one: Derivation) -> Iterator[Record]:
-    """One row a step; a figure that is an input itself has one row, without a formula."""
+    """One row for each step; a figure that is itself an input has one row, without a formula."""
     figure = one.figure
     itself = Step(figure.key, figure.symbol, figure.reference, "", "", one.value, figure.unit)
     for number, step in enumerate(one.steps or (itself,), start=1):
@@ -116,7 +116,7 @@ def _step_records(one: Derivation) -> Iterator[Record]:
 
 
 def _section(one: Derivation, profile: str, at: str) -> Chapter:
-    """The result, what it is, every step to it, and what they start from."""
+    """The result, its meaning, every step to it, and the inputs."""
     figure = one.figure
     kind = f"{one.transaction}, " if one.transaction else ""
     title = Sentence(
@@ -132,7 +132,7 @@ def _section(one: Derivation, profile: str, at: str) -> Chapter:
 
 
 def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
-    """The result in a sentence: one figure, or what a change sets."""
+    """The result in a sentence: one figure, or the keys that a change sets."""
     if isinstance(one.value, dict):
         settings = (
             Sentence((Code(key), " = ", ShownValue(new, key, at=f"{at}/value/changes/{key}")))
@@ -154,12 +154,12 @@ def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Word
 
 
 def _has_names(value: object) -> bool:
-    """Whether it is made of parts with names of their own."""
+    """Whether a value has named parts."""
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
 
 
 def _step(step: Step, at: str) -> blocks.CalculationStep:
-    """A line in symbols, and one in numbers where it says more than the one before or after it."""
+    """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
     result = _result(step.value, step.key, step.unit, at=f"{at}/value")
     said = figure_text(result) if isinstance(result, ShownValue) else result.text
     formula = "" if step.formula == step.symbol else step.formula

@@ -1,4 +1,4 @@
-"""Tables of registered figures: figures down, what they belong to across."""
+"""Tables of registered figures: one row for each figure, one column for each owner."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -8,30 +8,30 @@ from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, attribu
 
 
 class Owner(NamedTuple):
-    """What has figures: one column."""
+    """An object with figures: one column."""
 
     column: TableColumn
     figures: object
-    """Figures are its attributes."""
+    """Object that has the figures as attributes."""
     at: str
-    """Its place in the JSON document."""
+    """JSON pointer to it."""
 
 
 def figure_table(
     rows: Iterable[tuple[Figure, int]], owners: Sequence[Owner], *, caption: Sentence, unit: bool = True
 ) -> Table:
-    """Lay figures out side by side.
+    """Table of figures, the owners side by side.
 
     Parameters
     ----------
     rows
         Figures with their levels.
     owners
-        One a column.
+        One for each column.
     caption
-        What the table shows.
+        Caption of the table.
     unit
-        Whether units have a column; otherwise the caption says the unit of all.
+        If False, the column of units is left out: the caption says the unit.
     """
     head = (TableColumn("figure", kind="words"), TableColumn("eq", kind="words"), TableColumn("unit", kind="words"))
     columns = (*head[: 3 if unit else 2], *(owner.column for owner in owners))

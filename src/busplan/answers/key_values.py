@@ -1,4 +1,4 @@
-"""Keys of a profile with the values that they are to have, as a sentence."""
+"""New values of profile keys as a sentence."""
 
 from collections.abc import Mapping
 
@@ -10,18 +10,18 @@ NewValues = Mapping[str, bus.Value]
 
 
 def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: str, quotes: bool = True) -> Sentence:
-    """Write each key with its value, and what that means.
+    """Write each key with its new value and its meaning.
 
     Parameters
     ----------
     changes
         The new values.
     meanings
-        What a change of a key means, where that is not plain.
+        Note on a change, by key, for keys that need one.
     at
-        Place of the changes in the JSON document; empty where they have none.
+        JSON pointer to the changes; empty if they are not in the document.
     quotes
-        If True, a text stands between quotes, as in a profile.
+        If True, text values are quoted, as in a profile.
     """
     return joined(
         *(
@@ -33,7 +33,7 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: st
 
 
 def key_value(key: str, value: bus.Value, *, at: str) -> ShownValue:
-    """The value of one key, with its place among the changes."""
+    """The new value of one key, with its place in the JSON document."""
     return ShownValue(value, key, at=f"{at}/{key}" if at else "")
 
 

@@ -20,18 +20,18 @@ from busplan.forms.blocks import (
 )
 
 _DIGITS: Final = 5
-"""Significant digits of a published figure, and of a quotient of two."""
+"""Significant digits of a published figure or a quotient of two."""
 _DECIMALS: Final = {"mm": 6, "1": 4}
-"""Contour errors are micrometres: they need more decimals than microseconds do."""
+"""Decimals by unit; contour errors in mm are micrometres, so that they need six."""
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
 
 _Numbered = tuple[int, Comparison]
-"""A comparison with its number among all figures of the document."""
+"""A comparison with its index in the document's figures."""
 
 
 def paper_report(sections: Sequence[PaperSection]) -> Report:
-    """Answer the question of `paper`: published figures down, the ways to compute them across.
+    """Report of `paper`: one row for each published figure, one group of columns for each method.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def paper_report(sections: Sequence[PaperSection]) -> Report:
 
 
 def paper_records(sections: Sequence[PaperSection]) -> list[Record]:
-    """One row a published figure and way to compute it."""
+    """One row for each published figure and method."""
     return [
         {
             **comparison._asdict(),
@@ -105,7 +105,7 @@ def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:
     at, one = numbered
     decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
     place = f"/figures/{at}"
-    # What the decimals do not show is the rounding of the printed figure.
+    # Smaller values are rounding of the printed figure.
     return (
         ShownValue(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
         ShownValue(

@@ -30,7 +30,7 @@ from busplan.sections.profile import Profile
 
 
 def plan_report(plan: Plan, *, with_circle: bool) -> Report:
-    """Answer the question of `plan`.
+    """Report of `plan`.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def plan_report(plan: Plan, *, with_circle: bool) -> Report:
 
 
 def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
-    """The recommendation, a row for each option, and what does not exist."""
+    """The recommendation, a row for each option, and the settings that have no value."""
     yield _headline(plan, with_circle=with_circle)
     yield from _warnings(plan)
     yield options_table(plan)
@@ -66,7 +66,7 @@ def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
 
 
 def settings(profile: Profile, changes: NewValues) -> str:
-    """Write changes as a profile has them.
+    """Write changes as in a profile.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def settings(profile: Profile, changes: NewValues) -> str:
 
 
 def _settings(profile: Profile, changes: NewValues, *, at: str = "") -> Sentence:
-    # A number of nodes is what was asked for, never what a second bus would leave.
+    # The number of nodes is the goal here, so the note on a second bus does not apply.
     meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings, at=at)
 
@@ -88,7 +88,7 @@ _OF_MODELS: Final = (
     (" both timing models", " in the tighter one"),
     (" every timing model", " in the tightest one"),
 )
-"""What fits, and in which there is least to spare: of one timing model, of two and of more."""
+"""What fits, and which model has the least margin: for one timing model, for two and for more."""
 
 
 def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
@@ -114,7 +114,7 @@ def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
 
 
 def _goal(plan: Plan) -> tuple[Part, ...]:
-    """What is planned for."""
+    """The goal of the plan."""
     goal = plan.goal
     nodes, axes = goal.bus.nodes, goal.bus.nodes * goal.node.axes
     return (
@@ -182,7 +182,7 @@ def _record(plan: Plan, option: Option) -> Record:
 
 
 def plan_records(plan: Plan) -> list[Record]:
-    """One row an option, its changes and failures as words."""
+    """One row for each option, with its changes and failures as text."""
     return [
         {
             **record,

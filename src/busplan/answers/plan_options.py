@@ -1,4 +1,4 @@
-"""The options of a plan, side by side in one table."""
+"""The options of a plan as one table."""
 
 from typing import Final
 
@@ -24,7 +24,7 @@ from busplan.sections.profile import Profile
 
 
 def options_table(plan: Plan) -> Table:
-    """What each option sets and what it brings; the recommended one has a mark."""
+    """Settings and results of each option; the recommended one has a mark."""
     first = plan.options[0]
     columns = (
         TableColumn("option", kind="words"),
@@ -53,14 +53,14 @@ def _row(option: Option, *, at: str) -> TableRow:
 
 
 def option_margins(option: Option, *, at: str) -> list[ShownValue]:
-    """What is left under the timing model that decides, and under each other one.
+    """Margins under the timing model that decides, and under each other model.
 
     Parameters
     ----------
     option
         The option.
     at
-        Its place in the JSON document, which has the least of the others.
+        JSON pointer to the option; the document has only the smallest margin of the other models.
     """
     least_us = min((one.margin_us for one in option.others), default=None)
     found = []
@@ -82,7 +82,7 @@ _SHORT: Final = {
 
 
 def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
-    """What an option sets, in a few words."""
+    """The settings of an option, in a few words."""
     if not changes:
         return MISSING
     payloads = {value for key, value in changes.items() if key.startswith("payload.")}

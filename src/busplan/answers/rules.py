@@ -24,7 +24,7 @@ _COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("code
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:
-    """Answer the question of `rule`: one line a rule.
+    """Report of `rule` with one line for each rule.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def rules_report(rules: Sequence[Rule]) -> Report:
 
 
 def rule_report(rule: Rule) -> Report:
-    """Answer the question of `rule CODE`: all that is to say of one rule.
+    """Report of `rule CODE` with the explanation of one rule.
 
     Parameters
     ----------

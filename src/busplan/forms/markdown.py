@@ -1,4 +1,4 @@
-"""An answer as Markdown, for a repository's page or a comment: nothing of a profile's text is markup."""
+"""An answer as Markdown, for a repository page or a comment; text from profiles is escaped."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -29,7 +29,7 @@ from busplan.forms.markdown_words import code, escaped, table
 from busplan.forms.numbers import with_unit
 
 _COMMENT_LEVEL: Final = 3
-"""Level of the title of what is no page: it is read inside another one, as a comment on a change."""
+"""Title level of an answer that is not a page: it is read inside one, as in a comment on a change."""
 
 
 def text(report: Report) -> str:
@@ -47,7 +47,7 @@ def text(report: Report) -> str:
 
 
 def _blocks(blocks: Sequence[Block], *, level: int) -> Iterator[str]:
-    """Lines of blocks, a blank one in front of each; commands in a row are one listing."""
+    """Lines of blocks, with a blank line before each; neighbouring commands are one listing."""
     for are_commands, run in groupby(blocks, key=lambda block: isinstance(block, Command)):
         if are_commands:
             yield from ("", "```sh", *(one.line for one in run if isinstance(one, Command)), "```")
@@ -97,7 +97,7 @@ def _facts(facts: Facts) -> str:
 
 
 def _sentence(sentence: Sentence) -> str:
-    # As a whole: what begins a line or makes a link may lie across a figure. Code is text whatever it holds.
+    # Escape text and figures together: markup may span both. Code is escaped by itself.
     pieces: list[str] = []
     for is_code, run in groupby(sentence.parts, key=lambda part: isinstance(part, Code)):
         if is_code:
@@ -119,7 +119,7 @@ def _part(part: Part) -> str:
 
 
 def _table(one: Table) -> list[str]:
-    # A drawing has no place here; what it shows stands in figures beside it.
+    # Columns of drawings are left out: the figure is in another column.
     shown = [number for number, column in enumerate(one.columns) if column.kind != "drawing"]
     columns = [one.columns[number] for number in shown]
     headings = [
@@ -145,7 +145,7 @@ def _cell(cell: Cell) -> str:
         case Command() | Code():
             return code(cell_text(cell))
         case Swatch():
-            # Its mark stands for a colour, which is not here.
+            # The mark stands for a colour, and Markdown has none.
             return escaped(cell.text)
     return escaped(cell_text(cell))
 

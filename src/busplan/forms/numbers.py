@@ -1,4 +1,4 @@
-"""How a figure is written: its digits and its unit."""
+"""Write figures: digits and unit."""
 
 from math import isnan
 from typing import Final
@@ -8,15 +8,15 @@ from busplan.forms.blocks import ShownValue
 
 MISSING: Final = "-"
 _DIGITS: Final = 12
-"""Digits of a number that has as many as it takes: float rounding is not among them."""
+"""Most digits of a number; further ones are float rounding."""
 _FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6}
-"""From the unit of a key to the one it is written in."""
+"""Factor from the unit of a key to the unit it is written in."""
 _MILLISECOND_US: Final = 1e3
 _SECOND_US: Final = 1e6
 _SILENT: Final = frozenset(("", "1", "nodes", "axes"))
-"""Units that words say, where a figure stands in a sentence."""
+"""Units that a sentence does not repeat behind a figure: a noun names them."""
 _ROUNDING_UM: Final = 1e-6
-"""Smallest length, in um, that is more than rounding: a picometre."""
+"""Smaller lengths, in um, are float rounding: a picometre."""
 
 
 def figure_text(value: ShownValue) -> str:
@@ -46,7 +46,7 @@ def figure_text(value: ShownValue) -> str:
 
 
 def with_unit(value: ShownValue) -> str:
-    """Write a figure with its unit, as a sentence has it.
+    """Write a figure with its unit, as in a sentence.
 
     Examples
     --------
@@ -57,14 +57,14 @@ def with_unit(value: ShownValue) -> str:
 
 
 def unit_text(value: ShownValue) -> str:
-    """Write what stands behind a figure in a sentence."""
+    """Unit behind a figure in a sentence, with its space."""
     if value.unit in _SILENT or figure_text(value) == MISSING:
         return ""
     return "%" if value.unit == "%" else f" {value.unit}"
 
 
 def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
-    """Write a number with so many decimals, unless it is too small for them.
+    """Write a number with fixed decimals; one too small for them is written with three digits.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
 
 
 def period_value(period_us: float, *, at: str = "", command: str = "") -> ShownValue:
-    """A communication period in the unit that people say it in.
+    """A communication period in s, ms or us, by its size.
 
     Examples
     --------
@@ -90,12 +90,12 @@ def period_value(period_us: float, *, at: str = "", command: str = "") -> ShownV
 
 
 def period(period_us: float) -> str:
-    """Write a communication period as people say it."""
+    """Write a communication period in s, ms or us, by its size."""
     return with_unit(period_value(period_us))
 
 
 def plural(number: int, noun: str) -> str:
-    """Write a number of things with their noun.
+    """Write a count with its noun.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def plural(number: int, noun: str) -> str:
 
 
 def nouns(number: int, noun: str) -> str:
-    """The noun of so many things.
+    """Singular or plural of a noun, by its count.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def _number(value: ShownValue) -> str:
     if value.unit == "um" and abs(number) < _ROUNDING_UM:
         number = 0.0
     if value.decimals is not None:
-        # Plus zero: a negative one is no number to show.
+        # Adding 0.0 turns -0.0 into 0.0.
         number = round(number, value.decimals) + 0.0 if value.fixed else number
         return decimals_of(number, value.decimals, signed=value.signed)
     sign, comma = "+" if value.signed and number > 0 else "", "," if value.grouped else ""

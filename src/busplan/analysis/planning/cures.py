@@ -1,8 +1,8 @@
-"""The cheapest change of a profile that makes it fit, or that makes room for more nodes.
+"""Find the cheapest change of a profile that makes it fit, or that makes room for more nodes.
 
-Changes are tried from the cheapest: what the bus itself lets a plan turn; the slice ratio, which is computing time of
-the host; the period, which is what the machine is for. Each is put into the profile and computed again: what is
-advised has been seen to work, and is safe for the nodes it is advised for.
+Changes are tried from the cheapest on: settings of the bus; the slice ratio, which costs computing time of the host;
+the period, which costs performance of the machine. Each is put into the profile and computed again, so that advice is
+known to work and to be safe for its number of nodes.
 """
 
 from bisect import bisect_right
@@ -20,22 +20,22 @@ from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 RATIO_STEPS: Final = 10_000
-"""A slice ratio is advised in steps of 0.0001, a period in steps of 1 us, always rounded to the safe side."""
+"""A slice ratio is advised in steps of 0.0001 and a period in steps of 1 us, both rounded to the safe side."""
 MAX_ADVISED_RATIO: Final = 0.9
-"""No larger slice ratio is advised: the host computes in what communication leaves of the period. Chosen."""
+"""Largest slice ratio advised: the host computes in the rest of the period. Chosen."""
 _SMALLEST_SHARE: Final = 1e-6
-"""Below it there is no cure, as a slice ratio has no smaller value; what is divided by it stays finite."""
+"""Smallest share of the slice to find a cure for: the smallest slice ratio. It keeps quotients finite."""
 
 
 def changeable(profile: Profile, *, structure: bool = True) -> tuple[str, ...]:
-    """What may be changed of a network, in words, the cheapest first.
+    """Names of what may be changed in a network, the cheapest first.
 
     Parameters
     ----------
     profile
         The network.
     structure
-        Whether what needs new parts is among it.
+        If True, include changes that need new hardware.
     """
     bus = bus_of(profile)
     settings = (setting.label for setting in bus.settings(network_of(profile)))
@@ -55,36 +55,36 @@ def listed(words: Sequence[str], last: str) -> str:
 
 
 class Change(NamedTuple):
-    """A change of a profile, and what it brings."""
+    """A change of a profile, and its effect."""
 
     changes: dict[str, Value]
     """New value by dotted key."""
     nodes: int
     """Nodes that the change is made for."""
     figures: CapacityFigures
-    """The capacity after it, under the model it is made for that leaves the least."""
+    """Capacity after the change, under the model with the smallest margin."""
 
 
 def change_to_fit(profile: Profile, *, models: Sequence[str]) -> Change | None:
-    """Find the cheapest change after which a profile fits under every one of some timing models.
+    """Find the cheapest change after which a profile fits under all given timing models.
 
     Parameters
     ----------
     profile
-        A network that does not fit under one of them, or that is unsafe.
+        A network that does not fit under one of them, or is unsafe.
     models
         Timing models.
 
     Returns
     -------
     Change
-        None when no single kind of change does.
+        None if no single kind of change is enough.
     """
     return next(changes_to_fit(profile, models=models), None)
 
 
 def changes_to_fit(profile: Profile, *, models: Sequence[str]) -> Iterator[Change]:
-    """Find every kind of change after which a profile fits under every one of some timing models.
+    """Find every kind of change after which a profile fits under all given timing models.
 
     Parameters
     ----------
@@ -96,13 +96,13 @@ def changes_to_fit(profile: Profile, *, models: Sequence[str]) -> Iterator[Chang
     Yields
     ------
     Change
-        The cheapest first; no change at all when the profile fits and is safe.
+        The cheapest first; an empty change if the profile fits and is safe already.
     """
     cures = bus_of(profile).repairs(network_of(profile))
     nodes = int(cures.get("bus.nodes", profile.bus.nodes))
     try:
         cured = override(profile, dict(cures))
-    except BusplanError:  # a payload that the bus could carry and the execution table does not know
+    except BusplanError:  # the bus could carry the payload, but the execution table does not have it
         return
     for cure in ({}, *_time_cures(cured, nodes, models)):
         after = _after(profile, {**cures, **cure}, models=models)
@@ -123,7 +123,7 @@ def change_for_more(profile: Profile, *, model: str) -> Change | None:
     Returns
     -------
     Change
-        None when time is not what limits the nodes, or no single kind of change does.
+        None if time does not limit the nodes, or no single kind of change is enough.
     """
     now = figures(profile, model=model)
     if now.limited_by != TIME:
@@ -135,7 +135,7 @@ def change_for_more(profile: Profile, *, model: str) -> Change | None:
             return Change(setting, best, after[0])
     nodes = now.max_nodes + 1
     if not bus_of(profile).is_safe(network_of(profile).with_nodes(nodes)):
-        # What is safe for fewer nodes must not carry more.
+        # The settings are not safe for more nodes.
         return None
     for cure in _time_cures(profile, nodes, [model]):
         after = _after(profile, cure, models=[model])
@@ -145,12 +145,12 @@ def change_for_more(profile: Profile, *, model: str) -> Change | None:
 
 
 def change_for_room(profile: Profile, *, model: str, nodes: int, utilisation: float = 1.0) -> Change | None:
-    """Find the cheapest change after which a bus carries some nodes, and its own use no more than a share of the slice.
+    """Find the cheapest change after which a bus carries some nodes and uses at most a share of the slice.
 
     Parameters
     ----------
     profile
-        A network that keeps the limits of its bus.
+        A network within the limits of its bus.
     model
         Timing model.
     nodes
@@ -161,7 +161,7 @@ def change_for_room(profile: Profile, *, model: str, nodes: int, utilisation: fl
     Returns
     -------
     Change
-        None when no single kind of change does.
+        None if no single kind of change is enough.
     """
     if utilisation < _SMALLEST_SHARE:
         return None
@@ -173,7 +173,7 @@ def change_for_room(profile: Profile, *, model: str, nodes: int, utilisation: fl
 
 
 def _best_setting(profile: Profile, *, model: str) -> tuple[int, dict[str, Value]]:
-    """The most nodes that one setting of the bus carries with a value that is safe for just them, and that value."""
+    """The most nodes that one setting of the bus allows with a value that is safe for them, and that value."""
     bus, network = bus_of(profile), network_of(profile)
     given_us = available_us(network)
 
@@ -185,19 +185,19 @@ def _best_setting(profile: Profile, *, model: str) -> tuple[int, dict[str, Value
                 return setting
         return None
 
-    # Time grows with the nodes: those that fit are the first ones.
+    # Time grows with the nodes, so the numbers that fit come first.
     best = bisect_right(range(1, _ceiling(profile) + 1), x=False, key=lambda nodes: fitting(nodes) is None)
     return best, (fitting(best) or {}) if best else {}
 
 
 def _settings(profile: Profile, nodes: int) -> list[dict[str, Value]]:
-    """Values of the bus's own settings that are safe for that many nodes, the cheapest change first."""
+    """Values of the settings of the bus that are safe for a number of nodes, the cheapest change first."""
     settings = bus_of(profile).settings(network_of(profile).with_nodes(nodes))
     return [{setting.key: value} for setting in settings for value in setting.values]
 
 
 def _ceiling(profile: Profile) -> int:
-    """Most nodes by the limits of the bus, whatever the time."""
+    """Most nodes within the limits of the bus, ignoring time."""
     network, bus = network_of(profile), bus_of(profile)
 
     def is_over(nodes: int) -> bool:
@@ -212,13 +212,13 @@ def _ceiling(profile: Profile) -> int:
 def _time_cures(
     profile: Profile, nodes: int, models: Sequence[str], *, share: float = 1.0
 ) -> Iterator[dict[str, Value]]:
-    """Changes that win time for that many nodes to use a share of the slice, the cheapest first."""
+    """Changes after which a number of nodes uses at most a share of the slice, the cheapest first."""
     own_us = _required_us(profile, nodes, models)
     settings = [
         one for one in _settings(profile, nodes) if _required_us(override(profile, dict(one)), nodes, models) < own_us
     ]
     yield from settings
-    # A wider slice alone, then with a setting: one key is a smaller change than two.
+    # First a larger slice alone, then with a setting: one changed key is cheaper than two.
     for before in ({}, *settings):
         required_us = _required_us(override(profile, dict(before)), nodes, models) / share
         ratio = ceil(required_us / profile.cycle.period_us * RATIO_STEPS) / RATIO_STEPS
@@ -234,7 +234,7 @@ def _required_us(profile: Profile, nodes: int, models: Sequence[str]) -> float:
 
 
 def _after(profile: Profile, changes: dict[str, Value], *, models: Sequence[str]) -> list[CapacityFigures]:
-    """Capacity after some changes under each model; empty where the profile's schema refuses them."""
+    """Capacity after some changes under each model; empty if the profile's schema refuses them."""
     try:
         changed = override(profile, dict(changes))
     except BusplanError:

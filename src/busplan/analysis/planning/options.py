@@ -1,4 +1,4 @@
-"""What to set for a number of nodes: the best value of each setting, and the one change to make.
+"""Find what to set for a number of nodes: the best value of each setting, and the recommended change.
 
 Every option is put into the profile and computed again.
 """
@@ -32,61 +32,61 @@ class Option(NamedTuple):
 
     title: str
     changes: Changes
-    """What the option sets, by dotted key; what was asked for is not among it."""
+    """Keys that the option changes in the goal, with their new values."""
     profile: Profile
-    """The profile with the changes and with what was asked for."""
+    """The goal with the changes."""
     deciding: CapacityFigures
     """Capacity under the timing model that decides."""
     others: tuple[CapacityFigures, ...]
     """Capacity under the other timing models."""
     bounded_by: str | None = None
-    """What keeps the value from being better; None where there is no value to choose."""
+    """Limit that keeps the value from being better; None if the option chooses no value."""
     circle_failures: tuple[str, ...] | None = None
-    """What the circle does not hold; None when it was not run."""
+    """Failures of the circle; None if it was not run."""
     proven: bool = True
-    """Whether no better value can exist; False when the search for it was cut short."""
+    """Whether no better value exists; False if the search was cut short."""
     recommended: bool = False
 
     @property
     def circle_passed(self) -> bool | None:
-        """Whether the circle holds its tolerances; None when it was not run."""
+        """Whether the circle holds its tolerances; None if it was not run."""
         return None if self.circle_failures is None else not self.circle_failures
 
     @property
     def is_plan(self) -> bool:
-        """Whether it fits under every model, the bus is safe, and the circle passes if it was run."""
+        """Whether it fits under every model, the bus is safe, and the circle passes or was not run."""
         fits = self.deciding.fits and all(other.fits for other in self.others)
         return fits and self.deciding.safe and not self.circle_failures
 
 
 class Impossible(NamedTuple):
-    """A setting without a value that would do."""
+    """A setting that has no suitable value."""
 
     title: str
     reason: str
     proven: bool = True
-    """Whether there is none; False when the search was cut short."""
+    """Whether no value exists; False if the search was cut short."""
 
 
 class Plan(NamedTuple):
     """Answer of `plan`."""
 
     profile: Profile
-    """The profile as it was read."""
+    """The original profile."""
     goal: Profile
-    """The profile with what was asked for."""
+    """The profile with the wanted values."""
     wanted: Changes
-    """What was asked for and is not in the profile yet, by dotted key."""
+    """Wanted values that differ from the profile, by dotted key."""
     options: tuple[Option, ...]
     impossible: tuple[Impossible, ...]
 
     @property
     def recommended(self) -> Option | None:
-        """The option to take; None when there is no plan for the goal."""
+        """The recommended option; None if there is no plan for the goal."""
         return next((option for option in self.options if option.recommended), None)
 
     def all_changes(self, option: Option) -> Changes:
-        """What turns the profile as it was read into an option."""
+        """All changes from the original profile to an option."""
         return {**self.wanted, **option.changes}
 
 
@@ -99,26 +99,26 @@ def plan(
 ) -> Plan:
     """Find what to set.
 
-    The recommended option is the first, in the order of `cures` (nothing, a setting of the bus, slice ratio, both,
-    period, period and a setting; with them what the limits of the bus demand), after which the goal fits under every
-    timing model on a bus that is set safely, and passes the circle test. It changes nothing that was asked for, and
-    never the number of nodes. The other options are found under the timing model that decides.
+    The recommended option is the cheapest after which the goal fits under every timing model, the bus is safe, and the
+    circle test passes. The order is: nothing, a setting of the bus, slice ratio, both, period, period and a setting,
+    each with the changes that the limits of the bus require. It keeps the wanted values and the number of nodes. The
+    other options are found under the timing model that decides.
 
     Parameters
     ----------
     profile
         The network.
     wanted
-        What is asked for, by dotted key: {"bus.nodes": 6}.
+        Wanted values by dotted key: {"bus.nodes": 6}.
     circle
-        The circle test; without it no circle is run.
+        Function that runs the circle test; None for none.
     max_circles
-        How many periods in a row are tried for the circle before the search takes longer strides [1].
+        Number of consecutive periods to test before the strides double [1].
 
     Returns
     -------
     Plan
-        The options, those that do not exist with the reason, and the one to take.
+        The options, the settings without a suitable value, and the recommendation.
 
     Raises
     ------
@@ -154,17 +154,17 @@ def plan(
 
 
 def nodes_for_axes(profile: Profile, axes: int) -> int:
-    """Nodes that so many axes need, at the profile's axes of each."""
+    """Number of nodes for a number of axes, with the profile's axes per node."""
     return -(-axes // profile.node.axes)
 
 
 def _differing(profile: Profile, changes: Changes) -> Changes:
-    """The changes that a profile does not hold already."""
+    """The changes that differ from the profile."""
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
 
 
 _CHEAPEST: Final = ("cheapest that fits", "cheapest that meets both models", "cheapest that meets every model")
-"""Title of the recommendation where it is none of the other options, for one timing model, for two and for more."""
+"""Title of a recommendation that is none of the other options: for one timing model, for two and for more."""
 
 
 class _Planner:
@@ -178,7 +178,7 @@ class _Planner:
         self.max_circles = max_circles
 
     def options(self) -> Iterator[Option | Impossible]:
-        """The best value of each setting under the model that decides."""
+        """The options and impossible settings under the model that decides."""
         goal = self.goal
         yield self.option("as it is", {})
         settings = bus_of(goal).settings(network_of(goal))
@@ -204,11 +204,11 @@ class _Planner:
 
     @staticmethod
     def best(setting: Setting) -> Changes:
-        """What gives a setting its best value; nothing where it has it."""
+        """The change to the best value of a setting; empty if it has that value."""
         return {} if setting.best is None or not setting.values else {setting.key: setting.best}
 
     def recommended(self, *, keep: set[str]) -> Option | None:
-        """The cheapest change that makes a plan, of those that leave some keys alone."""
+        """The cheapest option that is a plan and keeps some keys."""
         for change in changes_to_fit(self.goal, models=self.models):
             changes = dict(change.changes)
             if keep & set(changes):
@@ -233,7 +233,7 @@ class _Planner:
         return None
 
     def option(self, title: str, changes: Changes, *, bounded_by: str | None = None, proven: bool = True) -> Option:
-        """Put changes into the goal and compute what they bring."""
+        """Put changes into the goal and compute its figures."""
         changed = override(self.goal, dict(changes))
         deciding = figures(changed, model=self.model)
         others = (model for model in self.models if model != self.model)
@@ -249,7 +249,7 @@ class _Planner:
         )
 
     def fitting(self, title: str, changes: Changes, *, bounded_by: str, proven: bool = True) -> Option | Impossible:
-        """An option, unless it still does not fit."""
+        """An option, unless it breaks a limit of the bus."""
         broken = broken_limits(override(self.goal, dict(changes)))
         if broken:
             return Impossible(title, f"the {bus_of(self.goal).limits_of}'s limit of {' and '.join(broken)} is broken")

@@ -1,4 +1,4 @@
-"""Circle tests over a grid: one for each point and timing model, in any order and in any process."""
+"""Circle tests over a grid: one for each point and timing model, in any process."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
@@ -23,9 +23,9 @@ CIRCLE_COLUMNS: Final = (
     "gain_margin_db",
     "passed",
 )
-"""Columns that circle tests add, by their names in `circle-test`."""
+"""Columns of circle tests, named as in `circle-test`."""
 MOST_CIRCLES_UNASKED: Final = 1000
-"""Circle tests that are run without being asked twice: minutes with numba, an hour without."""
+"""Most circle tests without --force: minutes with numba, an hour without."""
 
 Figures = tuple[float | bool | None, ...]
 
@@ -36,7 +36,7 @@ def all_columns(profile: Profile, grid: Grid, *, with_circle: bool) -> tuple[str
 
 
 class CircleTask(NamedTuple):
-    """One point's circle tests; a process can be handed it."""
+    """The circle tests of one point; picklable."""
 
     profile: Profile
     changes: dict[str, object]
@@ -44,7 +44,7 @@ class CircleTask(NamedTuple):
 
 
 def run_task(task: CircleTask) -> list[Figures]:
-    """Run the circle test of a point under each timing model, as if that model decided."""
+    """Run the circle test of a point with each timing model deciding."""
     found: dict[str, Figures] = {}
     on_node: Figures | None = None
     for model in task.timing_models:
@@ -55,25 +55,25 @@ def run_task(task: CircleTask) -> list[Figures]:
         (result,) = circle_test(profile, explain=False).results
         found[model] = tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
         if result.bus_fits and result.loop == "node":
-            # Such a loop knows nothing of the bus but whether it fits: the next model's circle is the same.
+            # A loop on the node depends only on whether the bus fits: the other models' circle is the same.
             on_node = found[model]
     return [found[model] for model in task.timing_models]
 
 
 def require_circles(profile: Profile, grid: Grid) -> None:
-    """Refuse a grid with a point that has no circle test, before any is run.
+    """Refuse a grid with a point whose circle test cannot be run, before any is run.
 
     Raises
     ------
     BusplanError
-        The first such point, with the reason: its period is no multiple of the step, the drive cannot reach the feed,
+        The first such point and the reason: its period is no multiple of the step, the drive cannot reach the feed,
         or the circle is too short for its ramps.
     """
     for chunk in grid.chunks(1):
         changes = chunk.point(0)
         variant = override(profile, changes)
         try:
-            # No model carries it: it has an answer, but no circle.
+            # A point that fits under no model is not simulated.
             carried = any(figures(variant, model=model).fits for model in model_names(variant))
             _ = setup(variant) if carried else loop_timing(variant)
         except BusplanError as error:
@@ -95,11 +95,11 @@ def with_circles(
     profile
         The network.
     block
-        Its capacity.
+        Capacity of the points.
     timing_models
-        The models that it was computed under.
+        Timing models of the block.
     run
-        Runs `run_task` for each task, here or in other processes, and keeps their order.
+        Maps `run_task` over tasks, in this or other processes, in order.
     """
     models = tuple(timing_models)
     tasks = (CircleTask(profile, block.chunk.point(index), models) for index in range(block.chunk.points))
@@ -119,7 +119,7 @@ def with_circles(
 
 
 def _array(values: Sequence[float | None]) -> Array:
-    """Truths as they are, and numbers with NaN for what was not simulated or does not exist."""
+    """Array of truth values, or of numbers with NaN for None."""
     if all(isinstance(value, bool) for value in values):
         return np.array(values, dtype=bool)
     return np.array([np.nan if value is None else value for value in values], dtype=float)

@@ -1,4 +1,4 @@
-"""The gate's report in its formats: each is a class and a line in `FORMATS`."""
+"""Formats of the gate's report: each is a class and a line in `FORMATS`."""
 
 from abc import ABC, abstractmethod
 from importlib import import_module
@@ -12,24 +12,24 @@ class GateFormat(ABC):
     """One format of the gate's report."""
 
     is_for_people: ClassVar[bool] = False
-    """Whether people read it, in the encoding of their terminal; a program reads UTF-8."""
+    """If True, it is written in the encoding of the terminal; otherwise in UTF-8."""
 
     @abstractmethod
     def write(self, report: "CheckReport") -> str:
         """Write a report."""
 
-    def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats are all there is to read
-        """Lines for standard error beside it."""
+    def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats log nothing
+        """Further lines for standard error."""
         return []
 
 
 class Registered(NamedTuple):
-    """Where a format is, so that only the one that is asked for is loaded."""
+    """Location of a format, so that only the requested one is loaded."""
 
     module: str
-    """In this folder."""
+    """Module in this folder."""
     name: str
-    """Of its class."""
+    """Name of the class."""
     is_for_builds: bool = False
     """Whether it is for a build service."""
 

@@ -1,4 +1,4 @@
-"""Findings as SARIF 2.1.0, the form that code scanning services read.
+"""Findings as SARIF 2.1.0, the format of code scanning services.
 
 References
 ----------
@@ -22,10 +22,10 @@ _SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 class Sarif(GateFormat):
-    """One run, for services that scan code."""
+    """One SARIF run."""
 
     def write(self, report: CheckReport) -> str:
-        """Write all rules, the results, and what could not be checked as notifications."""
+        """Write all rules and results; files that could not be checked are notifications."""
         failures = [file for file in report.files if file.failure is not None]
         run = {
             "tool": {
@@ -81,7 +81,7 @@ def _result(one: Located) -> JsonDocument:
 
 
 def _artifact(path: str) -> dict[str, str]:
-    """Place of a file: relative to the working folder where it lies below it, which its name then says."""
+    """URI of a file, relative to the working folder if the file is below it."""
     pure = PurePath(path)
     if pure.is_absolute() or ".." in pure.parts:
         return {"uri": Path(path).resolve().as_uri()}

@@ -1,4 +1,4 @@
-"""The parts of a page that the bus fills: verdict, timing models, timeline, terms, axes over the period."""
+"""Parts of a page on the bus: verdict, timing models, timeline, terms, axes over the period."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -45,7 +45,7 @@ _OVER_PERIOD: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
 
 
 def bus_question(answer: AllAnswers, sources: Sources) -> Question:
-    """Does the cycle fit, and do the timing models agree?"""
+    """The question whether the cycle fits, with its verdict."""
     verdict, results = answer.verdict, answer.capacity.results
     word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
     if not verdict.models_agree:
@@ -75,7 +75,7 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
 
 
 def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The timing models side by side: the whole cycle, and the latencies."""
+    """Capacity and latencies, the timing models side by side."""
     capacity, latency = sources["capacity"], sources["latency"]
     several = len(bus_of(answer.profile).timing_models) > 1
     return Chapter(
@@ -91,7 +91,7 @@ def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
 
 
 def timeline_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The cycle to scale."""
+    """The timeline, and the total of each kind of event."""
     return Chapter(Sentence(("The cycle to scale",)), tuple(_timeline(answer, sources)), "timeline")
 
 
@@ -101,7 +101,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
         return
     source, network = sources["timeline"], network_of(answer.profile)
     limit = bus_of(answer.profile).limit("nodes")
-    # The table says what more nodes take than a bus may have; drawn, they would be a page of their own.
+    # More nodes than a bus may have would make a huge drawing; the table has their figures.
     if limit is not None and limit.is_broken(network):
         yield Sentence((f"Not drawn: {limit.words(network)}.",))
     else:
@@ -111,7 +111,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 
 
 def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """Where the microseconds go."""
+    """The terms of the cycle, as bars and as a table."""
     results, source = answer.capacity.results, sources["capacity"]
     terms = (*bus_of(answer.profile).term_figures, LEFT)
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
@@ -134,7 +134,7 @@ def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
 
 
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """Axes against period."""
+    """The most axes over the period, as a chart and as a table."""
     source, steps = sources["axes"], answer.steps
     nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
     caption = sentence(
@@ -160,7 +160,7 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
 
 
 def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
-    """A row a period, the timing models behind one another."""
+    """One row for each period; the timing models one after the other."""
     number = 0
     for results in answer.periods.periods:
         period_us = results[0].period_us
@@ -172,7 +172,7 @@ def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
 
 
 def _curves(answer: AllAnswers) -> str:
-    """How the curves of the timing models are told apart."""
+    """Legend of the curves, if there are several."""
     if len(answer.steps) == 1:
         return ""
     return f": {answer.steps[0].timing_model} solid with a square, {answer.steps[1].timing_model} dashed with a diamond"

@@ -1,4 +1,4 @@
-"""The parts of a page that the circle test fills: verdict, drawing, figures, ranked sources."""
+"""Parts of a page on the circle test: verdict, drawing, figures, ranked error sources."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -19,7 +19,7 @@ _KEYS: Final = (
 
 
 def circle_question(answer: AllAnswers, sources: Sources) -> Question:
-    """Is the circle still round?"""
+    """The question whether the circle is round, with its verdict."""
     result = answer.circle_figures
     if result is None:
         return Question(
@@ -65,7 +65,7 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 
 
 def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
-    """What makes the circle less round, ranked; nothing without a simulation."""
+    """The ranked error sources; None without a simulation."""
     result = answer.circle_figures
     if result is None or result.contributions is None:
         return None

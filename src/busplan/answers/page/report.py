@@ -1,4 +1,4 @@
-"""Answer of `busplan report`: all that is said of one or several profiles on one page."""
+"""Answer of `busplan report`: all answers for one or several profiles on one page."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
@@ -54,11 +54,11 @@ class ReportedProfile(NamedTuple):
     """The PROFILE argument."""
     answer: AllAnswers
     other_period: bool
-    """Whether its period is not that of its file."""
+    """Whether its period differs from that of its file."""
 
 
 class _Subject(NamedTuple):
-    """A profile with the commands behind its figures."""
+    """A profile and the commands behind its figures."""
 
     key: str
     origin: str
@@ -71,14 +71,14 @@ class _Subject(NamedTuple):
 
 
 def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None) -> Report:
-    """Put the page together: a chapter for each profile and, for several, a comparison in front.
+    """Make the page: a chapter for each profile, after a comparison if there are several.
 
     Parameters
     ----------
     profiles
         One or more.
     title
-        Heading of the page; without it the profile's name, or how many there are.
+        Title of the page; by default the profile's name, or the number of profiles.
     """
     subjects = [
         _Subject(
@@ -99,7 +99,7 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
 
 
 def _document(subjects: Sequence[_Subject]) -> JsonDocument:
-    """Document of `busplan report --format json`: for each profile, those of the commands behind its figures."""
+    """Document of `busplan report --format json`: for each profile, the documents of its commands."""
     return document(
         "report",
         profiles=[
@@ -119,7 +119,7 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
 
 
 def _chapter(subject: _Subject) -> Iterator[Block]:
-    """All of one profile."""
+    """All blocks of one profile."""
     answer, found = subject.answer, subject.sources
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
@@ -141,7 +141,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
 
 
 def _facts(subject: _Subject) -> Facts:
-    """How the bus is set, and where the profile is from."""
+    """Settings of the bus, and the PROFILE argument."""
     bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
     setup = (one for one in bus.setup_figures if one.key in bus.facts)
 
@@ -164,7 +164,7 @@ def _facts(subject: _Subject) -> Facts:
 def _commands(found: Sources) -> Chapter:
     columns = (TableColumn("what", kind="words"), TableColumn("command", kind="words"))
     rows = tuple(TableRow((source.command.purpose, source.command)) for source in found.values())
-    line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
+    line = "The JSON document of one of these commands has each figure above, with all its digits."
     table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
     return Chapter(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
 
