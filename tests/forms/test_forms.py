@@ -41,7 +41,7 @@ from busplan.forms.blocks import (
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
 from busplan.forms.lines import Line, Mark
-from busplan.forms.numbers import decimals_of, period
+from busplan.forms.numbers import decimals_of, period, with_unit
 from busplan.forms.terminal import block_lines
 
 MARGIN = ShownValue(3.96912, "margin_us", "us", 3, at="/margin_us")
@@ -322,3 +322,8 @@ def test_periods_keep_their_digits(value_us: float, written: str) -> None:
 
 def test_numbers_too_small_for_their_decimals_keep_their_digits() -> None:
     assert (decimals_of(1234.5678, 3), decimals_of(0.0, 3), decimals_of(-0.0004, 3)) == ("1234.568", "0.000", "-0.0004")
+
+
+def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None:
+    with pytest.raises(KeyError):
+        with_unit(ShownValue(1.0, "margin_us", "mm"))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def complete_figure(incomplete: str) -> list[str]:
-    """Figures that begin as typed, for the shell's completion."""
+    """Complete the name of a figure for the shell."""
     from busplan.analysis.register import figures_of
     from busplan.buses import kind_named, kind_names
 
@@ -119,7 +119,7 @@ def _transactions(asked: str | None, profile: "Profile") -> "Sequence[str] | Non
 
 
 def _refuse_without_figure(options: "dict[str, object]") -> None:
-    """Refuse options that say which derivation of a figure, where there is none."""
+    """Refuse options of a derivation without a figure."""
     given = [name for name, value in options.items() if value]
     if given:
         raise BusplanError(f"{' and '.join(given)}: goes with a FIGURE, as in busplan explain PROFILE required_us")

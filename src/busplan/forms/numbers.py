@@ -9,14 +9,14 @@ from busplan.forms.blocks import ShownValue
 MISSING: Final = "-"
 _DIGITS: Final = 12
 """Most digits of a number; further ones are float rounding."""
-_FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6}
-"""Factor from the unit of a key to the unit it is written in."""
+_FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6, ("us", "us/byte"): 1.0}
+"""Factor from the unit of a key to the unit it is written in; the key `per_byte_us` is in us/byte."""
 _MILLISECOND_US: Final = 1e3
 _SECOND_US: Final = 1e6
 _SILENT: Final = frozenset(("", "1", "nodes", "axes"))
 """Units that a sentence does not repeat behind a figure: a noun names them."""
-_ROUNDING_UM: Final = 1e-6
-"""Smaller lengths, in um, are float rounding: a picometre."""
+ROUNDING_UM: Final = 1e-6
+"""Lengths below a picometre, in um, are float rounding."""
 
 
 def figure_text(value: ShownValue) -> str:
@@ -118,12 +118,20 @@ def nouns(number: int, noun: str) -> str:
     return f"{noun.removesuffix('is')}es" if noun.endswith("is") else f"{noun}s"
 
 
+def _factor(value: ShownValue) -> float:
+    """Factor to the unit a value is written in; KeyError for an unknown pair. A key without a unit has that unit."""
+    own = unit_of(value.key)
+    if own == value.unit or not value.unit or (not own and value.unit != "%"):
+        return 1.0
+    return _FACTORS[own, value.unit]
+
+
 def _number(value: ShownValue) -> str:
-    factor = _FACTORS.get((unit_of(value.key), value.unit), 1.0)
+    factor = _factor(value)
     number = value.value if factor == 1.0 else value.value * factor
     if isnan(number):
         return MISSING
-    if value.unit == "um" and abs(number) < _ROUNDING_UM:
+    if value.unit == "um" and abs(number) < ROUNDING_UM:
         number = 0.0
     if value.decimals is not None:
         # Adding 0.0 turns -0.0 into 0.0.

@@ -40,6 +40,17 @@ def round_steps(near: float) -> tuple[RoundStep, ...]:
     return tuple(RoundStep(factor, power + more) for more in (-1, 0, 1) for factor in (1, 2, 5))
 
 
+def ring_step(largest: float) -> float:
+    """Round step that divides up to `largest` into two to five parts.
+
+    Examples
+    --------
+    >>> ring_step(3.0), ring_step(12.0)
+    (1.0, 5.0)
+    """
+    return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
+
+
 def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
     """Tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
 

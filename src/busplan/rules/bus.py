@@ -1,4 +1,4 @@
-"""Rules that hold for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
+"""Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
 
 from collections.abc import Iterator
 from math import ceil
@@ -29,7 +29,7 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The bus carries fewer further nodes than [limits] asks for."""
+    """The bus carries fewer further nodes than [limits] requires."""
     limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
     spare = one.max_nodes - one.nodes
     if limit is not None and spare < limit:
@@ -37,7 +37,7 @@ def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The bus carries fewer further axes than [limits] asks for."""
+    """The bus carries fewer further axes than [limits] requires."""
     limit, one = subject.profile.limits.min_spare_axes, subject.deciding
     spare = one.max_axes - one.axes
     if limit is not None and spare < limit:
@@ -50,7 +50,7 @@ def _spare(spare: int, limit: int, one: RuleFigures) -> str:
 
 
 def _room(subject: RuleSubject, nodes: int) -> str:
-    """What limits the nodes, and how that many would have room."""
+    """What limits the nodes, and how to make room for a number of them."""
     one = subject.deciding
     limit = bus_of(subject.profile).limit(one.limited_by)
     cure = subject.room(nodes) if limit is None else limit.way_out
@@ -58,7 +58,7 @@ def _room(subject: RuleSubject, nodes: int) -> str:
 
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """An execution time that nobody has measured."""
+    """The execution time is an assumption."""
     if subject.profile.node.execution.grade == "assumed":
         yield RuleProblem(
             "node.execution.grade",
@@ -73,8 +73,8 @@ RULES: Final = (
         "error",
         "the cycle does not fit its time slice",
         "Under the timing model that decides (bus.timing_model), all terms of one cycle together (equation 2) take "
-        "longer than slice_ratio * period_us (equation 1). The message names the cheapest cure: a setting of the "
-        "bus needs no new parts, the slice ratio is computing time of the host, the period is what the machine is for.",
+        "longer than slice_ratio * period_us (equation 1). The message names the cheapest cure: a setting of the bus "
+        "costs nothing, the slice ratio costs computing time of the host, the period costs machine performance.",
         slice_overrun,
     ),
     Rule(
@@ -83,7 +83,7 @@ RULES: Final = (
         "error",
         "the slice is fuller than limits.max_utilisation",
         "[limits] max_utilisation keeps a share of the slice free, for retries, growth and what the model does "
-        "not know.",
+        "not cover.",
         over_utilisation,
     ),
     Rule(
@@ -91,7 +91,7 @@ RULES: Final = (
         "too-few-spare-nodes",
         "error",
         "fewer nodes to spare than limits.min_spare_nodes",
-        "[limits] min_spare_nodes asks that the bus could carry so many nodes more at the same period.",
+        "[limits] min_spare_nodes is the number of further nodes that the bus must carry at the same period.",
         too_few_spare_nodes,
     ),
     Rule(
@@ -99,7 +99,7 @@ RULES: Final = (
         "too-few-spare-axes",
         "error",
         "fewer axes to spare than limits.min_spare_axes",
-        "[limits] min_spare_axes asks that the bus could carry so many axes more at the same period.",
+        "[limits] min_spare_axes is the number of further axes that the bus must carry at the same period.",
         too_few_spare_axes,
     ),
     Rule(

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from importlib import import_module
-from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from busplan.rules.report import CheckReport
@@ -10,9 +10,6 @@ if TYPE_CHECKING:
 
 class GateFormat(ABC):
     """One format of the gate's report."""
-
-    is_for_people: ClassVar[bool] = False
-    """If True, it is written in the encoding of the terminal; otherwise in UTF-8."""
 
     @abstractmethod
     def write(self, report: "CheckReport") -> str:
@@ -30,18 +27,18 @@ class Registered(NamedTuple):
     """Module in this folder."""
     name: str
     """Name of the class."""
-    is_for_builds: bool = False
-    """Whether it is for a build service."""
+    reader: Literal["people", "programs", "builds"]
+    """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
 
 
 FORMATS: Final[dict[str, Registered]] = {
-    "text": Registered("plain", "Text"),
-    "full": Registered("plain", "Full"),
-    "json": Registered("documents", "Json"),
-    "github": Registered("github", "GitHub", is_for_builds=True),
-    "gitlab": Registered("documents", "GitLab", is_for_builds=True),
-    "junit": Registered("junit", "JUnit", is_for_builds=True),
-    "sarif": Registered("sarif", "Sarif", is_for_builds=True),
+    "text": Registered("plain", "Text", "people"),
+    "full": Registered("plain", "Full", "people"),
+    "json": Registered("documents", "Json", "programs"),
+    "github": Registered("github", "GitHub", "builds"),
+    "gitlab": Registered("documents", "GitLab", "builds"),
+    "junit": Registered("junit", "JUnit", "builds"),
+    "sarif": Registered("sarif", "Sarif", "builds"),
 }
 """Every format by its name, in the order of the help."""
 

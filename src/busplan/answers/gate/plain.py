@@ -26,8 +26,6 @@ def finding_line(path: str, finding: Finding) -> str:
 class Text(GateFormat):
     """One line for each finding."""
 
-    is_for_people = True
-
     def write(self, report: CheckReport) -> str:
         """Write the lines."""
         return "".join(f"{finding_line(one.path, one.finding)}\n" for one in report.located)
@@ -35,8 +33,6 @@ class Text(GateFormat):
 
 class Full(GateFormat):
     """Each finding with its line of the file and a caret below its column."""
-
-    is_for_people = True
 
     def write(self, report: CheckReport) -> str:
         """Write the lines of each finding."""
