@@ -1,7 +1,7 @@
 """busplan: does this motion network fit its period, and how many axes can it carry?
 
 Each function takes a profile (a `Profile`, a path or a shipped name) and gives a frozen answer: figures as typed
-attributes, the report as text, the document of `--format json` by `to_dict()`. What is wrong is a `BusplanError`.
+attributes, the report as text, the document of `--format json` by `to_dict()`. Errors are `BusplanError`s.
 
 Examples
 --------
@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     from busplan.errors import BusplanError
     from busplan.sections.profile import Profile
 else:
-    # Loaded when they are first asked for: the command line imports this package too, and must not pay. Type checkers
-    # do not see it, so that a name that is not there stays an error to them.
+    # Loaded at first use, because the command line imports this package, too. Hidden from type checkers, so that they
+    # report unknown names.
     _HOMES = {
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",

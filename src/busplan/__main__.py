@@ -6,12 +6,11 @@ import os
 
 
 def main() -> None:
-    """Run the command line without what makes a short run slow.
+    """Run the command line, tuned for short runs.
 
-    Imports make many objects that live as long as the process: collecting among them, and once more at exit, costs a
-    fifth of a short run. The collector stays on for what a long run may leave behind. Looking through all installed
-    packages for plugins of pydantic costs as much as the whole calculation; such a plugin could change what a profile
-    is taken for, so none is loaded.
+    Garbage collection during imports and at exit takes a fifth of a short run, so its threshold is raised; it stays on
+    for long runs. Searching all installed packages for pydantic plugins takes as long as the calculation, and a plugin
+    could change how profiles are validated, so plugins are disabled.
     """
     gc.set_threshold(500_000)
     atexit.register(gc.freeze)
@@ -20,7 +19,7 @@ def main() -> None:
         from busplan.cli import run
 
         run()
-    except KeyboardInterrupt:  # before the command line is there to catch it
+    except KeyboardInterrupt:  # before the command line can catch it
         raise SystemExit(130) from None
 
 

@@ -1,16 +1,16 @@
-"""The one exception that stops a run, and its form for what stands at a place of a file."""
+"""Errors for the user, with and without a place in a file."""
 
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple
 
 
 class BusplanError(Exception):
-    """Something the user can mend: bad input, bad usage, an unreadable file.
+    """An error that the user can fix: bad input, bad usage, an unreadable file.
 
     Parameters
     ----------
     *problems
-        One complete message each: what was wrong, where, the value, and what would be right.
+        One complete message each: what is wrong, where, the value, and what would be right.
         All problems of one input are reported together.
     """
 
@@ -26,34 +26,34 @@ class WorkerLostError(BusplanError):
 ProblemKind = Literal[
     "syntax", "unknown-key", "missing-key", "wrong-type", "out-of-range", "inconsistent", "execution-unknown"
 ]
-"""What is wrong with a file, in the terms of its gate."""
+"""Kind of a problem; each has a rule of the gate."""
 
 
 _MOST_SHOWN: Final = 50
 
 
 class PlacedProblem(NamedTuple):
-    """One thing that is wrong at one place of a file; lines and columns count from 1."""
+    """One problem at one place of a file; lines and columns count from 1."""
 
     line: int
     column: int
     kind: ProblemKind
     message: str
     key: str = ""
-    """Dotted key, where the problem has one."""
+    """Dotted key; empty if the problem has none."""
 
 
 class PlacedError(BusplanError):
-    """A file that is no profile, with the place of everything that is wrong in it.
+    """An invalid file, with all its problems and their places.
 
     Parameters
     ----------
     name
-        What the file is called.
+        Name of the file.
     problems
-        At least one, in the order of their places; the first ones of very many are listed.
+        At least one, in the order of their places; of very many, only the first ones are listed.
     hidden
-        How many further problems are not even given.
+        Number of further problems that are not in `problems`.
     """
 
     def __init__(self, name: str, problems: tuple[PlacedProblem, ...], *, hidden: int = 0) -> None:
@@ -66,7 +66,7 @@ class PlacedError(BusplanError):
         self.hidden = hidden
 
     def __reduce__(self) -> tuple[Callable[..., "PlacedError"], tuple[object, ...]]:
-        """Travel between processes as what it was made of: an exception by itself travels as its message."""
+        """Pickle with all arguments; by default, an exception is pickled with its message only."""
         return _remade, (self.name, self.placed, self.hidden)
 
 

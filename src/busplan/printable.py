@@ -1,18 +1,18 @@
-"""What is text, and what commands a terminal: the one place that decides it, and writes the latter so that it is seen.
+"""Make text safe to show: escape control characters.
 
-A file may be called anything. An escape sequence, a DEL, a C1 control or a mark that turns the direction of writing
-would be obeyed by the terminal, the log or the editor that shows the name.
+A file may have any name. A terminal, log or editor that shows the name would obey an escape sequence, a DEL, a C1
+control or a mark of writing direction in it.
 """
 
 from collections.abc import Callable
 
 
-def commands(text: str) -> bool:
-    r"""Tell whether a text holds anything but what is shown as itself: a control, a line end, a mark of direction.
+def has_controls(text: str) -> bool:
+    r"""Whether a text has a control character, a line end or a mark of writing direction.
 
     Examples
     --------
-    >>> commands("p.toml"), commands("p\x9b2J.toml"), commands("p\u202e.toml")
+    >>> has_controls("p.toml"), has_controls("p\x9b2J.toml"), has_controls("p\u202e.toml")
     (False, True, True)
     """
     return not text.isprintable()
@@ -23,48 +23,48 @@ def _escape(character: str) -> str:
 
 
 def json_escape(text: str) -> str:
-    """Write every character of a text as JSON escapes it."""
+    """Write every character of a text as a JSON escape."""
     units = text.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
 
 
 def printable(text: str, *, write: Callable[[str], str] = _escape) -> str:
-    r"""Make one line that commands no terminal, whatever a file or key is called.
+    r"""Escape the control characters of a text; the result is one line.
 
     Parameters
     ----------
     text
         Any text.
     write
-        How to write a character that commands; without it, as Python escapes it.
+        How to escape one character; by default as Python does.
 
     Examples
     --------
     >>> print(printable("p\x1b[2J.toml"))
     p\x1b[2J.toml
     """
-    return "".join(write(one) if commands(one) else one for one in text) if commands(text) else text
+    return "".join(write(one) if has_controls(one) else one for one in text) if has_controls(text) else text
 
 
 def printable_lines(text: str, *, write: Callable[[str], str] = _escape) -> str:
-    """Make lines that command no terminal: as `printable`, and line ends stay."""
+    """Escape the control characters of a text, as `printable`, but keep its line ends."""
     return "\n".join(printable(line, write=write) for line in text.split("\n"))
 
 
 def json_text(value: object, *, indent: int | None = None) -> str:
-    r"""Write a value as JSON that commands no terminal, and reads to the same value.
+    r"""Write a value as JSON without control characters; it parses to the same value.
 
     Parameters
     ----------
     value
         Plain data.
     indent
-        Blanks of each level; without it, all is one line.
+        Spaces of each level; by default, everything is on one line.
 
     Raises
     ------
     ValueError
-        A number is not finite: such a document must not leave the program.
+        A number is not finite.
 
     Examples
     --------
@@ -73,5 +73,5 @@ def json_text(value: object, *, indent: int | None = None) -> str:
     """
     import json  # noqa: PLC0415 - most runs write none
 
-    # Inside a text JSON escapes line ends itself: those that are left are the layout's.
+    # JSON escapes line ends inside strings; those that are left belong to the layout.
     return printable_lines(json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False), write=json_escape)

@@ -1,6 +1,6 @@
-"""How work that takes long tells how far it is."""
+"""Progress of long work."""
 
 from collections.abc import Callable
 
 Progress = Callable[[int, int], None]
-"""Called now and then with the work done and the work to do."""
+"""Called from time to time with the work done and the total work."""

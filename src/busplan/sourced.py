@@ -1,4 +1,4 @@
-"""Numbers and equations that carry where they come from, and numbers how well they are known."""
+"""Numbers and equations with their sources, and numbers with a grade of certainty."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -30,7 +30,7 @@ class Sourced(float):
     meaning
         What the number is, in one line.
     symbol
-        What stands for it in formulas; without one its value does.
+        Symbol in formulas; without one, formulas show the value.
 
     Examples
     --------
@@ -49,7 +49,7 @@ class Sourced(float):
     meaning: str
     symbol: str
     name: str
-    """Its name among the constants of its module; until they are listed, what it means."""
+    """Name among the constants of its module; `meaning` until `constants` is called."""
 
     def __new__(cls, value: float, *, unit: str, grade: Grade, source: str, meaning: str, symbol: str = "") -> Self:
         """Make the number; see the class."""
@@ -64,7 +64,7 @@ class Sourced(float):
 
 
 def constants(namespace: Mapping[str, object]) -> Mapping[str, Sourced]:
-    """List the sourced numbers of a module by name, and tell each its name.
+    """List the sourced numbers of a module by name, and set their `name`.
 
     Parameters
     ----------
@@ -88,13 +88,13 @@ class Equation(NamedTuple):
     Parameters
     ----------
     numbers
-        Number of the equation; several where they share the part.
+        Number of the equation; several if they share the part.
     symbol
-        What it gives, as the source writes it.
+        Symbol of the result in the source.
     section
         Where it stands in the source.
     part
-        What of the equation it is; empty for all of it.
+        Part of the equation; empty for all of it.
     function
         The function itself.
     """
@@ -107,28 +107,28 @@ class Equation(NamedTuple):
 
     @property
     def reference(self) -> str:
-        """Its numbers as a table shows them: (6) or (4)-(6)."""
+        """Numbers of the equation as in tables: (6) or (4)-(6)."""
         first, last = self.numbers[0], self.numbers[-1]
         return f"({first})" if first == last else f"({first})-({last})"
 
     @property
     def source(self) -> str:
-        """Where it comes from, in words."""
+        """Source in words."""
         noun = "equation" if len(self.numbers) == 1 else "equations"
         whole = f"Paper, section {self.section}, {noun} {self.reference}"
         return f"{whole}; {self.part}" if self.part else whole
 
 
 EQUATIONS: Final[dict[str, Equation]] = {}
-"""Every function that computes an equation, by its name; the modules of equations fill it."""
+"""Equations by the name of their function; filled by `published`."""
 SYMBOLS: Final[dict[str, str]] = {}
-"""What stands for a quantity in the equations, by its name here; the modules of equations fill it."""
+"""Symbols of quantities by parameter name; filled by the modules of equations."""
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def published(*numbers: int, symbol: str, section: str, part: str = "") -> Callable[[_Function], _Function]:
-    """Enter a function into `EQUATIONS`, and its source into its docstring.
+    """Decorator that adds a function to `EQUATIONS`, and its source to its docstring.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def published(*numbers: int, symbol: str, section: str, part: str = "") -> Calla
     def enter(function: _Function) -> _Function:
         equation = Equation(numbers, symbol, section, part, function)
         EQUATIONS[function.__name__] = equation
-        if function.__doc__:  # python -OO takes docstrings away
+        if function.__doc__:  # python -OO removes docstrings
             before, indent, examples = re.split(r"(?m)^( *)(?=Examples\n)", function.__doc__, maxsplit=1)
             references = "".join(f"{indent}{line}\n" for line in ("References", "----------", f"{equation.source}."))
             function.__doc__ = f"{before}{references}\n{indent}{examples}"

@@ -321,7 +321,7 @@ def test_periods_models_and_transactions_multiply() -> None:
     ],
 )
 def test_what_a_figure_has_no_choice_of_is_refused(name: str, asked: Any) -> None:
-    with pytest.raises(BusplanError, match=r"no other, paper|no figure of latency|no one of them"):
+    with pytest.raises(BusplanError, match=r"no other, paper|not a figure of latency|no timing model of its own"):
         explain(load("paper-4ms").profile, name, **asked)
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.analysis.derivation.formulas import formula_of, written
+from busplan.analysis.derivation.formulas import formula_of, formula_text
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.buses import time_slice
@@ -97,11 +97,11 @@ EXPRESSION = st.recursive(
 def test_any_expression_reads_back_as_its_value_in_numbers_and_in_symbols(expression: Any) -> None:
     if not isinstance(expression, Traced):
         return
-    in_numbers = written(expression, in_numbers=True)
+    in_numbers = formula_text(expression, in_numbers=True)
     if expression.operation:
         assert eval(in_numbers) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
         symbols = {f"x{value}": float(value) for value in range(1, 10)}
-        in_symbols = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", written(expression, in_numbers=False))
+        in_symbols = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", formula_text(expression, in_numbers=False))
         assert eval(in_symbols, symbols) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
 
 
@@ -117,10 +117,10 @@ def test_it_compares_as_its_value_does(one: float, other: float) -> None:
 def test_a_choice_is_written_as_what_was_chosen_and_rests_on_what_decided() -> None:
     x, y = number(3.0, "x"), number(2.0, "y")
     for chosen in (choose(y > 1, x, 9.0), choose(y > 2, 9.0, x)):
-        assert (written(chosen, in_numbers=False), chosen.value) == ("x", 3.0)
+        assert (formula_text(chosen, in_numbers=False), chosen.value) == ("x", 3.0)
         assert [one.symbol for one in inputs(chosen)] == ["x", "y"]
     plain = choose(x > 2, 9.0, x)
-    assert (written(plain, in_numbers=False), plain.value) == ("9", 9.0)
+    assert (formula_text(plain, in_numbers=False), plain.value) == ("9", 9.0)
     assert [one.symbol for one in inputs(plain)] == ["x"]
 
 
@@ -139,5 +139,5 @@ def test_lines_and_inputs_are_listed_once_and_in_order() -> None:
     second = (first + first * x).named("second_us", "B")
     assert [one.key for one in lines(second)] == ["first_us", "second_us"]
     assert [one.symbol for one in inputs(second)] == ["x", "y"]
-    assert written(second, in_numbers=False) == "A + A x"
+    assert formula_text(second, in_numbers=False) == "A + A x"
     assert math.isclose(second.value, 18.0)

@@ -18,14 +18,14 @@ def test_a_float_that_is_whole_may_stand_for_a_count() -> None:
     ("values", "message"),
     [
         ([], "nodes: no values; give at least one"),
-        ([1, True], "nodes: True is no finite number"),
-        ([float("nan")], "nodes: nan is no finite number"),
-        ([float("inf")], "nodes: inf is no finite number"),
-        (["best"], "nodes: 'best' is no finite number"),
-        (["optimal"], "nodes: 'optimal' is no finite number"),
-        ([None], "nodes: None is no finite number"),
-        ([[1]], "nodes: [1] is no finite number"),
-        ([1, 2, 1.0], "nodes: 1.0 is there twice"),
+        ([1, True], "nodes: True is not a finite number"),
+        ([float("nan")], "nodes: nan is not a finite number"),
+        ([float("inf")], "nodes: inf is not a finite number"),
+        (["best"], "nodes: 'best' is not a finite number"),
+        (["optimal"], "nodes: 'optimal' is not a finite number"),
+        ([None], "nodes: None is not a finite number"),
+        ([[1]], "nodes: [1] is not a finite number"),
+        ([1, 2, 1.0], "nodes: 1.0 is given twice"),
     ],
 )
 def test_what_is_no_value_is_refused(values: list[object], message: str) -> None:

@@ -13,10 +13,10 @@ from busplan.answers.circle import circle_document, circle_records, circle_repor
 from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
 from busplan.answers.circle_verdict import circle_sentences, servo_sentence
 from busplan.forms import render
-from busplan.forms.blocks import Bar, Chart, Report, Sentence, Table, Value, values_in
+from busplan.forms.blocks import Bar, Chart, Report, Sentence, ShownValue, Table, values_in
 from busplan.forms.columns import sentence_text
 from busplan.forms.json_document import to_json
-from busplan.forms.numbers import written
+from busplan.forms.numbers import figure_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 
@@ -59,11 +59,11 @@ def test_each_period_has_a_column(form: str) -> None:
     assert [column.heading for column in table.columns] == ["figure", "eq", "unit", "4 ms", "2 ms", "100 us"]
     rows = {str(row.cells[0]): row.cells for row in table.rows}
     for cells in rows.values():
-        places = [cell.at for cell in cells if isinstance(cell, Value)]
+        places = [cell.at for cell in cells if isinstance(cell, ShownValue)]
         assert [place.split("/")[2] for place in places] == ["0", "1", "2"]
-    assert [written(cell) for cell in rows["passed"] if isinstance(cell, Value)] == ["yes", "yes", "no"]
+    assert [figure_text(cell) for cell in rows["passed"] if isinstance(cell, ShownValue)] == ["yes", "yes", "no"]
     # What was not simulated is a dash; only what fails is set apart.
-    assert [written(cell) for cell in rows["circular deviation G"] if isinstance(cell, Value)][2] == "-"
+    assert [figure_text(cell) for cell in rows["circular deviation G"] if isinstance(cell, ShownValue)][2] == "-"
     assert [value for value in values_in(table) if value.state == "fails"] == [rows["passed"][-1]]
     assert "nan" not in render(circle_report(test, with_contributions=True), form).lower()  # type: ignore[arg-type]
 
@@ -168,7 +168,7 @@ def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> Non
     removed = [one.removed_mm for one in result.contributions or ()]
     assert {(bar.least, bar.most) for bar in bars} == {(min(0.0, *removed), max(0.0, *removed))}
     assert removed == sorted(removed, reverse=True)
-    assert written(takes[0]).startswith("+")  # type: ignore[arg-type]
+    assert figure_text(takes[0]).startswith("+")  # type: ignore[arg-type]
 
 
 def test_sources_that_take_nothing_have_no_bar() -> None:

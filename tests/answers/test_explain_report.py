@@ -10,7 +10,7 @@ from busplan.answers.assumptions import assumptions_report, assumptions_table
 from busplan.answers.explain import explain_report
 from busplan.buses import kind_named
 from busplan.forms import render
-from busplan.forms.blocks import Calculation, Chapter, Code, Report, Table, Value, Words, values_in
+from busplan.forms.blocks import Calculation, Chapter, Code, Report, ShownValue, Table, Words, values_in
 from busplan.forms.columns import sentence_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
@@ -86,7 +86,7 @@ def test_the_assumptions_are_a_table_of_their_own(values_in_their_places: Callab
     for row, one in zip(table.rows, found, strict=True):
         name, value, *others = row.cells
         assert (name, others) == (Code(one.name), [one.unit, one.grade, one.source, one.meaning])
-        assert isinstance(value, Value)
+        assert isinstance(value, ShownValue)
         assert (value.value, value.unit) == (one.value, one.unit)
     text = render(report, "table")
     assert text.startswith("What the figures of paper-4ms rest on, the least well known first\n")

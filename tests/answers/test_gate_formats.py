@@ -87,7 +87,7 @@ def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
     made = [gate_format(name) for name in FORMATS]
     assert len({type(one) for one in made}) == len(made) == 7
     assert all(isinstance(one, GateFormat) for one in made)
-    assert [name for name, one in zip(FORMATS, made, strict=True) if one.is_for_people] == ["text", "full"]
+    assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["text", "full"]
     code = (
         "import sys; from busplan.answers.gate import gate_format; gate_format(sys.argv[1])\n"
         "print(*sorted(name for name in sys.modules if name.startswith('busplan.answers.gate.')))"

@@ -10,7 +10,7 @@ from busplan.answers.paper import paper_document, paper_report
 from busplan.answers.profiles import profiles_report
 from busplan.answers.rules import rule_report, rules_report
 from busplan.forms import render
-from busplan.forms.blocks import Chapter, Report, Snippet, Table, Value, values_in
+from busplan.forms.blocks import Chapter, Report, ShownValue, Snippet, Table, values_in
 from busplan.profile.shipped import load, shipped_names
 from busplan.rules.registry import NEVER_SUPPRESSED, all_rules
 
@@ -69,4 +69,4 @@ def test_a_rule_is_explained_with_what_suppresses_it(code: str) -> None:
         assert snippets == []
     else:
         assert snippets == [Snippet((f"# busplan: ignore[{code}] reason",))]
-    assert not any(isinstance(value, Value) for value in values_in(tuple(report.blocks())))
+    assert not any(isinstance(value, ShownValue) for value in values_in(tuple(report.blocks())))

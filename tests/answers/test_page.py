@@ -26,7 +26,7 @@ from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.drawings.axes import AxesDrawing, drawn_range
 from busplan.drawings.terms import LEFT, TermsDrawing
 from busplan.forms import render
-from busplan.forms.blocks import Chapter, Report, Table, Value, values_in
+from busplan.forms.blocks import Chapter, Report, ShownValue, Table, values_in
 from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.inks import INKS
 from busplan.forms.signed_bar import signed_bar
@@ -194,7 +194,7 @@ def test_a_column_holds_the_figures_of_its_timing_model_and_transaction() -> Non
         for row in table.rows:
             for column, cell in zip(table.columns, row.cells, strict=True):
                 model = next((one for one in (column.heading, column.group) if one in ("paper", "standard")), None)
-                if isinstance(cell, Value) and model is not None:
+                if isinstance(cell, ShownValue) and model is not None:
                     owner = at(found[cell.command], "/".join(cell.at.split("/")[:3]))
                     assert owner["timing_model"] == model
                     assert owner.get("transaction", "") in column.group
@@ -207,10 +207,10 @@ def test_a_row_of_periods_holds_the_figures_of_its_period() -> None:
     source = documents(subject)["p1-axes"]
     (table,) = (block for block in parts(report)["axes"].blocks if isinstance(block, Table))
     for row in table.rows:
-        figures = [cell for cell in row.cells if isinstance(cell, Value)]
+        figures = [cell for cell in row.cells if isinstance(cell, ShownValue)]
         periods = {at(source, "/".join(cell.at.split("/")[:3]))["period_us"] for cell in figures}
         assert periods == {figures[0].value}
-    assert [cell_text(row.cells[0]) for row in table.rows if row.sought] == ["4000"]
+    assert [cell_text(row.cells[0]) for row in table.rows if row.highlighted] == ["4000"]
 
 
 def test_all_forms_say_the_same() -> None:

@@ -8,7 +8,7 @@ import pytest
 from busplan.analysis.planning.options import plan
 from busplan.answers.plan import plan_document, plan_records, plan_report, settings
 from busplan.forms import render
-from busplan.forms.blocks import Report, Table, TableRow, Value, Words, values_in
+from busplan.forms.blocks import Report, ShownValue, Table, TableRow, Words, values_in
 from busplan.forms.columns import cell_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
@@ -74,7 +74,7 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
         return () if profile.cycle.period_us > 3000 else ("rough",)
 
     found = report(paper, circle, max_circles=3)
-    (recommended,) = (row for row in rows(found) if row.sought)
+    (recommended,) = (row for row in rows(found) if row.highlighted)
     assert recommended.cells[:2] == ("cheapest that meets both models", "*?")
     marks = {str(row.cells[0]): row.cells[1] for row in rows(found)}
     assert [title for title, mark in marks.items() if "*" in str(mark)] == ["cheapest that meets both models"]
@@ -85,7 +85,7 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
         said = render(found, form)
         assert "* recommended." in said
         assert "? not proven" in said
-    (proven,) = (row for row in rows(report(paper)) if row.sought)
+    (proven,) = (row for row in rows(report(paper)) if row.highlighted)
     assert proven.cells[:2] == ("as it is", "*")
     assert "not proven" not in text(paper)
     assert "recommended" not in text(paper, circle=lambda _: ("the circle is an egg",), max_circles=2)
@@ -99,7 +99,7 @@ def test_what_fails_is_set_apart(paper: Profile) -> None:
     assert first.cells[5] == Words("FAILS", "fails")
     result = plan(paper, wanted={"bus.nodes": 4})
     for row, option in zip(rows(plan_report(result, with_circle=False)), result.options, strict=True):
-        margins = [cell for cell in row.cells if isinstance(cell, Value) and "margin" in cell.key]
+        margins = [cell for cell in row.cells if isinstance(cell, ShownValue) and "margin" in cell.key]
         assert [margin.state == "fails" for margin in margins] == [
             not one.fits for one in (option.deciding, *option.others)
         ]

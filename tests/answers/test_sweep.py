@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from busplan.analysis.capacity.figures import capacity
-from busplan.analysis.sweep.blocks import Block, Column, figure_names, sweep
+from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
 from busplan.answers.capacity import capacity_records
 from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
@@ -17,7 +17,7 @@ from busplan.answers.sweep.top import Tally, TopRows, sweep_report
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.forms import html, markdown, terminal
-from busplan.forms.blocks import Report, Table, Value, values_in
+from busplan.forms.blocks import Report, ShownValue, Table, values_in
 from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
@@ -34,7 +34,7 @@ AXES: dict[str, Values] = {
 }
 
 
-def blocks(chunk_points: int = 5) -> list[Block]:
+def blocks(chunk_points: int = 5) -> list[SweepBlock]:
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, AXES, with_circle=False)
     return list(sweep(profile, grid, timing_models=BOTH, chunk_points=chunk_points))
@@ -194,7 +194,10 @@ def test_a_row_that_does_not_fit_says_so_and_columns_are_the_registers() -> None
         *((name, "") for name in COLUMNS[4:]),
     ]
     fits = [row.cells[5] for row in table.rows]
-    assert {(one.value, one.state) for one in fits if isinstance(one, Value)} == {(False, "fails"), (True, "neutral")}
+    assert {(one.value, one.state) for one in fits if isinstance(one, ShownValue)} == {
+        (False, "fails"),
+        (True, "neutral"),
+    }
 
 
 def test_the_rows_of_the_answer_are_a_table_in_every_form_for_people() -> None:

@@ -255,7 +255,7 @@ class Shout(GateFormat):
 module = ModuleType("busplan.answers.gate.shout")
 module.Shout = Shout
 sys.modules[module.__name__] = module
-FORMATS["shout"] = Registered("shout", "Shout", is_for_builds=True)
+FORMATS["shout"] = Registered("shout", "Shout", "builds")
 from busplan.__main__ import main
 main()
 """

@@ -216,7 +216,7 @@ def test_what_is_no_regular_file_is_not_replaced(tmp_path: Path, name: str) -> N
     (tmp_path / "link").symlink_to("pipe")
     with pytest.raises(BusplanError) as caught:
         write_file(tmp_path / name, b"new", overwrite=True)
-    assert str(caught.value) == f"{tmp_path / name}: cannot be written: is no regular file"
+    assert str(caught.value) == f"{tmp_path / name}: cannot be written: is not a regular file"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "pipe"]
     assert (tmp_path / "pipe").is_fifo()
 

@@ -100,14 +100,14 @@ def test_what_would_be_another_file_is_refused_by_name(
     before = path.read_bytes()
     if what == "hard link":
         (tmp_path / "q.toml").hardlink_to(path)
-        words = f"{path.name}: has 2 hard links, which a new file would part; make a copy of it, and change that"
+        words = f"{path.name}: has 2 hard links, which replacing it would break; copy it and change the copy"
     elif what == "read-only":
         path.chmod(0o444)
         words = f"{path.name}: is read-only (mode 0444) and stays as it is; make it writable first"
     else:
         path.unlink()
         os.mkfifo(path)
-        words = f"{path.name}: is no regular file, so it cannot be changed"
+        words = f"{path.name}: is not a regular file, so it cannot be changed"
     assert refused(*change.command, cwd=tmp_path) == words
     assert path.is_fifo() or path.read_bytes() == before
 

@@ -172,7 +172,7 @@ def test_no_bytes_go_to_a_terminal(on_terminal: Callable[..., tuple[int, str]], 
     code, shown = on_terminal("timeline", "paper-4ms", "--format", "png", cwd=tmp_path)
     assert (code, shown) == (
         2,
-        "--format png: is no text for a terminal; give -o FILE.png, or send it down a pipe\n",
+        "--format png: is not text for a terminal; give -o FILE.png, or use a pipe\n",
     )
 
 
@@ -184,4 +184,4 @@ def test_a_working_folder_that_is_gone_is_said(run: Run, tmp_path: Path) -> None
         folder.mkdir()
         done = run(*arguments, cwd=folder, python=("-c", gone))
         assert (done.returncode, done.stdout) == (2, "")
-        assert done.stderr == "the working folder is no longer there; change into one that is\n"
+        assert done.stderr == "the working folder no longer exists; change into one that does\n"

@@ -26,13 +26,13 @@ from busplan.forms.blocks import (
     Report,
     SectionLink,
     Sentence,
+    ShownValue,
     Snippet,
     State,
     Swatch,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
     sentence,
     values_in,
@@ -41,11 +41,11 @@ from busplan.forms.blocks import (
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
 from busplan.forms.lines import Line, Mark
-from busplan.forms.numbers import decimals_of, period
+from busplan.forms.numbers import decimals_of, period, with_unit
 from busplan.forms.terminal import block_lines
 
-MARGIN = Value(3.96912, "margin_us", "us", 3, at="/margin_us")
-FAILED = Value(False, "fits", state="fails")
+MARGIN = ShownValue(3.96912, "margin_us", "us", 3, at="/margin_us")
+FAILED = ShownValue(False, "fits", state="fails")
 HOSTILE = "<b>*x*</b> | `y` [z](javascript:alert(1)) \x1b[2J"
 
 
@@ -77,9 +77,9 @@ def one_of_each(text: str = "text") -> Sequence[Block]:
             TableColumn("", kind="drawing"),
         ),
         (
-            TableRow((Code(text), MARGIN, Value(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
-            TableRow((SectionLink(text, "s", "x.toml"), Value(None), FAILED, ""), level=1),
-            TableRow((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), sought=True),
+            TableRow((Code(text), MARGIN, ShownValue(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
+            TableRow((SectionLink(text, "s", "x.toml"), ShownValue(None), FAILED, ""), level=1),
+            TableRow((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), highlighted=True),
             TableRow((Command("busplan capacity p", "what", "c"), sentence("{} of {}", MARGIN, Code(text)), "-", "")),
         ),
         sentence("A table of {}", Code(text)),
@@ -261,12 +261,12 @@ def test_a_page_and_a_comment_say_the_state_of_a_sentence_and_of_a_cell(state: S
 
 
 def test_the_row_that_is_sought_is_set_off_in_every_form_that_can() -> None:
-    table = Table((TableColumn("us"),), (TableRow((MARGIN,), sought=True), TableRow((MARGIN,))))
-    *_, sought, other = block_lines([table])
-    assert [mark.tone for mark in sought.marks] == ["heading"]
+    table = Table((TableColumn("us"),), (TableRow((MARGIN,), highlighted=True), TableRow((MARGIN,))))
+    *_, highlighted, other = block_lines([table])
+    assert [mark.tone for mark in highlighted.marks] == ["heading"]
     assert other.marks == ()
     assert render(answer(table), "markdown").count("**3.969**") == 1
-    assert render(answer(table), "html").count('<tr class="sought">') == 1
+    assert render(answer(table), "html").count('<tr class="highlighted">') == 1
 
 
 def test_columns_of_words_stand_to_the_left_wherever_they_are() -> None:
@@ -275,7 +275,7 @@ def test_columns_of_words_stand_to_the_left_wherever_they_are() -> None:
 
 
 def test_html_says_the_unit_of_the_exact_value_and_of_the_one_that_is_shown() -> None:
-    html = render(answer(Sentence((Value(0.0036, "mean_mm", "um", 3),))), "html")
+    html = render(answer(Sentence((ShownValue(0.0036, "mean_mm", "um", 3),))), "html")
     assert 'value="0.0036" data-unit="mm" data-shown-in="um">3.600</data> um' in html
 
 
@@ -284,7 +284,7 @@ def test_facts_without_a_fact_are_no_line() -> None:
 
 
 @pytest.mark.parametrize("parts", [(), (MARGIN, MARGIN)])
-def test_a_sentence_takes_as_many_parts_as_it_has_places(parts: tuple[Value, ...]) -> None:
+def test_a_sentence_takes_as_many_parts_as_it_has_places(parts: tuple[ShownValue, ...]) -> None:
     with pytest.raises(ValueError, match="zip"):
         sentence("{} to spare", *parts)
 
@@ -299,7 +299,9 @@ def test_json_and_csv_are_the_record() -> None:
 
 
 def test_what_is_no_one_table_has_no_csv() -> None:
-    with pytest.raises(BusplanError, match="CSV is one table, and this answer has several"):
+    with pytest.raises(
+        BusplanError, match="--format csv: this answer has several tables and CSV holds one; use --format json"
+    ):
         render(answer()._replace(records=None), "csv")
 
 
@@ -320,3 +322,8 @@ def test_periods_keep_their_digits(value_us: float, written: str) -> None:
 
 def test_numbers_too_small_for_their_decimals_keep_their_digits() -> None:
     assert (decimals_of(1234.5678, 3), decimals_of(0.0, 3), decimals_of(-0.0004, 3)) == ("1234.568", "0.000", "-0.0004")
+
+
+def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None:
+    with pytest.raises(KeyError):
+        with_unit(ShownValue(1.0, "margin_us", "mm"))

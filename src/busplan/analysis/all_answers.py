@@ -1,4 +1,4 @@
-"""Everything that is said of one profile on one page: each part by the function of its own command."""
+"""All answers for one profile, as a page shows them; each comes from the function of its command."""
 
 from typing import Final, NamedTuple
 
@@ -21,7 +21,7 @@ _PERIOD_FACTORS: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 class AllAnswers(NamedTuple):
-    """All answers of one profile; what cannot be computed is None, with the reason."""
+    """All answers for one profile; an answer that cannot be computed is None, with the reason."""
 
     profile: Profile
     capacity: Capacity
@@ -33,15 +33,15 @@ class AllAnswers(NamedTuple):
     steps: tuple[NodeSteps, ...]
     """Nodes over the period, under each timing model."""
     periods: Capacity
-    """Capacity at some periods about the profile's own, the own among them."""
+    """Capacity at several periods around and including the profile's own."""
     circle: CircleTest | None
-    """With its contributions, and without its simulation: that is condensed in `contour`."""
+    """The test with its contributions but without its simulation, which `contour` condenses."""
     contour: ContourProfile | None
-    """Contour error around the circle; None where the table did not follow it."""
+    """Contour error around the circle; None if the table did not follow it."""
     no_circle: tuple[str, ...]
-    """Why the circle test cannot be run; nothing where it was not asked for."""
+    """Why the circle test cannot be run; empty if it was not requested."""
     assumptions: tuple[Input, ...]
-    """What the figures rest on, the least well known first."""
+    """Inputs of the figures, the least well known first."""
 
     @property
     def circle_figures(self) -> CircleFigures | None:
@@ -50,7 +50,7 @@ class AllAnswers(NamedTuple):
 
 
 def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progress | None = None) -> AllAnswers:
-    """Compute what is to be said of a profile.
+    """Compute all answers for a profile.
 
     Parameters
     ----------
@@ -99,5 +99,5 @@ def _circle(
     except BusplanError as error:
         return None, None, error.problems
     (run,) = test.runs
-    # Half a million positions a profile are not kept: a page may have many.
+    # A simulation has half a million positions, and a page may have many profiles: keep only the condensed error.
     return test._replace(runs=(None,)), drawn_profile(run), ()

@@ -1,4 +1,4 @@
-"""Figures that only some kinds of bus have, as an answer holds them."""
+"""Figures of an answer that only some kinds of bus have."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Never, TypeAlias
@@ -6,16 +6,16 @@ from typing import Any, Never, TypeAlias
 from busplan.sourced import Sourced
 
 FigureValue: TypeAlias = float | str | None
-"""A number, a count, a truth or a word; None where it does not exist."""
+"""A number, a count, a truth value or a word; None if it does not exist."""
 
 
 class FigureValues(Mapping[str, FigureValue]):
-    """Figures by key, and as attributes; like all of an answer they do not change, and travel between processes.
+    """Figures by key and as attributes; immutable, and picklable.
 
     Parameters
     ----------
     values
-        Each is plain: what a constant brings along stays behind.
+        Figures by key; a `Sourced` constant becomes a plain float.
 
     Examples
     --------
@@ -42,7 +42,7 @@ class FigureValues(Mapping[str, FigureValue]):
         return len(self._values)
 
     def __getattr__(self, key: str) -> Any:
-        # Only what is no attribute comes here, and what is asked for before there are values.
+        # Called for missing attributes only, also before `_values` is set.
         if key.startswith("_") or key not in self._values:
             raise AttributeError(f"there is no figure {key!r}")
         return self._values[key]

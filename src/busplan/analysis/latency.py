@@ -1,4 +1,4 @@
-"""Latency on the bus: a profile in, every part of what takes time under each timing model out."""
+"""Latency on the bus: the phases of each transaction under each timing model."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -14,17 +14,17 @@ from busplan.sections.profile import Profile
 
 
 class Transaction(NamedTuple):
-    """One thing that takes time on the bus, taken apart: a read or a write of the farthest node, or a whole cycle."""
+    """The phases of a read or a write of the farthest node, or of a whole cycle."""
 
     timing_model: str
     transaction: str
     payload_bytes: int | None
     nodes: int
     phases: FigureValues
-    """Its figures, as the register of the bus has them."""
+    """Figures by their key in the register of the bus."""
 
     def __getattr__(self, key: str) -> Any:
-        # Only what is no field comes here.
+        # Called for missing attributes only.
         if not key.startswith("_") and key in self.phases:
             return self.phases[key]
         raise AttributeError(f"{self.transaction} has no figure {key!r}")
@@ -43,21 +43,21 @@ def latency(
     payloads_bytes: Sequence[int] | None = None,
     timing_models: Sequence[str] | None = None,
 ) -> LatencyResult:
-    """Take what a profile sends apart.
+    """Compute the phases of each transaction.
 
     Parameters
     ----------
     profile
         The network; a transaction is that of its farthest node.
     payloads_bytes
-        Payloads of both read and write [bytes]; without them the profile's own.
+        Payloads of both read and write [bytes]; by default the profile's own.
     timing_models
-        Which timing models, in this order; without them all of the kind of bus.
+        Timing models, in this order; by default all of the kind of bus.
 
     Returns
     -------
     LatencyResult
-        One transaction for each payload, kind and model, in this nesting.
+        One transaction for each payload, kind and model, nested in this order.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, Number]:
 
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:
-    """A profile with another payload of read and write alike, not checked [bytes]."""
+    """Return a copy with the payload of both read and write replaced [bytes], unvalidated."""
     return with_unchecked(with_unchecked(profile, "payload.read_bytes", size_bytes), "payload.write_bytes", size_bytes)
 
 
@@ -97,7 +97,7 @@ def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:
 
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
-    """Refuse payloads whose execution time is not known, all of them at once."""
+    """Refuse payloads whose execution time is not known, all in one error."""
     execution = profile.node.execution
     if not isinstance(execution, TableExecution):
         return

@@ -12,12 +12,12 @@ def bus_of(profile: Profile) -> Bus:
 
 
 def network_of(profile: Profile) -> Network:
-    """What the cycle of a profile is computed from.
+    """Network from which the cycle of a profile is computed.
 
     Parameters
     ----------
     profile
-        The network. Its values may be numbers of any sort.
+        The profile. Its values may be numbers, arrays or traced numbers.
     """
     payload, node, cycle = profile.payload, profile.node, profile.cycle
     execution = node.execution

@@ -1,4 +1,4 @@
-"""Every published figure that busplan reaches, beside the computed one: those of the bus, and those of the circle."""
+"""Compare published figures of the bus and of the circle with computed ones."""
 
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ def published() -> dict[str, Any]:
 
 
 def paper_sections(bench: Profile, *, circles: Sequence[CircleFigures]) -> tuple[PaperSection, ...]:
-    """Compare every published figure that the equations reach with what they give.
+    """Compare every published figure that the equations give with the computed one.
 
     Parameters
     ----------

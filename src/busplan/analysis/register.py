@@ -1,4 +1,4 @@
-"""Every figure of every command for a kind of bus, by command and key."""
+"""Register of the figures of all commands for a kind of bus, by command and key."""
 
 from collections.abc import Mapping
 from difflib import get_close_matches
@@ -10,20 +10,20 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import VERDICT_FIGURES, Figure, by_key
 from busplan.errors import BusplanError
 
-Command = Literal["latency", "capacity", "circle-test"]
+CommandName = Literal["latency", "capacity", "circle-test"]
 
-_HOLDERS: Final[Mapping[str, tuple[Command, str]]] = MappingProxyType(
+_HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
     {
         "changes": ("capacity", "cheapest_change"),
         **dict.fromkeys(("name", "value", "limit"), ("circle-test", "failures")),
         **dict.fromkeys(("source", "removed_mm"), ("circle-test", "contributions")),
     }
 )
-"""Keys that stand inside a figure, by that figure: they are derived with it."""
+"""Figure that contains a key, for keys inside a figure."""
 
 
-def figures_of(bus: Bus) -> dict[Command, dict[str, Figure]]:
-    """Figures by command and key. A key that several commands give is the first one's, where no command is named."""
+def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
+    """Figures by command and key. Without a command, a key means that of the first command that has it."""
     return {
         "capacity": by_key((*bus.capacity_figures, *VERDICT_FIGURES)),
         "latency": by_key(bus.latency_figures),
@@ -31,21 +31,21 @@ def figures_of(bus: Bus) -> dict[Command, dict[str, Figure]]:
     }
 
 
-def figure_named(name: str, *, bus: Bus) -> tuple[Command, Figure]:
-    """Find the figure that a name means.
+def figure_named(name: str, *, bus: Bus) -> tuple[CommandName, Figure]:
+    """Find a figure by its name.
 
     Parameters
     ----------
     name
-        A key, as "required_us", or one with its command before it, as "circle-test.required_us". A key inside a figure,
-        as "removed_mm", means that figure.
+        A key ("required_us"), or a command and a key ("circle-test.required_us"). A key inside a figure ("removed_mm")
+        means that figure.
     bus
         The kind of bus.
 
     Raises
     ------
     BusplanError
-        There is none; those that are spelt alike are named.
+        There is none; the message suggests similar names.
 
     Examples
     --------

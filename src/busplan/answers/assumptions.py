@@ -1,4 +1,4 @@
-"""Answer of `busplan explain PROFILE`: what its figures rest on, and all figures, equations and constants."""
+"""Answer of `busplan explain PROFILE`: its assumptions, and all figures, equations and constants."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -7,11 +7,22 @@ from typing import Final
 from busplan.analysis.derivation.formulas import formula_of
 from busplan.analysis.derivation.origin import DIGITS, Input
 from busplan.analysis.network import bus_of
-from busplan.analysis.register import Command, figures_of
+from busplan.analysis.register import CommandName, figures_of
 from busplan.answers.documents import document
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Cell, Code, Document, Record, Report, Sentence, Table, TableColumn, TableRow, Value
+from busplan.forms.blocks import (
+    Cell,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+)
 from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 
@@ -23,21 +34,21 @@ INPUT_COLUMNS: Final = (
     TableColumn("grade", kind="words"),
     TableColumn("source", kind="words"),
 )
-"""What an input is, and how well it is known."""
+"""Columns of an input: what it is, and how well it is known."""
 _FIGURES: Final = tuple(
     TableColumn(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is")
 )
 
 
 def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report:
-    """Answer the question of `explain PROFILE`: what its figures rest on, and all that can be explained.
+    """Report of `explain PROFILE`: the assumptions behind its figures, and all figures that can be explained.
 
     Parameters
     ----------
     profile
         The network.
     assumptions
-        What its figures rest on.
+        The inputs of its figures.
     """
     caption = Sentence(("What the figures of ", Code(profile.name), " rest on, the least well known first"))
     return Report(
@@ -52,21 +63,21 @@ def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report
 
 
 def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions") -> Table:
-    """What figures rest on, one row each.
+    """Table of inputs, one row each.
 
     Parameters
     ----------
     assumptions
         The inputs.
     at
-        Place of their list in the JSON document.
+        JSON pointer to their list.
     """
     rows = (TableRow((*input_cells(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
     return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
 
 
 def figure_rows(bus: Bus) -> list[Record]:
-    """One row a figure that can be explained."""
+    """One row for each figure that can be explained."""
     return [
         {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
         | {"reference": one.reference, "meaning": one.meaning}
@@ -75,7 +86,7 @@ def figure_rows(bus: Bus) -> list[Record]:
 
 
 def equation_rows() -> list[Record]:
-    """One row an equation: its numbers, formula, function and source."""
+    """One row for each equation: numbers, formula, function and source."""
     return [
         {
             "reference": one.reference,
@@ -88,7 +99,7 @@ def equation_rows() -> list[Record]:
 
 
 def constant_rows(bus: Bus) -> list[Record]:
-    """One row a constant: its value, unit, grade and source."""
+    """One row for each constant: value, unit, grade and source."""
     return [
         {"name": name, "value": float(one), "unit": one.unit}
         | {"grade": one.grade, "source": one.source, "meaning": one.meaning}
@@ -96,8 +107,8 @@ def constant_rows(bus: Bus) -> list[Record]:
     ]
 
 
-def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Document:
-    """Document of `busplan explain PROFILE --format json`: what the figures rest on, and the whole registry."""
+def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> JsonDocument:
+    """Document of `busplan explain PROFILE --format json`: the inputs of the figures, and the whole registry."""
     return document(
         "explain",
         profile=profile.name,
@@ -109,8 +120,8 @@ def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Docu
 
 
 def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
-    """Cells of an input, by its place in the JSON document."""
-    value = Value(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
+    """Cells of one input."""
+    value = ShownValue(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
     return Code(one.name), value, one.unit, one.grade, one.source
 
 
@@ -121,5 +132,5 @@ def _figure_table(bus: Bus) -> Table:
     return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
 
 
-def _all_figures(bus: Bus) -> Iterator[tuple[Command, Figure]]:
+def _all_figures(bus: Bus) -> Iterator[tuple[CommandName, Figure]]:
     yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())

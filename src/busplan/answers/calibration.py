@@ -13,7 +13,7 @@ from busplan.forms.blocks import (
     Block,
     Cell,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -46,11 +46,11 @@ _MEASURED_COLUMNS: Final = {
     "model_request_and_acknowledge_us": TableColumn("model", "us", group="T1+T2"),
     "unexplained_us": TableColumn("unexplained", "us", group="T1+T2"),
 }
-"""Columns of what was measured beside the latency."""
+"""Further columns if T1+T2 was measured, too."""
 
 
 def execution_keys(execution: LinearExecution | TableExecution) -> dict[str, object]:
-    """Keys of the execution time with their values, as a profile has them."""
+    """Keys and values of the execution time, as in a profile."""
     return {
         key: list(value) if isinstance(value, tuple) else value
         for key, value in execution.model_dump(exclude_none=True).items()
@@ -58,13 +58,13 @@ def execution_keys(execution: LinearExecution | TableExecution) -> dict[str, obj
 
 
 def execution_changes(execution: LinearExecution | TableExecution) -> dict[str, object]:
-    """Changes that make a profile's execution time this one; keys of the other form go (None)."""
+    """Changes that set a profile's execution time; None removes a key of the other form."""
     gone = dict.fromkeys((*LinearExecution.model_fields, *TableExecution.model_fields))
     return {f"{SECTION}.{key}": value for key, value in {**gone, **execution_keys(execution)}.items()}
 
 
 def provenance(result: Calibration, *, source: str) -> str:
-    """Where an execution time comes from, in the one line that goes into the profile; the same on any day."""
+    """Origin of an execution time, as a one-line comment for the profile, without a date."""
     taken = "T1+T2 as measured" if result.way == "measured-halves" else f"packets by the {result.timing_model} model"
     return (
         f"busplan calibrate: {result.execution.kind} ({result.method}) of "
@@ -74,16 +74,16 @@ def provenance(result: Calibration, *, source: str) -> str:
 
 
 def calibration_report(result: Calibration, *, source: str, applied_to: str | None) -> Report:
-    """Answer the question of `calibrate`.
+    """Report of `calibrate`.
 
     Parameters
     ----------
     result
         The calibration.
     source
-        What the measurements are called.
+        Name of the measurements.
     applied_to
-        The profile that the execution time was written into; None for none.
+        The profile that the execution time was written into; None if it was not written.
     """
     name = result.profile.name
     return Report(
@@ -95,7 +95,7 @@ def calibration_report(result: Calibration, *, source: str, applied_to: str | No
 
 
 def _blocks(result: Calibration, source: str) -> Iterator[Block]:
-    """The fit in words, the figures by payload, and the section of the profile."""
+    """The fit in sentences, the figures by payload, and the section for the profile."""
     measurements, sizes = len(result.residuals), len(result.payloads)
     yield sentence(
         f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
@@ -121,23 +121,23 @@ def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
 
 
 def _cell(value: float | None, key: str, at: str) -> Cell:
-    """Three decimals for all times: what is less is the rounding of the result."""
+    """A time has three decimals; further ones are rounding."""
     if value is None:
         return ""
     return time_value(value, key, at=at)._replace(fixed=True) if key.endswith("_us") else count_value(value, key, at=at)
 
 
 def calibration_warnings(result: Calibration) -> list[str]:
-    """What to look at before these figures are used."""
+    """What to check before using these figures."""
     return list(map(sentence_text, warning_sentences(result)))
 
 
 def calibration_records(result: Calibration) -> list[Record]:
-    """One row a payload."""
+    """One row for each payload."""
     return [fit._asdict() for fit in result.payloads]
 
 
-def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> Document:
+def calibration_document(result: Calibration, *, source: str, applied_to: str | None) -> JsonDocument:
     """Document of `busplan calibrate --format json`."""
     bus, cycle = bus_of(result.profile), cycle_of(result.profile, model=result.timing_model)
     figures = cycle.figures()

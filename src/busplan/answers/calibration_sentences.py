@@ -1,11 +1,11 @@
-"""What a calibration says of its fit, each figure with its place in the document of `calibrate`."""
+"""Sentences on the fit of a calibration, each figure with its place in the document of `calibrate`."""
 
 from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.calibration.calibrate import OUTLIER_DEVIATIONS, Calibration
 from busplan.analysis.network import bus_of, network_of
-from busplan.forms.blocks import Sentence, Value, count_value, joined, sentence
+from busplan.forms.blocks import Sentence, ShownValue, count_value, joined, sentence
 from busplan.forms.numbers import nouns
 from busplan.sections.execution import TableExecution
 
@@ -14,16 +14,16 @@ _LINE_DIGITS: Final = 6
 _DECIMALS: Final = 3
 _MOST_LINES: Final = 10
 _LONG_EXECUTION_US: Final = 10_000.0
-"""An execution time that no motion node has; latencies in ns under a heading of us have it."""
+"""Longer than the execution time of any motion node: the latencies are probably in ns."""
 
 
-def time_value(value_us: float, key: str, *, at: str = "") -> Value:
+def time_value(value_us: float, key: str, *, at: str = "") -> ShownValue:
     """A time of a calibration."""
-    return Value(value_us, key, "us", _DECIMALS, at=at)
+    return ShownValue(value_us, key, "us", _DECIMALS, at=at)
 
 
 def fit_sentences(result: Calibration) -> Iterator[Sentence]:
-    """How the execution time was found, in which form, how well it fits, and what the timing model leaves over."""
+    """Say how the execution time was found, its form, its fit, and what the timing model leaves unexplained."""
     yield _way(result)
     yield _form(result)
     yield _residual(result)
@@ -51,8 +51,10 @@ def _form(result: Calibration) -> Sentence:
         meaning = "all measurements" if result.method == "least squares" else "the median at each payload"
         return sentence(
             f"Line: {{}} + {{}} * payload, by {result.method} through {meaning}.",
-            Value(execution.base_us, "base_us", "us", digits=_LINE_DIGITS, at="/execution/base_us"),
-            Value(execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS, at="/execution/per_byte_us"),
+            ShownValue(execution.base_us, "base_us", "us", digits=_LINE_DIGITS, at="/execution/base_us"),
+            ShownValue(
+                execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS, at="/execution/per_byte_us"
+            ),
         )
     return sentence(f"Table: the {result.method} at each payload, {execution.range_bytes}.")
 
@@ -67,7 +69,7 @@ def _residual(result: Calibration) -> Sentence:
     if one.residual_us:
         place = sentence(
             " at {} (line {})",
-            Value(one.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
+            ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
             count_value(one.line, "line", at=f"{at}/line"),
         )
         said = joined(said, place, by="")
@@ -91,8 +93,8 @@ def _unexplained(result: Calibration) -> Iterator[Sentence]:
             f"Left unexplained by {model}: {{}} of T1+T2 on average, {{}} at most ({{}} of the measured, at {{}}).",
             time_value(mean_us, "unexplained_us"),
             time_value(worst_us, "unexplained_us", at=f"{at}/unexplained_us"),
-            Value(share, "", "%", 0, fixed=True),
-            Value(fit.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
+            ShownValue(share, "", "%", 0, fixed=True),
+            ShownValue(fit.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
         )
     kinds = [abs(fit.read_less_write_us) for fit in result.payloads if fit.read_less_write_us is not None]
     if kinds:
@@ -103,7 +105,7 @@ def _unexplained(result: Calibration) -> Iterator[Sentence]:
 
 
 def warning_sentences(result: Calibration) -> Iterator[Sentence]:
-    """What to look at before these figures are used."""
+    """Say what to check before using these figures."""
     if result.outliers:
         yield _outliers(result)
     execution, payload = result.execution, result.profile.payload
@@ -113,13 +115,13 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
             yield sentence(
                 f"the profile's payload of {{}} is outside the table, {execution.range_bytes}: measure it, or use "
                 "--form linear.",
-                Value(size, "payload_bytes", "bytes"),
+                ShownValue(size, "payload_bytes", "bytes"),
             )
     longest_us = max(fit.execution_us for fit in result.payloads)
     if longest_us > _LONG_EXECUTION_US:
         yield sentence(
             "an execution time of {} is long for a motion node: is latency_us in us?",
-            Value(longest_us, "execution_us", "us", 0),
+            ShownValue(longest_us, "execution_us", "us", 0),
         )
 
 

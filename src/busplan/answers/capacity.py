@@ -16,7 +16,7 @@ from busplan.buses.figure import Figure
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -31,7 +31,7 @@ from busplan.sections.profile import Profile
 
 
 def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
-    """Answer the question of `capacity`."""
+    """Report of `capacity`."""
     return Report(
         Sentence(("Capacity of ", Code(result.profile.name))),
         lambda: tuple(_blocks(result, verdicts)),
@@ -41,7 +41,7 @@ def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
 
 
 def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
-    """Verdict and figures of each period, the models side by side."""
+    """Verdict and figures of each period, the timing models side by side."""
     for number, (figures, verdict, start) in enumerate(zip(result.periods, verdicts, _starts(result), strict=False)):
         places = places_of(figures, start=start, change=number)
         yield from verdict_sentences(verdict, result.profile, places=places)
@@ -49,7 +49,7 @@ def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
 
 
 def _starts(result: Capacity) -> Iterator[int]:
-    """Number of each period's first set of figures among all of them."""
+    """Index in `results` of each period's first set of figures."""
     return accumulate(map(len, result.periods), initial=0)
 
 
@@ -61,9 +61,9 @@ def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, star
     profile
         The network.
     figures
-        A set for each timing model.
+        One set for each timing model.
     start
-        Number of the first among the results of the document.
+        Index of the first one in the document's results.
     """
     first, bus = figures[0], bus_of(profile)
     caption = sentence(
@@ -79,7 +79,7 @@ def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, star
 
 
 def _rows(bus: Bus) -> list[tuple[Figure, int]]:
-    """The cycle and its terms, the slice, what the kind of bus adds, and what would fit; terms are of level 1."""
+    """Figures with their levels: the cycle, its terms (level 1), the slice, figures of the kind of bus, and limits."""
     above = (figure.AVAILABLE, figure.REQUIRED)
     below = (
         *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
@@ -91,11 +91,11 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
 
 
 def capacity_records(result: Capacity) -> list[Record]:
-    """One row a period and timing model."""
+    """One row for each period and timing model."""
     return [{**figures.by_key(), "exceeded": list(figures.exceeded)} for figures in result.results]
 
 
-def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> Document:
+def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
     """Document of `busplan capacity --format json`."""
     return document(
         "capacity",
@@ -105,7 +105,7 @@ def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> Document
     )
 
 
-def _verdict(verdict: Verdict, result: Capacity) -> Document:
+def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
     change = verdict.change
     return {
         "period_us": verdict.period_us,
@@ -126,6 +126,6 @@ def _verdict(verdict: Verdict, result: Capacity) -> Document:
 
 
 def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
-    """Whether the bus is set safely, under the name that its kind has for it."""
+    """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
     safety = bus_of(profile).safety_figure
     return {} if safety is None else {safety.key: figures.safe}

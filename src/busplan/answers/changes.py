@@ -1,4 +1,4 @@
-"""Keys whose values differ between two profiles: what they are, shown so that the difference is seen."""
+"""Keys whose values differ between two profiles, written so that the difference is visible."""
 
 from collections.abc import Iterable, Sequence
 from itertools import takewhile
@@ -6,24 +6,24 @@ from operator import eq
 from typing import Final
 
 from busplan.analysis.comparison.difference import KeyDifference
-from busplan.forms.blocks import Cell, Code, Document, Sentence, Table, TableColumn, TableRow, Value
-from busplan.forms.numbers import MISSING, written
+from busplan.forms.blocks import Cell, Code, JsonDocument, Sentence, ShownValue, Table, TableColumn, TableRow
+from busplan.forms.numbers import MISSING, figure_text
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
 _COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("key", "A", "B"))
 _ALL_DIGITS: Final = 17
-"""Digits that tell any two floats apart."""
+"""Digits that distinguish any two floats."""
 _MOST_ITEMS: Final = 8
-"""Longest list that is shown in full."""
+"""Longest list shown in full."""
 _MOST_CHARACTERS: Final = 40
-"""Longest text that is shown in full."""
+"""Longest text shown in full."""
 _CONTEXT: Final = 8
-"""Characters that are shown in front of the first that differs."""
+"""Characters shown before the first one that differs."""
 
 
 def change_table(keys: Iterable[KeyDifference]) -> Table:
-    """One row a key: its values, and where they come from when that is not the file."""
+    """One row for each key: its values in A and B, with a note if a value is a default."""
     rows = (
         (
             Code(one.key),
@@ -36,17 +36,17 @@ def change_table(keys: Iterable[KeyDifference]) -> Table:
 
 
 def _cell(key: str, value: KeyValue | None, other: KeyValue | None, *, at: str) -> Cell:
-    """One side of a difference; the other side tells which part, or how many digits, of a long value matter."""
+    """One side of a difference; the other side decides which part or how many digits of a long value are shown."""
     if value is None:
         return MISSING
     own, beside = value.value, None if other is None else other.value
-    shown: Value | Code
+    shown: ShownValue | Code
     if isinstance(own, int | float) and not isinstance(own, bool):
-        shown = Value(own, key, at=at)
+        shown = ShownValue(own, key, at=at)
         if (
             own != beside
             and isinstance(beside, int | float)
-            and written(shown) == written(shown._replace(value=beside))
+            and figure_text(shown) == figure_text(shown._replace(value=beside))
         ):
             shown = shown._replace(digits=_ALL_DIGITS)
     else:
@@ -55,7 +55,7 @@ def _cell(key: str, value: KeyValue | None, other: KeyValue | None, *, at: str) 
 
 
 def shown_value(value: object, other: object = None) -> str:
-    """Write a value as TOML does, and of a long one what is not as in the other.
+    """Write a value as TOML; of a long one, only the part that differs from the other.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def shown_value(value: object, other: object = None) -> str:
 
 
 def _alike(one: Sequence[object], other: Sequence[object]) -> int:
-    """How many elements two sequences begin with in common."""
+    """Length of the common beginning of two sequences."""
     return sum(takewhile(bool, map(eq, one, other)))
 
 
@@ -106,8 +106,8 @@ def _text(text: str, other: str) -> str:
     return f"{'..' if start else ''}{piece}{'..' if end < len(text) else ''}"
 
 
-def change_document(one: KeyDifference) -> Document:
-    """Write a difference as plain data: both values in full."""
+def change_document(one: KeyDifference) -> JsonDocument:
+    """A difference as plain data, both values in full."""
     return {
         "key": one.key,
         "a": one.a and one.a.value,

@@ -1,17 +1,17 @@
-"""Answer of `busplan check`, as a document and in sentences; `gate` has it for build services."""
+"""Answer of `busplan check` as sentences and as JSON; `gate` writes it for build services."""
 
 from collections.abc import Iterator
 from functools import partial
 
 from busplan.answers.documents import document
 from busplan.answers.gate.plain import finding_parts
-from busplan.forms.blocks import Code, Document, Record, Report, Sentence, State, count_value, joined, sentence
+from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
 from busplan.forms.numbers import nouns
 from busplan.rules.report import CheckReport
 
 
 def check_report(report: CheckReport) -> Report:
-    """Answer the question of `check`."""
+    """Report of `check`."""
     return Report(
         Sentence(("Check of profiles",)),
         lambda: tuple(_sentences(report)),
@@ -21,7 +21,7 @@ def check_report(report: CheckReport) -> Report:
 
 
 def _sentences(report: CheckReport) -> Iterator[Sentence]:
-    """Each finding, what could not be checked, and what it adds up to."""
+    """Each finding, each file that could not be checked, and the summary."""
     for one in report.located:
         place, words = finding_parts(one.path, one.finding)
         yield Sentence((Code(place), f" {words}"), "fails" if one.finding.severity == "error" else "warns")
@@ -52,11 +52,11 @@ def _state(report: CheckReport) -> State:
 
 
 def check_records(report: CheckReport) -> list[Record]:
-    """One row a finding."""
+    """One row for each finding."""
     return [{"path": one.path, **one.finding._asdict()} for one in report.located]
 
 
-def check_document(report: CheckReport) -> Document:
+def check_document(report: CheckReport) -> JsonDocument:
     """Document of `busplan check --format json`."""
     files = []
     for one in report.files:

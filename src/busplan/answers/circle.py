@@ -17,17 +17,17 @@ from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
+    attribute_value,
     joined,
     sentence,
-    value_of,
 )
 from busplan.forms.numbers import period
 from busplan.sections.profile import Profile
@@ -38,7 +38,7 @@ _SHOWN: Final = (
     *("circular_deviation_mm", "radius_deviation_mm", "phase_margin_deg", "gain_margin_db", "crossover_hz"),
     *("radius_mm", "feed_mm_per_min", "period_us", "step_us", "duration_s", "setpoints", "loop", "stable", "passed"),
 )
-"""Figures of the table, in its order."""
+"""Figures of the table, in order."""
 ACT_TOGETHER: Final = Sentence(
     ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
 )
@@ -46,14 +46,14 @@ NO_SOURCES: Final = Sentence(("The profile has no error source that could be rem
 
 
 def circle_report(test: CircleTest, *, with_contributions: bool) -> Report:
-    """Answer the question of `circle-test`.
+    """Report of `circle-test`.
 
     Parameters
     ----------
     test
         The circle test.
     with_contributions
-        Whether the document ranks the error sources, too.
+        If True, the document ranks the error sources.
     """
     return Report(
         Sentence(("Circle test of ", Code(test.profile.name))),
@@ -64,7 +64,7 @@ def circle_report(test: CircleTest, *, with_contributions: bool) -> Report:
 
 
 def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
-    """Verdict of each period, their figures side by side, and what makes each circle less round."""
+    """Verdict of each period, the periods side by side, and the error sources of each circle."""
     places = [f"/results/{number}" for number in range(len(test.results))]
     for result, at in zip(test.results, places, strict=True):
         yield from circle_sentences(test.profile.name, result, at=at, with_contributions=with_contributions)
@@ -81,7 +81,7 @@ def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
     if ranked:
         yield ACT_TOGETHER if any(ranked) else NO_SOURCES
     for result, run, at in zip(test.results, test.runs, places, strict=True):
-        # Of a cycle that does not fit there is no circle to speak of, and the verdict says why.
+        # A cycle that does not fit has no circle; the verdict says why.
         if result.stable is not None:
             yield circle_drawing(drawn_profile(run), result, test.profile, at=at)
 
@@ -89,18 +89,18 @@ def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
 def circle_drawing(
     contour: ContourProfile | None, result: CircleFigures, profile: Profile, *, at: str
 ) -> Chart | Sentence:
-    """The circle with its error magnified, or why it is not drawn.
+    """The circle with its error magnified, or the reason why it is not drawn.
 
     Parameters
     ----------
     contour
-        Contour error around the circle; None where there is none to speak of.
+        Contour error around the circle; None if there is no circle.
     result
         The circle test at one period.
     profile
         The network and its tolerances.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     if contour is None:
         return Sentence(("Not drawn: ", *failure_words(result, at=at).parts, "."))
@@ -116,7 +116,7 @@ def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
     results
         The circle test at each period.
     start
-        Number of the first among the results of the document.
+        Index of the first one in the document's results.
     """
     owners = [
         Owner(TableColumn(period(result.period_us)), result, f"/results/{start + number}")
@@ -127,14 +127,14 @@ def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
 
 
 def contributions_table(result: CircleFigures, *, at: str) -> Table:
-    """The error sources, ranked, each with a bar on a scale that all share.
+    """The error sources, ranked, each with a bar on a common scale.
 
     Parameters
     ----------
     result
         The circle test at one period, with contributions.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     ranked = result.contributions or ()
     removed = [one.removed_mm for one in ranked]
@@ -142,8 +142,10 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
     rows = []
     for number, one in enumerate(ranked):
         place = f"{at}/contributions/{number}"
-        takes = Value(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
-        left = (value_of(_FIGURES[key], one, at=place) for key in ("max_contour_error_mm", "circular_deviation_mm"))
+        takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
+        left = (
+            attribute_value(_FIGURES[key], one, at=place) for key in ("max_contour_error_mm", "circular_deviation_mm")
+        )
         rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (
         TableColumn("source", kind="words"),
@@ -162,7 +164,7 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
 def circle_chart(
     contour: ContourProfile, result: CircleFigures, profile: Profile, *, at: str = "/results/0"
 ) -> Chart | None:
-    """The circle with its error magnified; None where there is no error to show.
+    """The circle with its error magnified; None if there is no error to show.
 
     Parameters
     ----------
@@ -173,7 +175,7 @@ def circle_chart(
     profile
         The network and its tolerances.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     tolerance_mm = profile.tolerance.max_contour_error_mm
     drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm)
@@ -181,7 +183,7 @@ def circle_chart(
     if scale is None:
         return None
     caption = sentence("Contour error at constant speed, at {} and {}", *setup_values(result, at=at))
-    tolerance = Value(tolerance_mm, "max_contour_error_mm", "um")
+    tolerance = ShownValue(tolerance_mm, "max_contour_error_mm", "um")
     limit = (
         sentence("the profile has no tolerance of the largest contour error.")
         if tolerance_mm is None
@@ -191,14 +193,14 @@ def circle_chart(
     )
     magnified = sentence(
         "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; ",
-        Value(scale.times(result.radius_mm), decimals=0),
-        Value(scale.ring_um, unit="um"),
+        ShownValue(scale.times(result.radius_mm), decimals=0),
+        ShownValue(scale.ring_um, unit="um"),
     )
     return Chart(drawing, caption, joined(magnified, limit, by=""))
 
 
 def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record]:
-    """One flat row a period: the centre in two columns, failures by name, what each source takes by its name."""
+    """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
     sources = sorted({one.source for result in test.results for one in result.contributions or ()})
     records = []
     for result in test.results:
@@ -213,7 +215,7 @@ def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record
     return records
 
 
-def circle_document(test: CircleTest, *, with_contributions: bool) -> Document:
+def circle_document(test: CircleTest, *, with_contributions: bool) -> JsonDocument:
     """Document of `busplan circle-test --format json`."""
     results = []
     for result in test.results:

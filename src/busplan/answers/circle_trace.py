@@ -1,4 +1,4 @@
-"""The simulated steps of a circle test, as rows of a CSV file."""
+"""Simulated steps of a circle test, as rows of a CSV file."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -17,7 +17,7 @@ TRACE_COLUMNS: Final = (
 )
 
 _BLOCK: Final = 4096
-"""Rows that are turned into Python's numbers together."""
+"""Rows converted to Python numbers at a time."""
 
 
 def trace_records(test: CircleTest, *, every: int) -> Iterator[Record]:
@@ -28,7 +28,7 @@ def trace_records(test: CircleTest, *, every: int) -> Iterator[Record]:
     test
         The circle test.
     every
-        One of how many steps is written [1].
+        n, 1 or more [1].
     """
     for result, run in zip(test.results, test.runs, strict=True):
         if run is None:
@@ -43,7 +43,7 @@ def trace_records(test: CircleTest, *, every: int) -> Iterator[Record]:
             trace.contour_error_mm,
         )
         for start in range(0, len(trace.time_us), _BLOCK):
-            # Python's own floats take four times the memory of numpy's.
+            # Python floats take four times the memory of numpy floats.
             block = [column[start : start + _BLOCK].tolist() for column in columns]
             for values in zip(*block, strict=True):
                 yield dict(zip(TRACE_COLUMNS, (result.period_us, *values), strict=True))

@@ -1,4 +1,4 @@
-"""What a circle test says of the circle, in sentences that a person can act on."""
+"""The verdict of a circle test in sentences."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -7,7 +7,7 @@ from busplan.analysis.circle.failures import Stated
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
 from busplan.buses.figure import by_key
-from busplan.forms.blocks import Code, Part, Sentence, Value, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, figure_value, joined, sentence
 from busplan.forms.numbers import period_value
 
 _FIGURES: Final = by_key(CIRCLE_FIGURES)
@@ -16,7 +16,7 @@ _FIGURES: Final = by_key(CIRCLE_FIGURES)
 def circle_sentences(
     name: str, result: CircleFigures, *, at: str, with_contributions: bool = True
 ) -> Iterator[Sentence]:
-    """Say whether the circle holds, what it does not hold, and what to attack first.
+    """Say whether the circle holds its tolerances, what it does not hold, and which error source to attack first.
 
     Parameters
     ----------
@@ -25,9 +25,9 @@ def circle_sentences(
     result
         The circle test at one period.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     with_contributions
-        Whether the document ranks the error sources, too.
+        If True, the document ranks the error sources.
     """
     period, feed = setup_values(result, at=at)
     subject = (Code(name), " at ", period, " and ", feed)
@@ -46,13 +46,13 @@ def circle_sentences(
         yield sentence(
             f"Attack {source_words(source.source)} first: without it the {label} is {{}}, {{}} less.",
             figure_value(_FIGURES[measure], getattr(source, measure), at=left),
-            Value(removed_mm, "removed_mm", "um", 3),
+            ShownValue(removed_mm, "removed_mm", "um", 3),
         )
     elif result.contributions is not None:
         yield Sentence((f"No single error source of the profile explains the {label}.",))
 
 
-def setup_values(result: CircleFigures, *, at: str) -> tuple[Value, Value]:
+def setup_values(result: CircleFigures, *, at: str) -> tuple[ShownValue, ShownValue]:
     """The period and the feed of a test.
 
     Parameters
@@ -60,7 +60,7 @@ def setup_values(result: CircleFigures, *, at: str) -> tuple[Value, Value]:
     result
         The circle test at one period.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     feed = figure_value(_FIGURES["feed_mm_per_min"], result.feed_mm_per_min, at=f"{at}/feed_mm_per_min")
     return period_value(result.period_us, at=f"{at}/period_us"), feed
@@ -74,7 +74,7 @@ def failure_words(result: CircleFigures, *, at: str) -> Sentence:
     result
         The circle test at one period, which fails.
     at
-        Place of its figures in the JSON document.
+        JSON pointer to its figures.
     """
     each = (Sentence(tuple(_part(part, result, at=at) for part in one.parts())) for one in result.failures)
     return joined(*each, by=", and ")
@@ -84,11 +84,11 @@ def _part(part: str | Stated, result: CircleFigures, *, at: str) -> Part:
     if isinstance(part, str):
         return part
     known = getattr(result, part.key, None) == part.value
-    return Value(part.value, part.key, part.unit, part.decimals, at=f"{at}/{part.key}" if known else "")
+    return ShownValue(part.value, part.key, part.unit, part.decimals, at=f"{at}/{part.key}" if known else "")
 
 
 def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
-    """Say how the servo values are known, wherever a figure is shown that rests on them; nothing without a simulation.
+    """Say how the servo values behind the figures are known; nothing without a simulation.
 
     Parameters
     ----------
@@ -101,5 +101,5 @@ def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
 
 
 def source_words(source: str) -> str:
-    """Name of an error source, as people write it."""
+    """Name of an error source in words."""
     return source.replace("_", " ")

@@ -1,4 +1,4 @@
-"""Answer of `busplan diff`: for people, for a pull request, and as plain data."""
+"""Answer of `busplan diff`."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -12,14 +12,14 @@ from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
     count_value,
     figure_value,
@@ -50,11 +50,11 @@ _FIGURES: Final = (
     TableColumn("B is", kind="words"),
 )
 _MOST_KEYS: Final = 20
-"""Keys that a reader is shown: a comment on a pull request is no listing."""
+"""Most keys shown to a reader; JSON lists all."""
 
 
 def diff_report(found: Difference, *, arguments: Arguments) -> Report:
-    """Answer the question of `diff`.
+    """Report of `diff`.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def diff_report(found: Difference, *, arguments: Arguments) -> Report:
     )
 
 
-def diff_document(found: Difference, *, arguments: Arguments) -> Document:
+def diff_document(found: Difference, *, arguments: Arguments) -> JsonDocument:
     """Document of `busplan diff --format json`.
 
     Parameters
@@ -99,12 +99,12 @@ def diff_document(found: Difference, *, arguments: Arguments) -> Document:
 
 
 def diff_records(found: Difference) -> list[Record]:
-    """One row a figure, whatever it is judged."""
+    """One row for each figure, whatever its judgement."""
     return [_figure_record(figure) for figure in found.figures]
 
 
 def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
-    """The verdict, the two sides, the keys that differ, and the figures that do."""
+    """The verdict, the two sides, the keys that differ, and the figures that differ."""
     yield headline(found)
     yield _sides(found, arguments)
     if not found.keys:
@@ -114,7 +114,7 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     hidden = len(found.keys) - _MOST_KEYS
     if hidden > 0:
         yield sentence(f"And {{}} more {nouns(hidden, 'key')}.", count_value(hidden))
-    # Of a circle that one side has not, a note says why: it needs no rows.
+    # If one side has no circle, a note says why, and its figures need no rows.
     shown = [
         (at, one) for at, one in enumerate(found.figures) if one.judgement != "neutral" or None not in (one.a, one.b)
     ]
@@ -147,7 +147,7 @@ def _sides(found: Difference, arguments: Arguments) -> Table:
 
 
 def _notes(found: Difference) -> Iterator[Sentence]:
-    """Say why a circle fails or has no figures, and what the figures rest on."""
+    """Say why a circle fails or has no figures, and how well the inputs of the figures are known."""
     executions = (found.a.node.execution.grade, found.b.node.execution.grade)
     yield from _graded("execution time behind these figures is", *executions)
     if found.circles is None:
@@ -161,7 +161,7 @@ def _notes(found: Difference) -> Iterator[Sentence]:
 
 
 def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
-    """Say how well something is known on either side; nothing where nobody says."""
+    """Say how well something is known on each side; nothing if neither side has a grade."""
     if a or b:
         of_a, of_b = a or "not graded", b or "not graded"
         text = of_a if of_a == of_b else f"{of_a} in A and {of_b} in B"
@@ -171,14 +171,14 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
 def _row(one: ComparedFigure, at: str) -> TableRow:
     figure = one.figure
     a, b, difference = (figure_value(figure, getattr(one, key), at=f"{at}/{key}") for key in ("a", "b", "difference"))
-    relative = Value(
+    relative = ShownValue(
         one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
     )
     judged = Words(one.judgement, STATES[one.judgement])
     return TableRow((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
 
 
-def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> Document:
+def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> JsonDocument:
     return {
         "argument": argument,
         "profile": profile.name,

@@ -1,4 +1,4 @@
-"""What a difference says first: where B is worse than A, and where it is better."""
+"""Headline of a difference: where B is worse than A, and where it is better."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final
@@ -14,14 +14,14 @@ STATES: Final[dict[Judgement, State]] = {
     "same": "neutral",
     "neutral": "neutral",
 }
-"""What a judgement says of B."""
+"""State of a judgement on B."""
 _FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
 _PASSES: Final[dict[Judgement, str]] = {
     "worse": "B does not pass the circle where A does",
     "better": "B passes the circle where A does not",
 }
 _MOST_NAMED: Final = 4
-"""Figures that a headline names."""
+"""Most figures that a headline names."""
 
 
 def headline(found: Difference) -> Sentence:
@@ -43,7 +43,7 @@ def headline(found: Difference) -> Sentence:
 
 
 def _loud_figures(found: Difference) -> dict[str, dict[Judgement, str]]:
-    """Figures that speak for themselves, beside whether it fits."""
+    """Sentences for the figures that have their own, apart from whether the cycle fits."""
     loud: dict[str, dict[Judgement, str]] = {}
     for bus in (bus_of(found.a), bus_of(found.b)):
         if bus.safety_figure is not None:
@@ -84,7 +84,7 @@ def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
 
 
 def named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
-    """Names of figures, each once, with the timing model where that is not all of them."""
+    """Names of figures, each once, with the timing model if only one judges it so."""
     models = {*model_names(found.a), *model_names(found.b)}
     parts: dict[str, list[str]] = {}
     for one in figures:
@@ -93,7 +93,7 @@ def named(figures: Sequence[ComparedFigure], found: Difference) -> list[str]:
 
 
 def regression_words(found: Difference, regressions: Sequence[ComparedFigure], *, tolerance: float) -> str:
-    """Say which figures fail a gate."""
+    """Message that lists the regressions."""
     by = f" by more than {tolerance:.12g} %" if tolerance else ""
     names = named(regressions, found)
     return f"regression: B is worse{by} in {plural(len(names), 'figure')}: {', '.join(names)}"

@@ -1,4 +1,4 @@
-"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and what it starts from."""
+"""Answer of `busplan explain PROFILE FIGURE`: every step to a figure, and its inputs."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -17,19 +17,19 @@ from busplan.forms.blocks import (
     Calculation,
     Chapter,
     Code,
-    Document,
+    JsonDocument,
     Part,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
     joined,
 )
-from busplan.forms.numbers import period_value, written
+from busplan.forms.numbers import figure_text, period_value
 from busplan.printable import json_text
 
 _NONE: Final = Words("none")
@@ -37,7 +37,7 @@ _SYMBOL: Final = TableColumn("symbol", kind="words")
 
 
 def explain_report(explanation: Explanation) -> Report:
-    """Answer the question of `explain PROFILE FIGURE`: a section for each derivation.
+    """Report of `explain PROFILE FIGURE` with a section for each derivation.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def explain_report(explanation: Explanation) -> Report:
 
 
 def _in_words(explanation: Explanation) -> Explanation:
-    """Put the verdict's sentences, and its change as the document has it, where the figures behind them are derived."""
+    """Fill in the value of figures that are sentences or changes: the report of `capacity` makes them."""
     return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
 
 
@@ -68,7 +68,7 @@ def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
     return one._replace(value=value, steps=(*before, last._replace(value=value)))
 
 
-def _explain_document(explanation: Explanation) -> Document:
+def _explain_document(explanation: Explanation) -> JsonDocument:
     return document(
         "explain",
         profile=explanation.profile.name,
@@ -76,7 +76,7 @@ def _explain_document(explanation: Explanation) -> Document:
     )
 
 
-def _derivation(one: Derivation) -> Document:
+def _derivation(one: Derivation) -> JsonDocument:
     return {
         "command": one.command,
         "figure": one.figure.key,
@@ -95,7 +95,7 @@ def _derivation(one: Derivation) -> Document:
 
 
 def _step_records(one: Derivation) -> Iterator[Record]:
-    """One row a step; a figure that is an input itself has one row, without a formula."""
+    """One row for each step; a figure that is itself an input has one row, without a formula."""
     figure = one.figure
     itself = Step(figure.key, figure.symbol, figure.reference, "", "", one.value, figure.unit)
     for number, step in enumerate(one.steps or (itself,), start=1):
@@ -116,7 +116,7 @@ def _step_records(one: Derivation) -> Iterator[Record]:
 
 
 def _section(one: Derivation, profile: str, at: str) -> Chapter:
-    """The result, what it is, every step to it, and what they start from."""
+    """The result, its meaning, every step to it, and the inputs."""
     figure = one.figure
     kind = f"{one.transaction}, " if one.transaction else ""
     title = Sentence(
@@ -132,36 +132,36 @@ def _section(one: Derivation, profile: str, at: str) -> Chapter:
 
 
 def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
-    """The result in a sentence: one figure, or what a change sets."""
+    """The result in a sentence: one figure, or the keys that a change sets."""
     if isinstance(one.value, dict):
         settings = (
-            Sentence((Code(key), " = ", Value(new, key, at=f"{at}/value/changes/{key}")))
+            Sentence((Code(key), " = ", ShownValue(new, key, at=f"{at}/value/changes/{key}")))
             for key, new in one.value["changes"].items()
         )
         return joined(*settings, by=", ").parts
     found = _result(one.value, one.figure.key, one.figure.unit, at=f"{at}/value")
-    return (found if isinstance(found, Value) else found.text,)
+    return (found if isinstance(found, ShownValue) else found.text,)
 
 
-def _result(value: object, key: str, unit: str, *, at: str) -> Value | Words:
+def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Words:
     if value is None or value == []:
         return _NONE
     if isinstance(value, dict):
         return Words(", ".join(f"{changed} = {new}" for changed, new in value["changes"].items()))
     if isinstance(value, list) and _has_names(value):
         return Words(", ".join(str(one.get("name", one.get("source"))) for one in value))
-    return Value(value, key, unit, digits=DIGITS, at=at)
+    return ShownValue(value, key, unit, digits=DIGITS, at=at)
 
 
 def _has_names(value: object) -> bool:
-    """Whether it is made of parts with names of their own."""
+    """Whether a value has named parts."""
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
 
 
 def _step(step: Step, at: str) -> blocks.CalculationStep:
-    """A line in symbols, and one in numbers where it says more than the one before or after it."""
+    """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
     result = _result(step.value, step.key, step.unit, at=f"{at}/value")
-    said = written(result) if isinstance(result, Value) else result.text
+    said = figure_text(result) if isinstance(result, ShownValue) else result.text
     formula = "" if step.formula == step.symbol else step.formula
     numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
     return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)

@@ -1,37 +1,37 @@
-"""Tables of registered figures: figures down, what they belong to across."""
+"""Tables of registered figures: one row for each figure, one column for each owner."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, value_of
+from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, attribute_value
 
 
 class Owner(NamedTuple):
-    """What has figures: one column."""
+    """An object with figures: one column."""
 
     column: TableColumn
     figures: object
-    """Figures are its attributes."""
+    """Object that has the figures as attributes."""
     at: str
-    """Its place in the JSON document."""
+    """JSON pointer to it."""
 
 
 def figure_table(
     rows: Iterable[tuple[Figure, int]], owners: Sequence[Owner], *, caption: Sentence, unit: bool = True
 ) -> Table:
-    """Lay figures out side by side.
+    """Table of figures, the owners side by side.
 
     Parameters
     ----------
     rows
         Figures with their levels.
     owners
-        One a column.
+        One for each column.
     caption
-        What the table shows.
+        Caption of the table.
     unit
-        Whether units have a column; otherwise the caption says the unit of all.
+        If False, the column of units is left out: the caption says the unit.
     """
     head = (TableColumn("figure", kind="words"), TableColumn("eq", kind="words"), TableColumn("unit", kind="words"))
     columns = (*head[: 3 if unit else 2], *(owner.column for owner in owners))
@@ -40,4 +40,4 @@ def figure_table(
 
 def _row(figure: Figure, level: int, owners: Sequence[Owner], *, unit: bool) -> TableRow:
     words = (figure.label, figure.reference, figure.column or figure.unit)[: 3 if unit else 2]
-    return TableRow((*words, *(value_of(figure, owner.figures, at=owner.at) for owner in owners)), level)
+    return TableRow((*words, *(attribute_value(figure, owner.figures, at=owner.at) for owner in owners)), level)

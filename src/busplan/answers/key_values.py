@@ -1,27 +1,27 @@
-"""Keys of a profile with the values that they are to have, as a sentence."""
+"""New values of profile keys as a sentence."""
 
 from collections.abc import Mapping
 
 from busplan.buses import bus
-from busplan.forms.blocks import Part, Sentence, Value, joined
+from busplan.forms.blocks import Part, Sentence, ShownValue, joined
 
-Changes = Mapping[str, bus.Value]
+NewValues = Mapping[str, bus.Value]
 """New values of a profile by dotted key."""
 
 
-def settings_sentence(changes: Changes, *, meanings: Mapping[str, str], at: str, quotes: bool = True) -> Sentence:
-    """Write each key with its value, and what that means.
+def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: str, quotes: bool = True) -> Sentence:
+    """Write each key with its new value and its meaning.
 
     Parameters
     ----------
     changes
         The new values.
     meanings
-        What a change of a key means, where that is not plain.
+        Note on a change, by key, for keys that need one.
     at
-        Place of the changes in the JSON document; empty where they have none.
+        JSON pointer to the changes; empty if they are not in the document.
     quotes
-        If True, a text stands between quotes, as in a profile.
+        If True, text values are quoted, as in a profile.
     """
     return joined(
         *(
@@ -32,9 +32,9 @@ def settings_sentence(changes: Changes, *, meanings: Mapping[str, str], at: str,
     )
 
 
-def key_value(key: str, value: bus.Value, *, at: str) -> Value:
-    """The value of one key, with its place among the changes."""
-    return Value(value, key, at=f"{at}/{key}" if at else "")
+def key_value(key: str, value: bus.Value, *, at: str) -> ShownValue:
+    """The new value of one key, with its place in the JSON document."""
+    return ShownValue(value, key, at=f"{at}/{key}" if at else "")
 
 
 def _part(key: str, value: bus.Value, at: str, quotes: bool) -> tuple[Part, ...]:

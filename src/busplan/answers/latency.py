@@ -10,12 +10,12 @@ from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
 from busplan.answers.verdict import execution_sentence, warning_sentences
 from busplan.buses.figure import REQUIRED
-from busplan.forms.blocks import Block, Code, Document, Record, Report, Sentence, Table, TableColumn
+from busplan.forms.blocks import Block, Code, JsonDocument, Record, Report, Sentence, Table, TableColumn
 from busplan.sections.profile import Profile
 
 
 def latency_report(result: LatencyResult, profile: Profile) -> Report:
-    """Answer the question of `latency`."""
+    """Report of `latency`."""
     return Report(
         Sentence(("Latency of ", Code(result.profile))),
         lambda: tuple(_blocks(result, profile)),
@@ -25,7 +25,7 @@ def latency_report(result: LatencyResult, profile: Profile) -> Report:
 
 
 def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
-    """Phases of each transaction, the models side by side; one table for each payload."""
+    """Phases of each transaction, the timing models side by side; one table for each payload."""
     network = network_of(profile)
     yield from latency_tables(result, profile)
     yield Sentence(
@@ -40,7 +40,7 @@ def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
 
 
 def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
-    """Each phase of the transactions, all of them in us; one table for each payload."""
+    """Phases of the transactions in us; one table for each payload."""
     bus = bus_of(profile)
     figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
     caption = Sentence((f"Phases in us, {bus.latency_subject(network_of(profile))}",))
@@ -50,7 +50,7 @@ def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
 
 
 def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:
-    """Each transaction with the number of its table and its own: one that is there already begins a new table."""
+    """Each transaction with the number of its table and its index; a repeated one begins a new table."""
     seen: set[tuple[str, str]] = set()
     number = 0
     for place, one in enumerate(transactions):
@@ -67,7 +67,7 @@ def _column(one: Transaction) -> TableColumn:
 
 
 def _over(result: LatencyResult, profile: Profile) -> list[str]:
-    """The limits of the bus that the profile breaks with each of the payloads."""
+    """Limits of the bus that the profile breaks with any of the payloads."""
     sizes = sorted({one.payload_bytes for one in result.transactions if one.payload_bytes is not None})
     networks = [network_of(with_payload(profile, size)) for size in sizes] or [network_of(profile)]
     broken = (limit.words(network) for network in networks for limit in bus_of(profile).broken(network))
@@ -75,7 +75,7 @@ def _over(result: LatencyResult, profile: Profile) -> list[str]:
 
 
 def latency_records(result: LatencyResult) -> list[Record]:
-    """One row a transaction, phases flat beside what they belong to."""
+    """One flat row for each transaction and its phases."""
     return [_record(transaction) for transaction in result.transactions]
 
 
@@ -85,6 +85,6 @@ def _record(transaction: Transaction) -> Record:
     return {**record, **phases}
 
 
-def latency_document(result: LatencyResult) -> Document:
+def latency_document(result: LatencyResult) -> JsonDocument:
     """Document of `busplan latency --format json`."""
     return document("latency", profile=result.profile, transactions=latency_records(result))

@@ -6,21 +6,32 @@ from typing import Final
 
 from busplan.answers.documents import document
 from busplan.buses.published import Comparison, PaperSection
-from busplan.forms.blocks import Cell, Chapter, Document, Record, Report, Sentence, Table, TableColumn, TableRow, Value
+from busplan.forms.blocks import (
+    Cell,
+    Chapter,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+)
 
 _DIGITS: Final = 5
-"""Significant digits of a published figure, and of a quotient of two."""
+"""Significant digits of a published figure or a quotient of two."""
 _DECIMALS: Final = {"mm": 6, "1": 4}
-"""Contour errors are micrometres: they need more decimals than microseconds do."""
+"""Decimals by unit; contour errors in mm are micrometres, so that they need six."""
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
 
 _Numbered = tuple[int, Comparison]
-"""A comparison with its number among all figures of the document."""
+"""A comparison with its index in the document's figures."""
 
 
 def paper_report(sections: Sequence[PaperSection]) -> Report:
-    """Answer the question of `paper`: published figures down, the ways to compute them across.
+    """Report of `paper`: one row for each published figure, one group of columns for each method.
 
     Parameters
     ----------
@@ -36,7 +47,7 @@ def paper_report(sections: Sequence[PaperSection]) -> Report:
 
 
 def paper_records(sections: Sequence[PaperSection]) -> list[Record]:
-    """One row a published figure and way to compute it."""
+    """One row for each published figure and method."""
     return [
         {
             **comparison._asdict(),
@@ -48,7 +59,7 @@ def paper_records(sections: Sequence[PaperSection]) -> list[Record]:
     ]
 
 
-def paper_document(sections: Sequence[PaperSection]) -> Document:
+def paper_document(sections: Sequence[PaperSection]) -> JsonDocument:
     """Document of `busplan paper --format json`."""
     return document(
         "paper",
@@ -83,7 +94,7 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
 
 def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> TableRow:
     at, first = next(iter(by_method.values()))
-    published = Value(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
+    published = ShownValue(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
     compared = (cell for method in methods for cell in _compared(by_method.get(method)))
     return TableRow((first.quantity, first.unit, published, *compared))
 
@@ -94,10 +105,10 @@ def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:
     at, one = numbered
     decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
     place = f"/figures/{at}"
-    # What the decimals do not show is the rounding of the printed figure.
+    # Smaller values are rounding of the printed figure.
     return (
-        Value(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
-        Value(
+        ShownValue(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
+        ShownValue(
             one.residual,
             "residual",
             one.unit,
@@ -106,7 +117,7 @@ def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:
             at=f"{place}/residual",
             fixed=True,
         ),
-        Value(
+        ShownValue(
             one.relative_residual, "relative_residual", "%", 1, signed=True, at=f"{place}/relative_residual", fixed=True
         ),
     )

@@ -8,19 +8,19 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.documents import document, with_profile
-from busplan.answers.key_values import Changes, settings_sentence
+from busplan.answers.key_values import NewValues, settings_sentence
 from busplan.answers.plan_options import option_margins, options_table
 from busplan.answers.verdict import warning_sentences
 from busplan.buses.figure import AXES, NODES, UTILISATION
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Part,
     Record,
     Report,
     Sentence,
-    Value,
+    ShownValue,
     figure_value,
     sentence,
 )
@@ -30,7 +30,7 @@ from busplan.sections.profile import Profile
 
 
 def plan_report(plan: Plan, *, with_circle: bool) -> Report:
-    """Answer the question of `plan`.
+    """Report of `plan`.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def plan_report(plan: Plan, *, with_circle: bool) -> Report:
 
 
 def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
-    """The recommendation, a row for each option, and what does not exist."""
+    """The recommendation, a row for each option, and the settings that have no value."""
     yield _headline(plan, with_circle=with_circle)
     yield from _warnings(plan)
     yield options_table(plan)
@@ -58,15 +58,15 @@ def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
         yield Sentence(("? not proven: the search for a smaller period was cut short (--max-circles).",))
     for number, one in enumerate(plan.impossible):
         proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        reason = Value(one.reason, "reason", at=f"/impossible/{number}/reason")
+        reason = ShownValue(one.reason, "reason", at=f"/impossible/{number}/reason")
         yield sentence(f"{one.title.capitalize()}: none, {{}}{proven}.", reason)
 
 
 # --- sentences ------------------------------------------------------------------------------------------------
 
 
-def settings(profile: Profile, changes: Changes) -> str:
-    """Write changes as a profile has them.
+def settings(profile: Profile, changes: NewValues) -> str:
+    """Write changes as in a profile.
 
     Examples
     --------
@@ -77,8 +77,8 @@ def settings(profile: Profile, changes: Changes) -> str:
     return sentence_text(_settings(profile, changes))
 
 
-def _settings(profile: Profile, changes: Changes, *, at: str = "") -> Sentence:
-    # A number of nodes is what was asked for, never what a second bus would leave.
+def _settings(profile: Profile, changes: NewValues, *, at: str = "") -> Sentence:
+    # The number of nodes is the goal here, so the note on a second bus does not apply.
     meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
     return settings_sentence(changes, meanings=meanings, at=at)
 
@@ -88,7 +88,7 @@ _OF_MODELS: Final = (
     (" both timing models", " in the tighter one"),
     (" every timing model", " in the tightest one"),
 )
-"""What fits, and in which there is least to spare: of one timing model, of two and of more."""
+"""What fits, and which model has the least margin: for one timing model, for two and for more."""
 
 
 def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
@@ -114,7 +114,7 @@ def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
 
 
 def _goal(plan: Plan) -> tuple[Part, ...]:
-    """What is planned for."""
+    """The goal of the plan."""
     goal = plan.goal
     nodes, axes = goal.bus.nodes, goal.bus.nodes * goal.node.axes
     return (
@@ -182,7 +182,7 @@ def _record(plan: Plan, option: Option) -> Record:
 
 
 def plan_records(plan: Plan) -> list[Record]:
-    """One row an option, its changes and failures as words."""
+    """One row for each option, with its changes and failures as text."""
     return [
         {
             **record,
@@ -193,7 +193,7 @@ def plan_records(plan: Plan) -> list[Record]:
     ]
 
 
-def plan_document(plan: Plan) -> Document:
+def plan_document(plan: Plan) -> JsonDocument:
     """Document of `busplan plan --format json`."""
     recommended = None if plan.recommended is None else plan.all_changes(plan.recommended)
     return document(

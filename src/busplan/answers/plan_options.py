@@ -1,30 +1,30 @@
-"""The options of a plan, side by side in one table."""
+"""The options of a plan as one table."""
 
 from typing import Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.options import Option, Plan
-from busplan.answers.key_values import Changes, key_value, settings_sentence
+from busplan.answers.key_values import NewValues, key_value, settings_sentence
 from busplan.buses import bus
 from busplan.buses.figure import BINDING_TERM, MARGIN, MAX_AXES, MAX_NODES
 from busplan.forms.blocks import (
     Cell,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
+    attribute_value,
     figure_value,
     joined,
     sentence,
-    value_of,
 )
 from busplan.forms.numbers import MISSING, period_value
 from busplan.sections.profile import Profile
 
 
 def options_table(plan: Plan) -> Table:
-    """What each option sets and what it brings; the recommended one has a mark."""
+    """Settings and results of each option; the recommended one has a mark."""
     first = plan.options[0]
     columns = (
         TableColumn("option", kind="words"),
@@ -44,23 +44,23 @@ def _row(option: Option, *, at: str) -> TableRow:
         "*" * option.recommended + "?" * (not option.proven),
         _short(option.profile, option.changes, at=f"{at}/changes"),
         figure_value(BINDING_TERM, option.deciding.binding_term, at=f"{at}/{BINDING_TERM.key}"),
-        Value(option.bounded_by, "bounded_by", at=f"{at}/bounded_by"),
+        ShownValue(option.bounded_by, "bounded_by", at=f"{at}/bounded_by"),
         circle,
         *option_margins(option, at=at),
-        *(value_of(one, option.deciding, at=at) for one in (MAX_NODES, MAX_AXES)),
+        *(attribute_value(one, option.deciding, at=at) for one in (MAX_NODES, MAX_AXES)),
     )
-    return TableRow(cells, sought=option.recommended)
+    return TableRow(cells, highlighted=option.recommended)
 
 
-def option_margins(option: Option, *, at: str) -> list[Value]:
-    """What is left under the timing model that decides, and under each other one.
+def option_margins(option: Option, *, at: str) -> list[ShownValue]:
+    """Margins under the timing model that decides, and under each other model.
 
     Parameters
     ----------
     option
         The option.
     at
-        Its place in the JSON document, which has the least of the others.
+        JSON pointer to the option; the document has only the smallest margin of the other models.
     """
     least_us = min((one.margin_us for one in option.others), default=None)
     found = []
@@ -81,8 +81,8 @@ _SHORT: Final = {
 }
 
 
-def _short(profile: Profile, changes: Changes, *, at: str) -> Cell:
-    """What an option sets, in a few words."""
+def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
+    """The settings of an option, in a few words."""
     if not changes:
         return MISSING
     payloads = {value for key, value in changes.items() if key.startswith("payload.")}
@@ -101,6 +101,6 @@ def _short(profile: Profile, changes: Changes, *, at: str) -> Cell:
     )
 
 
-def _short_value(key: str, value: bus.Value, *, at: str) -> Value:
+def _short_value(key: str, value: bus.Value, *, at: str) -> ShownValue:
     found = key_value(key, value, at=at)
     return found._replace(unit=period_value(float(value)).unit) if key == "cycle.period_us" else found

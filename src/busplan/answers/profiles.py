@@ -9,7 +9,7 @@ from busplan.sections.profile import Profile
 
 
 def profiles_report(profiles: Sequence[Profile]) -> Report:
-    """Answer the question of `profiles`: what every command takes by name.
+    """Report of `profiles`: the profiles that every command takes by name.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def profiles_report(profiles: Sequence[Profile]) -> Report:
 
 
 def _record(profile: Profile) -> Record:
-    """What it is called and what it stands for."""
+    """Name, main figures and description."""
     return {
         "name": profile.name,
         "nodes": profile.bus.nodes,

@@ -9,7 +9,7 @@ from busplan.buses.rule import Rule
 from busplan.forms.blocks import (
     Block,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
@@ -24,7 +24,7 @@ _COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("code
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:
-    """Answer the question of `rule`: one line a rule.
+    """Report of `rule` with one line for each rule.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def rules_report(rules: Sequence[Rule]) -> Report:
 
 
 def rule_report(rule: Rule) -> Report:
-    """Answer the question of `rule CODE`: all that is to say of one rule.
+    """Report of `rule CODE` with the explanation of one rule.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def _blocks(rule: Rule) -> Iterator[Block]:
         yield Snippet((f"# busplan: ignore[{rule.code}] reason",))
 
 
-def _document(rules: Sequence[Rule]) -> Document:
+def _document(rules: Sequence[Rule]) -> JsonDocument:
     return document("rule", rules=_records(rules))
 
 

@@ -17,19 +17,19 @@ from busplan.forms.blocks import (
     Block,
     Chart,
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Swatch,
     Table,
     TableColumn,
     TableRow,
-    Value,
+    attribute_value,
     joined,
     sentence,
     state_of,
-    value_of,
     with_values,
 )
 from busplan.forms.columns import sentence_text
@@ -39,7 +39,7 @@ _TOTAL_FIGURES: Final = (EVENTS, TOTAL, SHARE)
 
 
 def timeline_report(plan: Schedule) -> Report:
-    """Answer the question of `timeline`."""
+    """Report of `timeline`."""
     return Report(
         Sentence(("Timeline of ", Code(plan.profile.name))),
         lambda: tuple(_blocks(plan)),
@@ -49,7 +49,7 @@ def timeline_report(plan: Schedule) -> Report:
 
 
 def _blocks(plan: Schedule) -> Iterator[Block]:
-    """Whether the cycle fits, the cycle to scale, and what each kind of event takes of it."""
+    """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
     yield headline(plan)
     yield from (Sentence((words,), "warns") for words in _warnings(plan))
     yield timeline_chart(plan)
@@ -57,7 +57,7 @@ def _blocks(plan: Schedule) -> Iterator[Block]:
 
 
 def headline(plan: Schedule) -> Sentence:
-    """Say whether the cycle fits, and under which model."""
+    """Say whether the cycle fits under its timing model."""
     figures = plan.figures
     parts = (
         *(Code(plan.profile.name), " at ", period_value(figures.period_us), ": "),
@@ -83,7 +83,7 @@ def timeline_chart(plan: Schedule) -> Chart:
 
 
 def totals_table(plan: Schedule) -> Table:
-    """What each kind of event takes of the window.
+    """Total time of each kind of event in the window.
 
     Parameters
     ----------
@@ -98,18 +98,18 @@ def totals_table(plan: Schedule) -> Table:
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(plan, number, one) for number, one in enumerate(totals(plan))),
-        sentence(f"What takes {part}, {{}}", Value(plan.to_us - plan.from_us, "duration_us", "us", 3)),
+        sentence(f"What takes {part}, {{}}", ShownValue(plan.to_us - plan.from_us, "duration_us", "us", 3)),
     )
 
 
 def _total_row(plan: Schedule, number: int, one: Total) -> TableRow:
     kind = kind_of(plan.profile, one.kind)
-    values = (value_of(figure, one, at=f"/totals/{number}") for figure in _TOTAL_FIGURES)
+    values = (attribute_value(figure, one, at=f"/totals/{number}") for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
 
 
 def _placed(one: Sentence, plan: Schedule) -> Sentence:
-    """Give each figure its place in the document, where it stands there as it is."""
+    """Add the place of each figure that the document has."""
     facts = _facts(plan)
     return with_values(
         one, lambda value: value._replace(at=f"/{value.key}") if facts.get(value.key) == value.value else value
@@ -120,8 +120,8 @@ def _warnings(plan: Schedule) -> list[str]:
     return warnings(plan.profile, nodes=plan.figures.nodes, most=0)
 
 
-def _facts(plan: Schedule) -> Document:
-    """What the document says of the whole cycle, and the window."""
+def _facts(plan: Schedule) -> JsonDocument:
+    """The document without events: figures of the whole cycle, and the window."""
     figures = plan.figures
     return document(
         "timeline",
@@ -142,19 +142,19 @@ def _facts(plan: Schedule) -> Document:
     )
 
 
-def timeline_document(plan: Schedule) -> Document:
+def timeline_document(plan: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
     return {**_facts(plan), "events": _event_records(plan), "totals": [one._asdict() for one in totals(plan)]}
 
 
 def timeline_records(plan: Schedule) -> list[Record]:
-    """Rows for CSV, one an event: profile and model in front."""
+    """One row for each event, with profile and timing model in front."""
     head = {"profile": plan.profile.name, "timing_model": plan.figures.timing_model}
     return [{**head, **record} for record in _event_records(plan)]
 
 
 def _event_records(plan: Schedule) -> list[Record]:
-    """One row an event of the window."""
+    """One row for each event of the window."""
     return [
         {
             "kind": event.kind,

@@ -1,4 +1,4 @@
-"""Verdicts in sentences that a person can act on."""
+"""The verdict of `capacity` in sentences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -9,17 +9,17 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import AVAILABLE, MARGIN, MAX_AXES, MAX_NODES, REQUIRED, UTILISATION
-from busplan.forms.blocks import Code, Part, Sentence, Value, count_value, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
 
 Places = Mapping[str, str]
-"""Where the figures of each timing model stand in the JSON document."""
+"""JSON pointer to the figures of each timing model."""
 NO_PLACES: Places = {}
 
 
 def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO_PLACES) -> Iterator[Sentence]:
-    """Say what the verdict is, what the bus carries, what to change, and what to beware of.
+    """Say the verdict, what the bus carries, the advised change, and warnings.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     profile
         The network.
     places
-        Where its figures stand in the document.
+        JSON pointers to its figures.
     """
     figures = verdict.deciding
     at = places.get(figures.timing_model, "")
@@ -38,7 +38,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     largest = max(figures.terms, key=lambda term: term.us)
     yield sentence(
         f"Largest term: {figures.binding_term}, {{}} of {{}}.",
-        Value(largest.us, largest.key, "us", 3, at=_place(at, largest.key)),
+        ShownValue(largest.us, largest.key, "us", 3, at=_place(at, largest.key)),
         figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
     )
     yield _carries(verdict, places)
@@ -48,7 +48,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
-    """What to beware of, whatever the verdict.
+    """Warnings, whatever the verdict.
 
     Parameters
     ----------
@@ -57,18 +57,18 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
     nodes
         Nodes on the bus [1].
     most
-        Largest number of nodes that the report speaks of [1].
+        Largest number of nodes in the report [1]; 0 if it has none.
     """
     return bus_of(profile).warnings(network_of(profile), nodes=[number for number in (nodes, most) if number])
 
 
 def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Sentence]:
-    """The same, in sentences."""
+    """Warnings as sentences; see `warnings`."""
     return (Sentence((words,), "warns") for words in warnings(profile, nodes=nodes, most=most))
 
 
 def execution_sentence(profile: Profile) -> Iterator[Sentence]:
-    """Say how the execution time is known, wherever a figure is shown that rests on it; nothing where nobody says."""
+    """Say how the execution time behind the figures is known; nothing if the profile has no grade."""
     grade = profile.node.execution.grade
     if grade is not None:
         text = f"The execution time behind these figures is {grade}."
@@ -99,7 +99,7 @@ def _headline(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
 
 
 def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[Part, ...]:
-    """Say of one set of figures whether it fits, and by how much or why not.
+    """Say whether a cycle fits, and by how much or why not.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
     profile
         The network.
     at
-        Where they stand in the JSON document.
+        JSON pointer to them.
     """
     available = figure_value(AVAILABLE, figures.available_us, at=_place(at, AVAILABLE.key))
     if figures.fits:
@@ -120,7 +120,7 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
             available,
         ).parts
     needed = figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key))
-    short = Value(-figures.margin_us, MARGIN.key, "us", 3)
+    short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
     broken = (bus_of(profile).limit(key) for key in figures.exceeded)
     reasons = (
         sentence("{} short, {} needed of {}", short, needed, available)
@@ -178,7 +178,7 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
 
 
 def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
-    """Say that there is no change to advise, and why."""
+    """Say that no change is advised, and why."""
     bus, figures = bus_of(profile), verdict.deciding
     if not verdict.all_well:
         if all(one.fits for one in verdict.all_figures):
@@ -194,16 +194,16 @@ def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
 
 
 def places_of(results: Sequence[CapacityFigures], *, start: int, change: int) -> dict[str, str]:
-    """Where the figures of one period stand in the document of `capacity`.
+    """JSON pointers to the figures of one period in the document of `capacity`.
 
     Parameters
     ----------
     results
-        Figures of the period, a set for each timing model.
+        Figures of the period, one set for each timing model.
     start
-        Number of the first among all results.
+        Index of the first one in all results.
     change
-        Number of the period among the verdicts.
+        Index of the period in the verdicts.
     """
     own = {one.timing_model: f"/results/{start + number}" for number, one in enumerate(results)}
     return {**own, "change": f"/verdicts/{change}/cheapest_change"}

@@ -1,1 +1,1 @@
-"""The Python interface: each function a module, with its answer; `import busplan` gives them all by name."""
+"""The Python interface: one module for each function and its answer; `import busplan` has them all."""

@@ -1,4 +1,4 @@
-"""What every answer of the Python interface can do."""
+"""Base class of the answers of the Python interface."""
 
 import json
 from abc import ABC, abstractmethod
@@ -11,23 +11,23 @@ from busplan.forms.terminal import block_lines
 
 
 class Answer(ABC):
-    """A frozen answer: its figures as attributes, its report as text, its document as plain data."""
+    """A frozen answer: figures are attributes, `str()` is the report, `to_dict()` the JSON document."""
 
     __slots__ = ()
 
     def to_json(self) -> str:
-        """Write the document of the command's `--format json`, as text with a line end."""
+        """Return the document of the command's `--format json` as text."""
         return render(self._report(), "json")
 
     def to_dict(self) -> dict[str, Any]:
-        """Give the document of the command's `--format json` as plain data, anew with each call."""
-        # Through the text, so that both are the same whatever the figures are made of.
+        """Return the document of the command's `--format json` as new plain data."""
+        # Parse the text, so that both are equal whatever the types of the figures.
         document: dict[str, Any] = json.loads(self.to_json())
         return document
 
     @abstractmethod
     def _report(self) -> Report:
-        """What the command answers."""
+        """The report of the command."""
 
     def _headline(self) -> str:
         """The answer in one line."""
@@ -40,5 +40,5 @@ class Answer(ABC):
         return f"<{type(self).__name__}: {self._headline()}>"
 
     def _repr_html_(self) -> str:
-        # For notebooks, which would break the lines of a table; what a profile is called is text, never markup.
+        # Notebooks would wrap the lines of a table without <pre>.
         return f"<pre>{escape(str(self))}</pre>"

@@ -22,9 +22,9 @@ class CapacityAnswer(Answer):
     profile
         The network.
     periods
-        Figures of each period, a set for each timing model.
+        Figures of each period, one set for each timing model.
     verdicts
-        What to act on, one for each period.
+        One verdict for each period.
     """
 
     profile: Profile
@@ -33,7 +33,7 @@ class CapacityAnswer(Answer):
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
-        """All sets of figures in one row: a period after the other, a timing model after the other within each."""
+        """All sets of figures, period by period, and in each period timing model by timing model."""
         return self._found.results
 
     def _report(self) -> Report:
@@ -57,9 +57,9 @@ def capacity(
     profile
         The network: a `Profile`, a path or a shipped name.
     periods_us
-        Communication periods T_s [us], shape (n,); without them the profile's own.
+        Communication periods T_s [us], shape (n,); by default the profile's own.
     timing_models
-        Names of timing models, in this order; without them all of the kind of bus. IEEE 1394 has "paper" for the
+        Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
         paper's equations as published, and "standard" for the standard's clock and packets.
 
     Returns
@@ -70,7 +70,7 @@ def capacity(
     Raises
     ------
     BusplanError
-        No profile, a period that a profile cannot have, or another timing model.
+        Not a profile, an invalid period, or an unknown timing model.
 
     References
     ----------

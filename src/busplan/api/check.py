@@ -21,14 +21,14 @@ class CheckAnswer(Answer):
     Parameters
     ----------
     files
-        Each file with its `status`, its `findings` and, where it could not be checked, the `failure`.
+        Each file with its `status`, its `findings` and, if it could not be checked, its `failure`.
     """
 
     files: tuple[FileResult, ...]
 
     @property
     def findings(self) -> tuple[Located, ...]:
-        """All findings in the order of files and places, each with the `path` and the line of its file."""
+        """All findings by file and place, each with the `path` and the source line."""
         return self._found.located
 
     @property
@@ -53,25 +53,25 @@ class CheckAnswer(Answer):
 
 
 def check(paths: Path | Iterable[Path], *, with_circle: bool = True) -> CheckAnswer:
-    """Find what of some profiles no longer fits its bus or its circle.
+    """Check whether profiles fit their bus and hold their circle.
 
     Parameters
     ----------
     paths
-        Files, folders (every *.toml below that claims a `schema_version`) and shipped names; one, or several.
+        One or several files, folders (every *.toml below with a `schema_version`) or shipped names.
     with_circle
         Run the circle test of profiles that ask for one.
 
     Returns
     -------
     CheckAnswer
-        Findings with code, message, key, line and column. A file that cannot be read is no error here: its `failure`
-        says why, and the others are checked.
+        Findings with code, message, key, line and column. A file that cannot be read raises nothing: it has a
+        `failure`, and the others are checked.
 
     Raises
     ------
     BusplanError
-        No path at all, or standard input.
+        No path, or standard input.
 
     Examples
     --------

@@ -23,11 +23,11 @@ class CircleTestAnswer(Answer):
     profile
         The network, its servo and its circle.
     results
-        Figures of each period; what was not simulated is None.
+        Figures of each period; those of a simulation that did not run are None.
     runs
-        The simulation of each period, with its `trace`; None where the bus does not carry the cycle.
+        Simulation of each period, with its `trace`; None if the cycle does not fit the bus.
     with_contributions
-        Whether the document and the report rank the error sources.
+        If True, document and report rank the error sources.
     """
 
     profile: Profile
@@ -55,18 +55,18 @@ def circle_test(
     with_contributions: bool = False,
     progress: Progress | None = None,
 ) -> CircleTestAnswer:
-    """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
+    """Tell whether the circle is still round: simulate both axes at the communication period.
 
     Parameters
     ----------
     profile
         The network, its servo and its circle: a `Profile`, a path or a shipped name.
     periods_us
-        Communication periods T_s [us], shape (n,); without them the profile's own.
+        Communication periods T_s [us], shape (n,); by default the profile's own.
     with_contributions
-        Remove each error source in turn and rank them.
+        If True, remove each error source in turn, and rank them.
     progress
-        Called now and then with the steps simulated so far and those known to be needed.
+        Called from time to time with the steps simulated and the steps known to be needed.
 
     Returns
     -------
@@ -76,8 +76,8 @@ def circle_test(
     Raises
     ------
     BusplanError
-        No profile, a period that is no multiple of the step, a feed that the drive cannot reach, or a circle too short
-        for its ramps.
+        Not a profile, a period that is no multiple of the step, a feed that the drive cannot reach, or a circle too
+        short for its ramps.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""What callers give: a profile in any of its forms, and values as lists, ranges or NumPy arrays."""
+"""Arguments of the Python interface: profiles, and values as lists, ranges or NumPy arrays."""
 
 import os
 import sys
@@ -14,7 +14,7 @@ from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 Path = str | os.PathLike[str]
-"""A text may also be the name of a shipped profile; a path object is always a path."""
+"""A str may also be the name of a shipped profile; a path object is always a path."""
 ProfileLike = Profile | Path
 MOST_FLOAT: Final = sys.float_info.max
 
@@ -22,16 +22,16 @@ _Item = TypeVar("_Item")
 
 
 def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None = None) -> Profile:
-    """Read and check a profile, and change values of it.
+    """Read and check a profile, and change some of its values.
 
     Parameters
     ----------
     profile
-        A path, the name of a shipped profile, or a `Profile`, which is taken as it is. A text that is a shipped name
-        means the shipped profile; "./paper-4ms" and path objects are always files.
+        A path, the name of a shipped profile, or a `Profile`. A str that is a shipped name means the shipped profile;
+        "./paper-4ms" and path objects are always files.
     changes
         New values by dotted key, in the key's unit: {"bus.nodes": 3, "cycle.period_us": 500}. They are checked like a
-        file; the file stays as it is.
+        file; the file is not changed.
 
     Returns
     -------
@@ -41,8 +41,8 @@ def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None =
     Raises
     ------
     BusplanError
-        Not there, not readable, no TOML or no profile, with the place of every problem; or a change that the profile's
-        schema refuses.
+        The file does not exist, cannot be read or is not a valid profile, with the place of every problem; or the
+        profile's schema refuses a change.
 
     Examples
     --------
@@ -65,32 +65,32 @@ def _key(key: object) -> str:
 
 
 def argument(path: Path) -> str:
-    """What a path would be on the command line.
+    """PROFILE argument of the command line for a path.
 
     Raises
     ------
     BusplanError
-        Standard input, which is the command line's; or no path at all.
+        Standard input, or not a path.
     """
     if not isinstance(path, str | os.PathLike):
         raise BusplanError(f"{path!r}: expected a path, the name of a shipped profile, or a Profile")
     if path == "-":
         raise BusplanError("-: standard input is read by the command line alone; give a file or a shipped profile")
-    return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib has none that keeps links
+    return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib would resolve links
 
 
 def plain(value: Any) -> Any:
-    """A number of NumPy as Python's own, and an array as a list; all else as it is."""
+    """Convert a NumPy number or array to Python; return anything else unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
-    """Values one by one, each plain.
+    """List of several values, converted from NumPy.
 
     Raises
     ------
     BusplanError
-        A single value, or none.
+        A single value, or no values.
     """
     plain_values = plain(values)
     if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
@@ -102,12 +102,12 @@ def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
 
 
 def checked_models(timing_models: Iterable[str] | None, profile: Profile) -> tuple[str, ...]:
-    """Timing models, each once; without any all of the profile's kind of bus.
+    """Check the names of timing models; None means all of the profile's kind of bus.
 
     Raises
     ------
     BusplanError
-        Others, or one twice.
+        An unknown or a repeated name.
     """
     known = model_names(profile)
     if timing_models is None:
@@ -126,10 +126,10 @@ def finite(value: object, *, name: str) -> float:
     Raises
     ------
     BusplanError
-        NaN, infinite, a truth, or no number.
+        NaN, infinite, a bool, or not a number.
     """
     found = plain(value)
-    # A whole number beyond a float is none either, and says so by an error of its own.
+    # Comparing first: float() of a huge int would raise OverflowError.
     if type(found) not in (int, float) or not -MOST_FLOAT <= found <= MOST_FLOAT:
         raise BusplanError(f"{name} {found!r}: expected a finite number")
     return float(found)
@@ -141,7 +141,7 @@ def whole(value: object, *, name: str) -> int:
     Raises
     ------
     BusplanError
-        Anything else, or more than a profile may have of anything.
+        Anything else, or more than the largest count in a profile.
     """
     found = plain(value)
     if type(found) is not int or not 1 <= found <= MAX_COUNT:

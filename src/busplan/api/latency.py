@@ -22,7 +22,7 @@ class LatencyAnswer(Answer):
     profile
         The network.
     transactions
-        One for each payload, kind and timing model, in this nesting, each taken apart in its `phases`.
+        One for each payload, kind and timing model, nested in this order, with its `phases`.
     """
 
     profile: Profile
@@ -52,9 +52,9 @@ def latency(
     profile
         The network: a `Profile`, a path or a shipped name.
     payloads_bytes
-        Payloads of both read and write [bytes], shape (n,); without them the profile's own of each.
+        Payloads of both read and write [bytes], shape (n,); by default the profile's own.
     timing_models
-        Names of timing models, in this order; without them all of the kind of bus. IEEE 1394 has "paper" for the
+        Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
         paper's equations as published, and "standard" for the standard's clock and packets.
 
     Returns
@@ -65,7 +65,7 @@ def latency(
     Raises
     ------
     BusplanError
-        No profile, a payload that is none or whose execution time is not known, or another timing model.
+        Not a profile, an invalid payload or one whose execution time is not known, or an unknown timing model.
 
     References
     ----------

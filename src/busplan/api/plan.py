@@ -22,15 +22,15 @@ class PlanAnswer(Answer):
     Parameters
     ----------
     profile
-        The profile as it was read.
+        The original profile.
     goal
-        The profile with what was asked for.
+        The profile with the wanted values.
     wanted
-        What was asked for and is not in the profile yet, by dotted key.
+        Wanted values that differ from the profile, by dotted key.
     options
-        Ways to set the network, each computed with it in place.
+        Ways to set the network, each with its figures.
     impossible
-        Settings without a value that would do, with the reason.
+        Settings that have no suitable value, with the reason.
     with_circle
         Whether the circle test was run.
     """
@@ -44,12 +44,12 @@ class PlanAnswer(Answer):
 
     @property
     def recommended(self) -> Option | None:
-        """The option to take, with its `profile`; None when there is no plan for the goal."""
+        """The recommended option, with its `profile`; None if there is no plan for the goal."""
         return self._found.recommended
 
     @property
     def recommended_changes(self) -> dict[str, Value] | None:
-        """What turns the profile as it was read into the recommended one; None when there is no plan."""
+        """Changes from the original profile to the recommended one; None if there is no plan."""
         option = self.recommended
         return None if option is None else self._found.all_changes(option)
 
@@ -78,28 +78,28 @@ def plan(
     profile
         The network: a `Profile`, a path or a shipped name. It is not changed.
     nodes
-        Goal: so many distributed nodes [1]; without it, and without `axes`, the profile's own.
+        Goal: number of distributed nodes [1]; without it and `axes`, the profile's own.
     axes
-        Goal: so many axes, on the nodes they need [1]; instead of `nodes`.
+        Goal: number of axes, on as few nodes as they need [1]; instead of `nodes`.
     period_us
-        Communication period T_s, which is then kept [us].
+        Communication period T_s to keep [us].
     gap_count
-        Gap count, which is then kept: 0 to 63, or "optimal" [1].
+        Gap count to keep, 0 to 63, or "optimal" [1].
     with_circle
-        Run the circle test, where the profile has a section for it.
+        Run the circle test, if the profile has a section for it.
     max_circles
-        How many periods in a row are tried for the circle before the search takes longer strides [1].
+        Number of consecutive periods to test with the circle before the strides double [1].
 
     Returns
     -------
     PlanAnswer
-        The options, and the one to take: the cheapest after which the goal fits under both timing models with a safe
-        gap count, and passes the circle. Times are in us.
+        The options, and the recommended one: the cheapest after which the goal fits under all timing models with a
+        safe gap count, and passes the circle. Times are in us.
 
     Raises
     ------
     BusplanError
-        No profile, or a goal that no profile can have. That there is no plan is an answer.
+        Not a profile, or a goal that no profile can have. "No plan" is an answer, not an error.
 
     References
     ----------

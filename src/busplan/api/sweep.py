@@ -10,7 +10,7 @@ import numpy as np
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
-from busplan.analysis.sweep.blocks import Block, Column
+from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.circles import (
     MOST_CIRCLES_UNASKED,
     CircleTask,
@@ -32,7 +32,7 @@ from busplan.profile.kinds import words_of
 from busplan.sections.profile import Profile
 
 MOST_POINTS: Final = 2_000_000
-"""Points that are kept in memory: about half a gigabyte. The command line writes any number of them in flat memory."""
+"""Most points, about half a gigabyte of memory. The command line has no such limit."""
 _SHOWN: Final = 20
 """Rows of the report."""
 
@@ -41,28 +41,28 @@ _SHOWN: Final = 20
 class SweepAnswer(Answer):
     """Answer of `sweep`: a table with a row for each point and timing model, in the order of the grid.
 
-    `answer["max_axes"]` is a column as an array of shape (rows,), made anew with each call: numbers as numbers, words
-    as text, NaN what does not exist. Iterating gives the columns' names, `len(answer)` the rows.
+    `answer["max_axes"]` is a new array of shape (rows,): numbers (NaN if missing) or words. Iterating gives the names
+    of the columns, `len(answer)` the number of rows.
 
     Parameters
     ----------
     profile
         The network.
     grid
-        Which keys go through which values.
+        The varied keys and their values.
     timing_models
         The timing models, in the order of the rows of a point.
     columns
         Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests.
     blocks
-        The figures as they were computed.
+        The figures, block by block.
     """
 
     profile: Profile
     grid: Grid
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]
-    blocks: tuple[Block, ...]
+    blocks: tuple[SweepBlock, ...]
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
@@ -76,7 +76,7 @@ class SweepAnswer(Answer):
         return self.grid.points * len(self.timing_models)
 
     def keys(self) -> tuple[str, ...]:
-        """Names of all columns, so that `dict(answer)` is a table."""
+        """Names of all columns; `dict(answer)` is a table."""
         return self.columns
 
     def to_json(self) -> str:
@@ -98,8 +98,8 @@ class SweepAnswer(Answer):
         )
 
 
-def _rows(block: Block, name: str) -> Array:
-    """One column of a block, words spelled out."""
+def _rows(block: SweepBlock, name: str) -> Array:
+    """One column of a block as a flat array."""
     parts = [np.broadcast_to(_spelled(column), block.chunk.shape).ravel() for column in block.columns(name)]
     return np.stack(parts, axis=1).ravel()
 
@@ -126,27 +126,26 @@ def sweep(
     profile
         The network: a `Profile`, a path or a shipped name.
     vary
-        Values by dotted key, in the key's unit: a list, range or array of shape (n,), or the command line's text as
-        "250:8000:250". Words that a key takes, as "optimal", may be among them. The last key changes fastest.
+        Values by dotted key, in the key's unit: a list, range or array of shape (n,), or text as on the command line:
+        "250:8000:250". They may include words that a key takes, such as "optimal". The last key changes fastest.
     timing_models
-        Names of timing models, in this order; without them all of the kind of bus. IEEE 1394 has "paper" for the
+        Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
         paper's equations as published, and "standard" for the standard's clock and packets.
     with_circle
-        Also run the circle test of every point, one after the other, and add its columns (errors in mm, margins).
+        Also run the circle test of every point, and add its columns (errors in mm, margins).
     force
-        Run more circle tests than are sane without being asked twice.
+        Allow more than 1,000 circle tests.
 
     Returns
     -------
     SweepAnswer
-        Columns by name, each an array of shape (points times timing models,), a point after the other and a timing
-        model after the other within each.
+        Columns by name, each an array of shape (points * timing models,), point by point, and for each point timing
+        model by timing model.
 
     Raises
     ------
     BusplanError
-        No profile, a key or value that it cannot have, a point without a circle test, or more points than are kept in
-        memory.
+        Not a profile, an invalid key or value, a point whose circle test cannot be run, or too many points.
 
     References
     ----------

@@ -21,9 +21,9 @@ class TimelineAnswer(Answer):
     profile
         The network.
     figures
-        Capacity of the cycle: what it needs, what it may take, and whether it fits.
+        Capacity of the cycle: time needed, time available, and whether it fits.
     cycle_events
-        Every event of the cycle, and what is left of its slice.
+        Events of the whole cycle, and the idle rest of its slice.
     from_us, to_us
         Start and end of the window [us].
     """
@@ -36,12 +36,12 @@ class TimelineAnswer(Answer):
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Events inside the window, cut off at its edges."""
+        """Events inside the window, clipped to it."""
         return self._found.events
 
     @property
     def totals(self) -> tuple[Total, ...]:
-        """What the events of the window add up to, by kind."""
+        """Totals of the events in the window, by kind."""
         return totals(self._found)
 
     def _report(self) -> Report:
@@ -67,21 +67,21 @@ def timeline(
     profile
         The network: a `Profile`, a path or a shipped name.
     timing_model
-        Name of a timing model, as "standard"; without it the profile's own, which decides.
+        Name of a timing model, such as "standard"; by default the one that decides.
     from_us, to_us
-        Start and end of the window, counted from the start of the cycle [us]; without them the cycle's own.
+        Start and end of the window, from the start of the cycle [us]; by default the whole cycle.
     transaction
-        One transaction of one node with its gaps, as ("read", 1).
+        One transaction of one node with its gaps: ("read", 1).
 
     Returns
     -------
     TimelineAnswer
-        Its `events` touch each other; times are in us.
+        Its `events` have no gaps between them; times are in us.
 
     Raises
     ------
     BusplanError
-        No profile, more nodes than can be laid out, another timing model, or a window with nothing in it.
+        Not a profile, too many nodes, an unknown timing model, or an empty window.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The command line: parse, call, render, exit. One module a command; heavy imports stand inside the commands."""
+"""The command line: parse, call, render, exit. Each command has a module; heavy imports are inside the commands."""
 
 import sys
 from pathlib import Path
@@ -52,13 +52,13 @@ def _options(
 
 
 def run() -> None:
-    """Run the command line and exit, with the codes of its epilog."""
+    """Run the command line and exit with one of the codes in its epilog."""
     mend_streams()
     try:
         with signals_end_the_run():
             app(prog_name="busplan")
     except SystemExit as leaving:
-        # Typer exits by itself, with 2 for usage and 130 for Ctrl-C. Its 1 is a closed pipe or worse, and no verdict.
+        # Typer exits with 2 for usage, 130 for Ctrl-C, and 1 for a closed pipe or other errors, which is no verdict.
         sys.exit(CANNOT if leaving.code == PLAN_FAILS else leaving.code)
     except PlanFailsError:
         sys.exit(PLAN_FAILS)
@@ -66,15 +66,15 @@ def run() -> None:
         say(*error.problems)
     except OSError as error:
         say(_in_words(error))
-    except Exception as error:  # noqa: BLE001 - the last net: Python's own exit code 1 would read as a verdict
+    except Exception as error:  # noqa: BLE001 - Python's exit code 1 would read as a verdict
         say(f"busplan itself failed ({type(error).__name__}: {error}); please report this")
     sys.exit(CANNOT)
 
 
 def _in_words(error: OSError) -> str:
-    """What the operating system refused, and where."""
+    """Message of an error of the operating system."""
     try:
         Path.cwd()
     except OSError:
-        return "the working folder is no longer there; change into one that is"
+        return "the working folder no longer exists; change into one that does"
     return ": ".join(str(part) for part in (error.filename, error.strerror or error) if part)

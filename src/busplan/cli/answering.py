@@ -1,4 +1,4 @@
-"""How a command gives its answer: in the form that is asked for, on standard output or in a file."""
+"""Write the answer of a command: in the requested form, to standard output or a file."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -28,25 +28,25 @@ def answer(
     default: Form = "table",
     refused: Mapping[Form, str] = NOTHING_REFUSED,
 ) -> "Iterator[Callable[[Report], None]]":
-    """Open the destination of an answer before the work for it: a path that cannot be written is said at once.
+    """Open the destination of an answer before the work, so that a path that cannot be written fails at once.
 
     Parameters
     ----------
     form
-        What --format says.
+        Value of --format.
     output
-        What --output says.
+        Value of --output.
     inputs
         Files that the command reads.
     default
-        The form on standard output, where none is asked for.
+        Form on standard output without --format.
     refused
-        Forms that make no sense for the question, with the reason.
+        Forms that this command does not have, with the reason.
 
     Raises
     ------
     BusplanError
-        A file that cannot be written, or that is an input; a form that is refused; or a name that says no form.
+        The file cannot be written or is an input, the form is refused, or the file name has no known ending.
     """
     chosen = form_of_file(form, output, forms=ENDINGS, default=default)
     if chosen in refused:
@@ -65,7 +65,7 @@ def _write(write: Callable[[bytes], object], report: "Report", form: Form) -> No
 
 
 def give(report: "Report", form: Form) -> None:
-    """Write an answer to standard output: for a terminal in its width and colours."""
+    """Write an answer to standard output, on a terminal in its width and colours."""
     if form == "table":
         from busplan.forms import terminal
 
@@ -75,7 +75,7 @@ def give(report: "Report", form: Form) -> None:
 
 
 def columns() -> int:
-    """Width of the terminal; in a pipe a drawing is the same wherever it runs."""
+    """Width of the terminal; without one, a fixed width, so that output is reproducible."""
     from busplan.forms.terminal import WIDTH
 
     if not sys.stdout.isatty():

@@ -1,4 +1,4 @@
-"""`--apply`: recommended values go into the profile's own file, in place, as a whole or not at all."""
+"""`--apply`: write recommended values into the profile's own file, all or none."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def require_own_file(argument: str) -> None:
-    """Refuse a PROFILE argument that names no file of the user's, or one that cannot be changed; before the work.
+    """Refuse a PROFILE argument that is not a file of the user, or a file that cannot be changed.
 
     Raises
     ------
@@ -34,20 +34,19 @@ def require_own_file(argument: str) -> None:
 def apply_changes(
     document: "Document", changes: Mapping[str, object], *, notes: Mapping[str, str] | None = None
 ) -> None:
-    """Change values of a profile's file; comments, layout and line ends stay.
+    """Change values in a profile's file; comments, layout and line ends stay.
 
     Parameters
     ----------
     document
-        The text that the changes are made for, of a file of the user's (see `require_own_file`).
+        The text that the changes are made for, from a file of the user (see `require_own_file`).
     changes, notes
         As for `profile.edit.edited`.
 
     Raises
     ------
     BusplanError
-        The file has another text by now, a change that cannot be made, or a file that cannot be written; it is as it
-        was.
+        The file was changed meanwhile, a change cannot be made, or the file cannot be written. The file is unchanged.
     """
     from busplan.profile.edit import edited_file
     from busplan.profile.toml import decode, read_bytes
@@ -55,7 +54,7 @@ def apply_changes(
     name = document.name
     path = Path(name)
     with changing(path):
-        # Absolute: a file may be called "-", which there means standard input.
+        # Absolute, because "-" would mean standard input.
         content = read_bytes(path.absolute(), name=name)
         if decode(content, name=name) != document:
             raise BusplanError(f"--apply: {name} was changed meanwhile, and stays as it is now; run the command again")

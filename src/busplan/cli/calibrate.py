@@ -14,8 +14,8 @@ from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     BUS_OPTIONS,
     NO_CHANGES,
-    Changes,
     FormatOption,
+    KeyChanges,
     OutputOption,
     ProfileArgument,
     takes_bus_options,
@@ -61,7 +61,7 @@ def calibrate_command(
             "through these medians instead of least squares.",
         ),
     ] = False,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
         typer.Option(
@@ -106,7 +106,7 @@ def calibrate_command(
             timing_model=None if timing is None else timing_model(timing, bench),
             form=form,
             robust=robust,
-            # The shipped example holds published figures: what is computed from them is derived.
+            # The shipped example has published figures, so the result is derived.
             grade="derived" if shipped else "measured",
         )
         if apply:
@@ -117,7 +117,7 @@ def calibrate_command(
 
 
 def _measurements_file(argument: str) -> Iterator[Path]:
-    """The file that MEASUREMENTS means; whoever reads it says what is wrong with any other."""
+    """File of the MEASUREMENTS argument; nothing if there is none: reading it will report the error."""
     from busplan.profile.shipped import locate_measurements
 
     with suppress(BusplanError, ValueError):  # ValueError: a NUL in the path

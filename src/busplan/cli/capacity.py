@@ -4,8 +4,8 @@ from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     NO_CHANGES,
-    Changes,
     FormatOption,
+    KeyChanges,
     OutputOption,
     PeriodsOption,
     ProfileArgument,
@@ -21,7 +21,7 @@ from busplan.cli.options import (
 def capacity_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
     format_: FormatOption = None,
     output: OutputOption = None,

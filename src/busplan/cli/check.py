@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
     FormatName = str
 else:
-    # What typer takes as choices.
+    # The choices for typer.
     FormatName = Literal[tuple(FORMATS)]
 
 Recordings = dict[str, dict[str, float]]
-_BUILD_FORMATS: Final = [name for name, one in FORMATS.items() if one.is_for_builds]
+_BUILD_FORMATS: Final = [name for name, one in FORMATS.items() if one.reader == "builds"]
 
 
 def check_command(
@@ -139,7 +139,7 @@ def _check(
         return CheckReport(tuple(map(one, sources)))
     from busplan.cli.workers import workers
 
-    # Only this process has the standard input.
+    # Only this process has standard input.
     own = {source: one(source) for source in sources if str(source.path) == "-"}
     others = [source for source in sources if source not in own]
     with workers(number) as map_:
@@ -153,7 +153,7 @@ def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
     from busplan.profile.toml import read_bytes
     from busplan.rules.baseline import MAX_BASELINE_BYTES, read_baseline
 
-    # Absolute: a file may be called "-", which there means standard input.
+    # Absolute, because "-" would mean standard input.
     content = read_bytes(path.absolute(), name=str(path), limit=MAX_BASELINE_BYTES)
     if len(content) > MAX_BASELINE_BYTES:
         raise BusplanError(f"{path}: is larger than {MAX_BASELINE_BYTES:,} bytes, so it is no baseline; give another")
@@ -165,12 +165,12 @@ def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
 
 
 def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
-    """Record what was checked; profiles that were not checked keep their record."""
+    """Record the checked profiles; others keep their record."""
     from busplan.rules.baseline import write_baseline
 
     now = {file.path: file.figures for file in report.files if file.figures}
     with changing(path):
-        # Read again: another run may have written since the check began.
+        # Read again: another run may have changed it since the check began.
         recorded = _read_baseline(path, needed=False) or {}
         rewrite(path, write_baseline({**recorded, **now}).encode())
     if not quiet:
@@ -180,7 +180,7 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
 def _write(report: "CheckReport", *, format_: str, output: Path | None) -> None:
     chosen = gate_format(format_)
     text = chosen.write(report)
-    if output is None and chosen.is_for_people:
+    if output is None and FORMATS[format_].reader == "people":
         emit_text(text)
     else:
         write_document(text, output, quiet=True)

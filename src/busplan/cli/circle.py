@@ -98,7 +98,7 @@ def circle_test_command(
         changes: dict[str, object] = {key: value for key, value in asked.items() if value is not None}
         plan = override(load(profile).profile, changes, origin=_OPTIONS)
         with ExitStack() as files:
-            # Opened before the simulation: a path that cannot be written is said at once.
+            # Opened before the simulation, so that a path that cannot be written fails at once.
             trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
             plot_file = files.enter_context(new_file(plot, overwrite=True)) if plot else None
             with progress_bar("circle test") as progress:
@@ -119,7 +119,7 @@ def circle_test_command(
 
 
 def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
-    """Draw what was simulated; where no period was, the old file stays as it is."""
+    """Draw the simulated periods; without any, an old file stays unchanged."""
     if all(run is None for run in test.runs):
         file.abandon()
         return

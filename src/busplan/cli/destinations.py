@@ -1,4 +1,4 @@
-"""Where a command may write: not over what it reads, not two things into one file, and no report into a profile."""
+"""Check output paths: no input, no other output and no profile may be overwritten."""
 
 import os
 import sys
@@ -15,21 +15,21 @@ _PROFILE: Final = ".toml"
 def require_apart(
     outputs: Mapping[str, Path | None], *, inputs: Iterable[Path] = (), of_profiles: bool = False
 ) -> None:
-    """Refuse to destroy a file: to be called before any work.
+    """Refuse output paths that would destroy a file; call it before any work.
 
     Parameters
     ----------
     outputs
-        Files to write, by the options that name them.
+        Files to write, by option.
     inputs
-        Files that are read; "-" is standard input.
+        Files to read; "-" is standard input.
     of_profiles
-        Whether profiles are what is written; nothing else may have a profile's name.
+        If True, the outputs are profiles; other outputs must not end in .toml.
 
     Raises
     ------
     BusplanError
-        An output that is an input or another output, by whatever name or link; or a profile's name for what is none.
+        An output is an input or another output, also through a link, or has the name of a profile without being one.
     """
     asked = {option: path for option, path in outputs.items() if path is not None}
     if not asked:
@@ -50,7 +50,7 @@ def require_apart(
 
 
 def profile_files(*arguments: str) -> Iterator[Path]:
-    """Files that PROFILE arguments mean; whoever reads them says what is wrong with the others."""
+    """Files of PROFILE arguments; invalid ones are left out: reading them will report the error."""
     from busplan.profile.shipped import locate
 
     for argument in arguments:
@@ -59,11 +59,11 @@ def profile_files(*arguments: str) -> Iterator[Path]:
 
 
 def _identity(path: Path) -> object:
-    """What two names of one file have in common."""
-    with suppress(OSError, ValueError, AttributeError):  # not there, and so on; AttributeError: a closed input
+    """Identity of a file, equal for all its names."""
+    with suppress(OSError, ValueError, AttributeError):  # no such file, and so on; AttributeError: a closed input
         status = os.fstat(sys.stdin.fileno()) if str(path) == "-" else path.stat()
         return status.st_dev, status.st_ino
-    # Not there yet: two names that differ in case are one file on some systems.
+    # A new file: names that differ in case are one file on some systems.
     real = _real(path)
     return str(real.parent), real.name.casefold()
 

@@ -96,7 +96,7 @@ def diff_command(
 
 
 def _models(timing: str, one: "Profile", other: "Profile") -> "tuple[str, ...] | None":
-    """Timing models that both profiles have; None for all, also where the two kinds of bus have none in common."""
+    """Timing models to compare; None for all, or for the deciding ones if the kinds of bus differ."""
     if timing == ALL_MODELS:
         return None
     if one.bus.kind != other.bus.kind:
@@ -118,7 +118,7 @@ def _tolerance(percent: float | None, *, wanted: bool) -> float:
 
 
 def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
-    """Run the circle tests of both profiles with one progress."""
+    """Make a function that runs the circle test, with one progress for both profiles."""
     number = count()
 
     def run(plan: "Profile") -> "CircleFigures":

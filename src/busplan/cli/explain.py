@@ -9,8 +9,8 @@ from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
     NO_CHANGES,
-    Changes,
     FormatOption,
+    KeyChanges,
     OutputOption,
     PeriodsOption,
     ProfileArgument,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def complete_figure(incomplete: str) -> list[str]:
-    """Figures that begin as typed, for the shell's completion."""
+    """Complete the name of a figure for the shell."""
     from busplan.analysis.register import figures_of
     from busplan.buses import kind_named, kind_names
 
@@ -53,7 +53,7 @@ def explain_command(
         ),
     ] = None,
     period: PeriodsOption = None,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
         typer.Option(
@@ -119,7 +119,7 @@ def _transactions(asked: str | None, profile: "Profile") -> "Sequence[str] | Non
 
 
 def _refuse_without_figure(options: "dict[str, object]") -> None:
-    """Refuse options that say which derivation of a figure, where there is none."""
+    """Refuse options of a derivation without a figure."""
     given = [name for name, value in options.items() if value]
     if given:
         raise BusplanError(f"{' and '.join(given)}: goes with a FIGURE, as in busplan explain PROFILE required_us")

@@ -1,4 +1,4 @@
-"""How --help reads: arguments by plain names, commands in whole sentences, and what the exit codes mean."""
+"""Layout of --help: plain argument names, whole sentences for commands, and the exit codes."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,9 +11,9 @@ FAILURES: Final = (
     "Exits 2 when it could not do its job and says why on standard error, 130 when interrupted, 143 when terminated, "
     "129 when hung up."
 )
-"""What holds for every command, and stands at the end of its help."""
+"""End of the help of every command."""
 _OFFER: Final = 60
-"""Characters of help beside an offer of the shell's completion."""
+"""Most characters of help for a completion in the shell."""
 _COMPLETION: Final = {
     "install_completion": "Add completion by the Tab key to the start-up file of your shell, and exit.",
     "show_completion": "Print the script that does it, to look at or to place by hand, and exit.",
@@ -21,7 +21,7 @@ _COMPLETION: Final = {
 
 
 class PlainCommand(TyperCommand):
-    """A command whose help says what a user needs, and nothing of types."""
+    """A command whose help has no Python types."""
 
     def __init__(self, name: str | None, **settings: Any) -> None:
         super().__init__(name, **settings)
@@ -29,11 +29,11 @@ class PlainCommand(TyperCommand):
             param.metavar = param.metavar or param.name.upper()
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Pieces of the usage line, without the braces that typer puts around what is required."""
+        """Pieces of the usage line, without typer's braces around required arguments."""
         return [piece.replace("{", "").replace("}", "") for piece in super().collect_usage_pieces(ctx)]
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
-        """Options that begin as typed."""
+        """Complete options."""
         return _on_one_line(super().shell_complete(ctx, incomplete))
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
@@ -42,31 +42,31 @@ class PlainCommand(TyperCommand):
 
 
 class PlainGroup(TyperGroup):
-    """The program's help: its commands first."""
+    """The program; its help lists the commands first."""
 
     def make_context(self, *arguments: Any, **settings: Any) -> Any:
-        """Read the options before the command."""
+        """Parse the options before the command."""
         with _usage_as_text():
             return super().make_context(*arguments, **settings)
 
     def invoke(self, ctx: Any) -> Any:
-        """Read what follows, and run the command."""
+        """Parse the command line of a command and run it."""
         with _usage_as_text():
             return super().invoke(ctx)
 
     def get_params(self, ctx: Any) -> list[Any]:
-        """Options, those of typer's completion in words of ours: it adds them behind our back."""
+        """Options, with our own help for the completion options that typer adds."""
         params: list[Any] = super().get_params(ctx)
         for param in params:
             param.help = _COMPLETION.get(param.name, param.help)
         return params
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
-        """Commands and options that begin as typed."""
+        """Complete commands and options."""
         return _on_one_line(super().shell_complete(ctx, incomplete))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write each command with its first sentence, whole: typer would cut it at the end of a line."""
+        """Write each command with its whole first sentence, which typer would shorten."""
         commands: list[Any] = [self.get_command(ctx, name) for name in self.list_commands(ctx)]
         with formatter.section("Commands"):
             formatter.write_dl([(one.name, one.help.partition("\n\n")[0]) for one in commands if not one.hidden])
@@ -79,7 +79,7 @@ class PlainGroup(TyperGroup):
 
 @contextmanager
 def _usage_as_text() -> Iterator[None]:
-    """Show what was typed as text: typer escapes control characters in its errors, and no marks of direction."""
+    """Escape marks of writing direction in usage errors; typer escapes only control characters."""
     try:
         yield
     except TyperException as error:
@@ -92,7 +92,7 @@ def _usage_as_text() -> Iterator[None]:
 def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: Any) -> None:
     for kind in ("argument", "option"):
         records = (param.get_help_record(ctx) for param in _of_kind(command.get_params(ctx), kind))
-        # Typer names a Python type behind an argument.
+        # Typer adds a Python type to an argument.
         rows = [(row[0].partition(" <")[0] if kind == "argument" else row[0], row[1]) for row in records if row]
         if rows:
             with formatter.section(f"{kind.capitalize()}s"):
@@ -100,7 +100,7 @@ def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: A
 
 
 def _on_one_line(items: list[Any]) -> list[Any]:
-    """Shorten the help beside a shell's offers: typer breaks what is long, and to fish each line is another offer."""
+    """Shorten the help of completions: typer wraps long help, and fish takes each line for a completion."""
     from textwrap import shorten
 
     for item in items:

@@ -40,6 +40,6 @@ def init_command(
     if not path.name.removesuffix(".toml").strip("."):
         raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     write_file(path, starter_text(source, name=path.stem).encode(), overwrite=force)
-    # A name that begins with a dash would be read as an option.
+    # A name that begins with a dash would be an option.
     shown = f"./{path}" if str(path).startswith("-") else str(path)
     say(f"wrote {path}; next: busplan capacity {shlex.quote(shown)}")

@@ -1,4 +1,4 @@
-"""Signals that end a run: at once, with all files closed and removed, or between two steps of a long one."""
+"""Signals that end a run: at once, after removing temporary files, or between two steps of a long run."""
 
 import signal
 from collections.abc import Callable, Iterator
@@ -7,24 +7,24 @@ from types import FrameType
 from typing import Final
 
 _BY_OTHERS: Final = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""What a service manager or a terminal that closes sends. Python raises KeyboardInterrupt for Ctrl-C by itself."""
+"""Signals of a service manager or a closing terminal; for Ctrl-C, Python raises KeyboardInterrupt."""
 ENDING: Final = (signal.SIGINT, *_BY_OTHERS)
 _SIGNALLED: Final = 128
-"""Added to a signal's number, it is the exit code, as shells have it."""
+"""Exit code of a signal minus its number, as in shells."""
 
 
 class StoppedError(SystemExit):
-    """A run that ends between two steps: what stands in the file so far is whole in itself, and may be kept."""
+    """A run that ends between two steps: its partial output is valid and may be kept."""
 
 
 def stopped_by(number: int) -> StoppedError:
-    """Make the error for a signal that was noted."""
+    """Make the error for a signal."""
     return StoppedError(_SIGNALLED + number)
 
 
 @contextmanager
 def signals_end_the_run() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP end the run as Ctrl-C does; a second one ends the process at once."""
+    """Let SIGTERM and SIGHUP end the run like Ctrl-C; a second signal ends the process at once."""
 
     def end(number: int, _frame: FrameType | None) -> None:
         signal.signal(number, signal.SIG_DFL)
@@ -39,7 +39,7 @@ def signals_end_the_run() -> Iterator[None]:
 
 @contextmanager
 def signals_noted() -> Iterator[Callable[[], int | None]]:
-    """Give a function that tells which signal has come that ends the run. A second one ends it at once."""
+    """Defer signals: give a function that returns the number of the first one. A second one ends the run at once."""
     noted: int | None = None
 
     def note(number: int, _frame: FrameType | None) -> None:
@@ -58,7 +58,7 @@ _Handlers = dict[int, Callable[[int, FrameType | None], object] | int | None]
 
 
 def _handled(numbers: tuple[int, ...], handler: Callable[[int, FrameType | None], None]) -> _Handlers:
-    """Handle signals, but for those that nohup or a shell's background ignores; gives the handlers before."""
+    """Set a handler, except for signals that are ignored (nohup); return the former handlers."""
     before = {number: signal.getsignal(number) for number in numbers}
     listened: _Handlers = {number: old for number, old in before.items() if old not in {signal.SIG_IGN, None}}
     for number in listened:

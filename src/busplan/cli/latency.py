@@ -8,8 +8,8 @@ from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     NO_CHANGES,
-    Changes,
     FormatOption,
+    KeyChanges,
     OutputOption,
     ProfileArgument,
     TimingOption,
@@ -33,7 +33,7 @@ def latency_command(
             show_default=False,
         ),
     ] = None,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
     format_: FormatOption = None,
     output: OutputOption = None,

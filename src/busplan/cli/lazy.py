@@ -1,4 +1,4 @@
-"""Commands that load when they are called: one call pays for one command, and only --help for all."""
+"""Commands that are loaded when they are called; only --help loads all."""
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
@@ -29,11 +29,11 @@ COMMANDS: Final = (
     "profiles",
     "init",
 )
-"""In the order of the help. `circle-test` is in `circle`: a module called `circle_test` would be taken for tests."""
+"""In the order of the help. `circle-test` is in module `circle`: `circle_test` would look like a test module."""
 
 
 class LazyCommands(Mapping[str, Any]):
-    """Commands by name, each made when it is first asked for."""
+    """Commands by name, each created at first use."""
 
     def __init__(self) -> None:
         self._made: dict[str, Any] = {}
@@ -68,6 +68,6 @@ class LazyGroup(PlainGroup):
         super().__init__(**settings)
         self.commands: Any = LazyCommands()
 
-    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - the signature is typer's
-        """Names of all commands, none of them loaded."""
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - typer's signature
+        """Names of all commands, without loading them."""
         return list(COMMANDS)

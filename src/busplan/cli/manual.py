@@ -12,7 +12,7 @@ from busplan.errors import BusplanError
 
 
 def complete_topic(incomplete: str) -> list[str]:
-    """Topics that begin as typed, for the shell's completion."""
+    """Complete the name of a topic for the shell."""
     from busplan.manual import topics
 
     return [topic for topic in topics() if topic.startswith(incomplete)]
@@ -44,7 +44,7 @@ def manual_command(
 
 
 def _contents(headings: dict[str, str]) -> str:
-    """One line a topic."""
+    """List of topics, one on each line."""
     width = max(map(len, headings))
     lines = (f"{topic:{width}}  {heading}\n" for topic, heading in headings.items())
     return f"Topics of the manual; `busplan manual TOPIC` shows one:\n\n{''.join(lines)}"

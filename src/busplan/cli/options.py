@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and how their values are read."""
+"""Arguments and options of several commands, and parsers of their values."""
 
 import re
 from collections.abc import Callable
@@ -28,7 +28,7 @@ _EXPONENT: Final = {"us": 0, "ms": 3, "s": 6}
 
 
 def complete_profile(incomplete: str) -> list[str]:
-    """Shipped names that begin as typed, for the shell's completion."""
+    """Complete the name of a shipped profile for the shell."""
     from busplan.profile.shipped import shipped_names
 
     return [name for name in shipped_names() if name.startswith(incomplete)]
@@ -83,29 +83,29 @@ TimingOption = Annotated[
 
 
 def bus_changes(*, nodes: int | None, gap_count: str | None) -> dict[str, object]:
-    """Changes of a profile that --nodes and --gap-count ask for, by dotted key."""
+    """Changes of a profile by --nodes and --gap-count, by dotted key."""
     changes: dict[str, object] = {}
     if nodes is not None:
         changes["bus.nodes"] = nodes
     if gap_count is not None:
-        # What is no number goes on as text: the profile knows what is right, and says so.
+        # Other text is passed on: the profile's schema accepts or refuses it.
         changes["bus.gap_count"] = int(gap_count) if re.fullmatch(r"[+-]?[0-9]{1,9}", gap_count) else gap_count
     return changes
 
 
 ALL_MODELS: Final = "both"
-"""What --timing takes for all timing models."""
+"""Value of --timing for all timing models."""
 BUS_OPTIONS: Final = {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"}
-"""What the profile's keys are called on the command line."""
+"""Options by profile key."""
 
 
-Changes = dict[str, object]
+KeyChanges = dict[str, object]
 """New values of a profile by dotted key."""
-NO_CHANGES: Final[Changes] = {}
+NO_CHANGES: Final[KeyChanges] = {}
 
 
 def takes_bus_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command --nodes and --gap-count in the place of its parameter `changes`, which gets what they change.
+    """Replace the parameter `changes` of a command by the options --nodes and --gap-count, whose values it gets.
 
     Parameters
     ----------
@@ -132,13 +132,13 @@ def takes_bus_options(command: Callable[..., None]) -> Callable[..., None]:
     return with_changes
 
 
-def load_changed(argument: str, changes: Changes) -> "Profile":
-    """Read a profile and put the values of options into it.
+def load_changed(argument: str, changes: KeyChanges) -> "Profile":
+    """Read a profile and apply the values of options.
 
     Raises
     ------
     BusplanError
-        No profile, or a value that its schema refuses.
+        Not a profile, or a value that its schema refuses.
     """
     from busplan.profile.shipped import load
     from busplan.profile.toml import override
@@ -147,12 +147,12 @@ def load_changed(argument: str, changes: Changes) -> "Profile":
 
 
 def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | None:
-    """Read what --period asks for, as 4ms, 250us or 0.001s [us]; None where it is not given.
+    """Parse the values of --period, such as 4ms, 250us or 0.001s [us]; None if it is not given.
 
     Raises
     ------
     BusplanError
-        No number, no unit, or out of the profile's range.
+        Not a number with a unit, or out of the profile's range.
     """
     if not texts:
         return None
@@ -167,17 +167,17 @@ def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | Non
 
 
 def time_us(text: str, *, option: str) -> float:
-    """Read a time with its unit, as 4ms, 250us or 0.001s [us].
+    """Parse a time with its unit, such as 4ms, 250us or 0.001s [us].
 
     Raises
     ------
     BusplanError
-        No number, no unit, or more than a number can hold.
+        Not a number with a unit, or too large for a float.
     """
     match = _TIME.fullmatch(text.strip())
     if match is None:
         raise BusplanError(f"{option} {text}: expected a time with its unit, as 4ms, 250us or 0.001s")
-    # Decimal keeps 0.0003 s the float nearest to 300 us.
+    # With Decimal, 0.0003 s is exactly 300 us.
     found_us = float(Decimal(match["value"]).scaleb(_EXPONENT[match["unit"]]))
     if isinf(found_us):
         raise BusplanError(f"{option} {text}: is longer than any time; expected one as 4ms, 250us or 0.001s")
@@ -185,7 +185,7 @@ def time_us(text: str, *, option: str) -> float:
 
 
 def parse_sizes(text: str, *, option: str) -> list[int]:
-    """Read sizes between commas, as 4,16,32 [bytes].
+    """Parse sizes separated by commas, such as 4,16,32 [bytes].
 
     Raises
     ------
@@ -203,18 +203,18 @@ def parse_sizes(text: str, *, option: str) -> list[int]:
 
 
 def timing_models(timing: str, profile: "Profile") -> tuple[str, ...]:
-    """Timing models that --timing asks for.
+    """Timing models of --timing.
 
     Raises
     ------
     BusplanError
-        A model that the profile's kind of bus has not.
+        The profile's kind of bus has no such model.
     """
     return known_models(profile) if timing == ALL_MODELS else (timing_model(timing, profile),)
 
 
 def timing_model(timing: str, profile: "Profile") -> str:
-    """The one timing model that --timing asks for.
+    """The timing model of --timing, for commands that take one only.
 
     Raises
     ------
@@ -237,12 +237,12 @@ def known_models(profile: "Profile") -> tuple[str, ...]:
 
 
 def plot_format(path: Path) -> str:
-    """File format that a figure's name asks for.
+    """File format of a figure, by the ending of its name.
 
     Raises
     ------
     BusplanError
-        Another ending, or nothing to draw with.
+        Another ending, or matplotlib is not installed.
     """
     from busplan.drawings.circle_plot import PLOT_FORMATS, require_matplotlib
 
@@ -257,12 +257,12 @@ STANDARD_OUTPUT: Final = Path("-")
 
 
 def output_option(words: str) -> Any:
-    """Make the option that sends a document to a file.
+    """Make the option --output.
 
     Parameters
     ----------
     words
-        What is written where, without the full stop.
+        Beginning of the help: what is written where.
     """
     help_ = f"{words}; an old file is replaced; - is standard output.  [default: standard output]"
     return typer.Option("--output", "-o", metavar="FILE", parser=_file_unless_dash, help=help_, show_default=False)
@@ -273,12 +273,12 @@ def _file_unless_dash(text: str) -> Path | None:
 
 
 def format_option(default: str) -> Any:
-    """Make the option that says the form of an answer.
+    """Make the option --format.
 
     Parameters
     ----------
     default
-        The form where neither it nor a file's name says one.
+        The form without --format and --output.
     """
     help_ = f"Form of the answer; a table is lines of text.  [default: by the ending of --output, else {default}]"
     return typer.Option("--format", help=help_, show_default=False)
@@ -291,12 +291,12 @@ OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{'
 def form_of_file(
     given: AnyForm | None, output: Path | None, *, forms: "Mapping[str, AnyForm]", default: AnyForm
 ) -> AnyForm:
-    """The form of a document: what --format says, else what the name of --output says, else the default.
+    """Choose the form of a document: by --format, else by the ending of --output, else the default.
 
     Raises
     ------
     BusplanError
-        The name says nothing.
+        The ending is not known.
     """
     chosen = given or (default if output is None else forms.get(output.suffix.lower()))
     if chosen is None:

@@ -1,4 +1,4 @@
-"""The one place that writes: the document to stdout, the rest to stderr, files atomically."""
+"""All output: documents to stdout, messages to stderr, files atomically."""
 
 import io
 import os
@@ -14,43 +14,43 @@ from busplan.cli.interrupt import StoppedError
 from busplan.errors import BusplanError
 
 PLAN_FAILS: int = 1
-"""Exit code of a plan that does not hold."""
+"""Exit code if the answer is that the plan fails."""
 CANNOT: int = 2
-"""Exit code of a run that could not do its job."""
+"""Exit code if the program could not do its job."""
 
 _LONG_NAME = 200
 _NEW_MODE = 0o666
-"""Permissions of a new file, less what the user's umask takes."""
+"""Permissions of a new file, before the umask."""
 
 
 class PlanFailsError(Exception):
-    """The answer is out, and it is that the plan does not hold: exit with `PLAN_FAILS`."""
+    """The answer is written, and it is that the plan fails: exit with `PLAN_FAILS`."""
 
 
 def say(*messages: str) -> None:
-    """Write a summary or errors to stderr, a line each; a closed stderr is no reason to fail."""
-    from busplan.printable import printable  # a run that says nothing need not load it
+    """Write messages to stderr, one on each line; a closed stderr is ignored."""
+    from busplan.printable import printable  # loaded only if there is a message
 
     with suppress(OSError):
         for message in messages:
-            # What a user typed or a file is called may hold anything: nothing of it commands the terminal.
-            print(printable(message), file=sys.stderr, flush=True)  # noqa: T201 - this is the place that prints
+            # Names and arguments may contain control characters.
+            print(printable(message), file=sys.stderr, flush=True)  # noqa: T201 - the only place that prints
 
 
 def emit_text(text: str) -> None:
-    """Write words for a reader to stdout, in the encoding of the terminal, with escapes for what it lacks.
+    """Write text for people to stdout, in the encoding of the terminal; characters that it lacks are escaped.
 
     Raises
     ------
     BusplanError
-        stdout is closed, or cannot take it all.
+        stdout is closed or cannot be written.
     """
     sys.stdout.write(text)
     sys.stdout.flush()
 
 
 def emit_document(document: str | bytes) -> None:
-    """Write what a program reads to stdout: its text is UTF-8, whatever the terminal's encoding.
+    """Write a document for programs to stdout; text is UTF-8, whatever the terminal's encoding.
 
     Raises
     ------
@@ -63,24 +63,24 @@ def emit_document(document: str | bytes) -> None:
 
 
 def document_bytes(document: str | bytes) -> bytes:
-    """Bytes of a document, on every way out; a path that is no UTF-8 becomes escapes, which reading JSON takes back."""
+    """Encode a document as UTF-8; bytes of a path that are not UTF-8 become JSON escapes."""
     return document.encode("utf-8", "backslashreplace") if isinstance(document, str) else document
 
 
 def refuse_terminal(form: str) -> None:
-    """Refuse to write bytes that are no text to a terminal.
+    """Refuse to write binary data to a terminal.
 
     Raises
     ------
     BusplanError
-        stdout is one.
+        stdout is a terminal.
     """
     if sys.stdout.isatty():
-        raise BusplanError(f"--format {form}: is no text for a terminal; give -o FILE.{form}, or send it down a pipe")
+        raise BusplanError(f"--format {form}: is not text for a terminal; give -o FILE.{form}, or use a pipe")
 
 
 def write_document(document: str | bytes, output: Path | None, *, quiet: bool = False) -> None:
-    """Write a document to its file, and say so; or to stdout, where no file is asked for.
+    """Write a document to a file, with a message, or to stdout if `output` is None.
 
     Raises
     ------
@@ -96,12 +96,12 @@ def write_document(document: str | bytes, output: Path | None, *, quiet: bool = 
 
 
 def is_styled() -> bool:
-    """Whether to write with colours: on a terminal, or where FORCE_COLOR asks for them."""
+    """Whether to write colours: on a terminal, or with FORCE_COLOR."""
     return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()
 
 
 def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
-    """Write a file as a whole or not at all.
+    """Write a file atomically.
 
     Raises
     ------
@@ -113,17 +113,16 @@ def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
 
 
 def partial_path(path: Path) -> Path:
-    """What the file of a stopped run is called: rows.csv becomes rows.partial.csv."""
+    """File name for the output of a stopped run: rows.csv becomes rows.partial.csv."""
     return path.with_name(f"{path.stem}.partial{path.suffix}")
 
 
 @contextmanager
 def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Iterator["NewFile"]:
-    """Open a file that appears as a whole or not at all: a temporary one beside it, which takes its name at the end.
+    """Open a file for atomic writing: a temporary file next to it is renamed at the end.
 
-    It is opened at once, so that a path that cannot be written is refused before the work for it is done. What fails
-    inside leaves the old file as it was. With `keeps_partial`, what a `StoppedError` leaves
-    behind takes the partial name.
+    It is opened at once, so that a path that cannot be written fails before the work. After an error, the old file is
+    unchanged. With `keeps_partial`, a `StoppedError` leaves the output so far under `partial_path`.
 
     Raises
     ------
@@ -131,7 +130,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
         It exists and `overwrite` is false, or it cannot be written.
     """
     target = Path(os.path.realpath(path))
-    # What a file is called may be as long as a name can be.
+    # A name of the greatest length leaves no room for a suffix.
     stem = target.name if len(os.fsencode(target.name)) <= _LONG_NAME else "busplan"
     temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
     stopped: StoppedError | None = None
@@ -142,7 +141,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
             file = NewFile(_Raw(temporary, path=path, target=target))
         last.callback(_close, file)
         try:
-            # What the caller's own work raises is the caller's to tell.
+            # Errors of the caller's own work pass through.
             yield file
         except StoppedError as error:
             if not keeps_partial:
@@ -166,7 +165,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Ite
 
 
 class _Raw(io.FileIO):
-    """A new file that says itself that it cannot be written: a full disk shows in the caller's own write."""
+    """A new file whose write errors name the user's path: a full disk shows in the caller's own write."""
 
     def __init__(self, temporary: Path, *, path: Path, target: Path) -> None:
         self._names = path, target
@@ -178,17 +177,17 @@ class _Raw(io.FileIO):
 
 
 class NewFile(io.BufferedWriter):
-    """A file in the making."""
+    """A file that is not complete yet."""
 
     abandoned = False
 
     def abandon(self) -> None:
-        """Leave what was there before as it is: nothing takes its name at the end."""
+        """Discard the new file at the end and leave an old one unchanged."""
         self.abandoned = True
 
 
 def _opened(temporary: str, flags: int) -> int:
-    """Open a file that has no name yet, where the system has such: a process that is killed leaves nothing of it."""
+    """Open a file without a name, if the system supports it, so that a killed process leaves nothing behind."""
     if hasattr(os, "O_TMPFILE") and Path("/proc/self/fd").is_dir():
         with suppress(OSError):
             return os.open(Path(temporary).parent, os.O_TMPFILE | os.O_WRONLY, _NEW_MODE)
@@ -200,7 +199,7 @@ def _give_name(descriptor: int, temporary: Path) -> None:
         return
     nameless = f"/proc/self/fd/{descriptor}"
     try:
-        # A descriptor for the folder, though the path begins at the root: only so does Python follow the link.
+        # src_dir_fd is not used by an absolute path, but makes Python follow the link.
         os.link(nameless, temporary, src_dir_fd=descriptor)
     except OSError:  # a file system without hard links
         from shutil import copyfile
@@ -220,7 +219,7 @@ def _remove(temporary: Path) -> None:
 
 @contextmanager
 def _named(path: Path, target: Path) -> Iterator[None]:
-    """Say in the user's words what cannot be done with a file."""
+    """Convert errors of the operating system to messages with the user's path."""
     try:
         yield
     except FileExistsError:
@@ -233,7 +232,7 @@ def _named(path: Path, target: Path) -> Iterator[None]:
 
 
 def _mode_of(target: Path, *, overwrite: bool) -> int | None:
-    """Permissions of the file that is to be replaced; what may not be replaced is said before the work for it."""
+    """Permissions of the file to be replaced, None for a new file; refuse one that may not be replaced."""
     if not os.path.lexists(target):
         return None
     if not overwrite:
@@ -242,17 +241,17 @@ def _mode_of(target: Path, *, overwrite: bool) -> int | None:
     if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
     if not stat.S_ISREG(status.st_mode):
-        raise ValueError("is no regular file")
+        raise ValueError("is not a regular file")
     return stat.S_IMODE(status.st_mode)
 
 
 def _rename_new(temporary: Path, target: Path) -> None:
-    """Give a file its name unless the name is taken, even if it was taken a moment ago."""
+    """Rename a file, but never over an existing one."""
     try:
         os.link(temporary, target)
     except FileExistsError:
         raise
-    except OSError:  # a file system without hard links, which cannot promise the same
+    except OSError:  # a file system without hard links: not atomic
         if os.path.lexists(target):
             raise FileExistsError from None
         temporary.replace(target)

@@ -140,7 +140,7 @@ def plan_command(
         wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
         with_circle = circle and loaded.profile.asks_for_circle
         with ExitStack() as files:
-            # Opened before the search: a path that cannot be written is said at once.
+            # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
             with progress_bar("circle tests") as progress:
                 check = None
@@ -183,7 +183,7 @@ def _check_options(
 def _wanted(
     profile: "Profile", *, nodes: int | None, axes: int | None, period: str | None, gap_count: str | None
 ) -> "dict[str, Value]":
-    """What the options ask for by dotted key, checked."""
+    """Wanted values of the options by dotted key, validated."""
     from busplan.analysis.planning.options import nodes_for_axes
     from busplan.profile.toml import override
 
@@ -200,7 +200,7 @@ def _wanted(
 
 
 def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
-    """Edit the recommended values into the file."""
+    """Write the recommended values into the profile's file."""
     from busplan.answers.plan import settings
 
     if result.recommended is None:
@@ -209,7 +209,7 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     if not changes:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
-    # A whole number is written as one.
+    # Write whole floats without a fraction.
     values = {
         key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
     }
@@ -218,7 +218,7 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
 
 
 def _write_profile(result: "Plan", file: NewFile | None) -> None:
-    """Write the recommended profile to its file or to standard output; without a plan the old file stays as it is."""
+    """Write the recommended profile to its file or standard output; without a plan, an old file stays unchanged."""
     if result.recommended is not None:
         from busplan.profile.write import profile_text
 
@@ -229,7 +229,7 @@ def _write_profile(result: "Plan", file: NewFile | None) -> None:
 
 
 def _say_report(report: "Report") -> None:
-    """Write the report past standard output, which has the profile."""
+    """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
 
     say(*(line.text for line in block_lines(report.blocks())))

@@ -1,4 +1,4 @@
-"""A progress bar on stderr for what takes longer than a second; nothing where stderr is no terminal."""
+"""A progress bar on stderr for work longer than a second, if stderr is a terminal."""
 
 import sys
 from collections.abc import Iterator
@@ -16,12 +16,12 @@ _PATIENCE_S = 1.0
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Progress]:
-    """Give a function that takes the work done and the work to do.
+    """Give a function that takes the work done and the total work.
 
     Parameters
     ----------
     title
-        What is under way.
+        Name of the work.
     """
     started = monotonic()
     bar: Bar | None = None

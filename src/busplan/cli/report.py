@@ -68,9 +68,9 @@ def report_command(
 
     Example: busplan report paper-4ms paper-1ms -o report.html
     """
-    from busplan.printable import commands
+    from busplan.printable import has_controls
 
-    if title is not None and (commands(title) or not title.strip()):
+    if title is not None and (has_controls(title) or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
     with answer(format_, output, inputs=profile_files(*profiles), default="html", refused=_REFUSED) as give:
         plans = load_each(profiles, partial(_plan, period=period))

@@ -1,7 +1,7 @@
-"""Files of the user's that are changed and stay theirs: a profile under --apply, a baseline.
+"""Change files of the user in place: a profile with --apply, a baseline.
 
-A document is replaced by the next one. These keep owner and mode, are not taken apart from their other names, and one
-run at a time changes them.
+Unlike an output file, such a file keeps its owner and mode, must not have further hard links, and is locked against
+other runs.
 """
 
 import os
@@ -16,21 +16,21 @@ from busplan.cli.output import NewFile, new_file, say
 from busplan.errors import BusplanError
 
 PATIENCE_S: Final = 30.0
-"""How long to wait for another run, which reads and writes a page meanwhile."""
+"""Longest wait for another run, which only reads and writes a short file."""
 _LOOK_AGAIN_S: Final = 0.02
 
 
 @contextmanager
 def changing(path: Path) -> Iterator[None]:
-    """Keep other runs from changing a file between its reading and its writing.
+    """Lock a file against other runs between reading and writing it.
 
-    The folder is locked, not the file: the file is replaced, and may not be there yet. The lock ends with the process,
-    whatever ends it.
+    The folder is locked, because the file is replaced or may not exist yet. The lock ends with the process at the
+    latest.
 
     Raises
     ------
     BusplanError
-        There is no such folder, or another run does not end.
+        There is no such folder, or another run holds the lock too long.
     """
     folder = Path(os.path.realpath(path)).parent
     try:
@@ -64,37 +64,37 @@ def _lock(folder: int, path: Path) -> None:
 
 
 def require_changeable(path: Path) -> os.stat_result | None:
-    """Refuse a file that cannot be changed and stay what it is; to be called before the work.
+    """Refuse a file that cannot be changed in place; call it before the work.
 
     Returns
     -------
     os.stat_result or None
-        Of the file, symbolic links followed; None if there is none.
+        Status of the file, symbolic links followed; None if it does not exist.
 
     Raises
     ------
     BusplanError
-        No regular file, a read-only one, or one with further hard links.
+        It is not a regular file, is read-only, or has further hard links.
     """
     try:
         status = path.stat()
-    except (OSError, ValueError):  # who reads it says why
+    except (OSError, ValueError):  # reading it will report the error
         return None
     if not stat.S_ISREG(status.st_mode):
-        raise BusplanError(f"{path}: is no regular file, so it cannot be changed")
-    # Root may write anything: what a mode forbids is meant for root, too.
+        raise BusplanError(f"{path}: is not a regular file, so it cannot be changed")
+    # Root could write it nevertheless, so check the mode, too.
     if not status.st_mode & (stat.S_IWUSR | stat.S_IWGRP | stat.S_IWOTH) or not os.access(path, os.W_OK):
         mode = stat.S_IMODE(status.st_mode)
         raise BusplanError(f"{path}: is read-only (mode {mode:04o}) and stays as it is; make it writable first")
     if status.st_nlink > 1:
         raise BusplanError(
-            f"{path}: has {status.st_nlink} hard links, which a new file would part; make a copy of it, and change that"
+            f"{path}: has {status.st_nlink} hard links, which replacing it would break; copy it and change the copy"
         )
     return status
 
 
 def rewrite(path: Path, content: bytes) -> None:
-    """Give a file other content, as a whole or not at all; it keeps owner and mode.
+    """Replace the content of a file atomically; it keeps owner and mode.
 
     Raises
     ------
@@ -116,6 +116,6 @@ def _keep_owner(file: NewFile, status: os.stat_result, path: Path) -> None:
         os.fchown(file.fileno(), status.st_uid, status.st_gid)
     except OSError as error:
         raise BusplanError(
-            f"{path}: belongs to user {status.st_uid} and group {status.st_gid}, and would not any more "
+            f"{path}: belongs to user {status.st_uid} and group {status.st_gid}, which cannot be kept "
             f"({error.strerror}); it stays as it is"
         ) from None

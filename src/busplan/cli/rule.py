@@ -10,7 +10,7 @@ from busplan.errors import BusplanError
 
 
 def complete_code(incomplete: str) -> list[str]:
-    """Codes of rules that begin as typed, for the shell's completion."""
+    """Complete the code of a rule for the shell."""
     from busplan.rules.registry import all_rules
 
     return [code for code in all_rules() if code.startswith(incomplete)]

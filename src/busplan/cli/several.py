@@ -1,4 +1,4 @@
-"""What commands of several profiles share: reading them all, and one progress over all of their work."""
+"""Common parts of commands with several profiles: read them all, and show one progress."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Final
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from busplan.sections.profile import Profile
 
 _PARTS: Final = 1000
-"""Parts of one piece of work that the whole's progress counts."""
+"""Progress steps of one piece of work."""
 
 
 def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "list[Profile]":
@@ -23,12 +23,12 @@ def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "li
     arguments
         PROFILE arguments; standard input may be one of them.
     load
-        Reads one.
+        Function that reads one.
 
     Raises
     ------
     BusplanError
-        Standard input more than once; or what is wrong with any of them, said of all together.
+        Standard input more than once; or the problems of all profiles together.
     """
     plans: list[Profile] = []
     problems: list[str] = []
@@ -46,16 +46,16 @@ def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "li
 
 
 def part_of(progress: Progress, *, number: int, of: int) -> Progress:
-    """The progress of one of several pieces of work, each taken for as long as the others.
+    """Progress of one of several equal pieces of work.
 
     Parameters
     ----------
     progress
-        Of the whole.
+        Progress of all pieces.
     number
-        Which piece, from 0.
+        Number of the piece, from 0.
     of
-        How many there are.
+        Number of pieces.
     """
 
     def report(done: int, total: int) -> None:

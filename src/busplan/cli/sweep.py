@@ -1,4 +1,4 @@
-"""`busplan sweep`: its options, and what of them goes together."""
+"""`busplan sweep`: its options and their checks."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -124,7 +124,7 @@ def sweep_command(
     for option, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{option} {number}: must be 1 or more")
-    # Every command pays for what stands at the top of this module.
+    # Imported here, because --help imports the top of this module.
     from busplan.cli.vary import parse_axes
 
     kept = None if output is None else partial_path(output)
@@ -164,7 +164,7 @@ def sweep_command(
 
 
 def _form_of(output: Path | None) -> SweepForm:
-    """Choose the form by the ending of a file."""
+    """Choose the form by the ending of the file."""
     ending = "" if output is None else output.suffix.lower()
     if ending == ".npz":
         raise BusplanError(
@@ -175,7 +175,7 @@ def _form_of(output: Path | None) -> SweepForm:
 
 
 def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:
-    """Refuse options that the form cannot follow."""
+    """Refuse options that do not apply to the form."""
     for option, value in (("--sort", sort), ("--top", top)):
         if value is not None and form not in TOP_FORMS:
             forms = f"{', '.join(TOP_FORMS[:-1])} or {TOP_FORMS[-1]}"
@@ -183,14 +183,14 @@ def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> Non
 
 
 def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> None:
-    """Refuse options that mean nothing without another."""
+    """Refuse options that need another option."""
     for option, value in options.items():
         if value is not None and not is_there:
             raise BusplanError(f"{option}: goes with {needed}")
 
 
 def _require_number(profile: "Profile", grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
-    """Refuse a column that is not there or not in numbers, where only a number will do."""
+    """Refuse a column that does not exist or is not numeric."""
     from busplan.analysis.sweep.blocks import word_figures
     from busplan.analysis.sweep.circles import all_columns
 

@@ -1,4 +1,4 @@
-"""What a sweep is asked for, each value checked."""
+"""The checked options of a sweep."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
@@ -10,15 +10,15 @@ if TYPE_CHECKING:
     from busplan.sections.profile import Profile
 
 RowsForm = Literal["csv", "json", "jsonl"]
-"""Forms of every row as text, written as it comes."""
+"""Forms with every row, written during the sweep."""
 SweepForm = Literal[Form, RowsForm]
 ROWS_FORMS: Final = get_args(RowsForm)
 TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in ROWS_FORMS)
-"""Forms of the rows at the top, for people."""
+"""Forms with the top rows, for people."""
 
 
 class SweepJob(NamedTuple):
-    """What is asked for, each value checked."""
+    """The checked options of a sweep."""
 
     profile: "Profile"
     grid: "Grid"
@@ -33,6 +33,6 @@ class SweepJob(NamedTuple):
     plot_format: str | None
     figure: str
     jobs: int | None
-    """Processes for circle tests; None without them."""
+    """Processes for circle tests; None without circle tests."""
     force: bool
-    """Whether their number does not matter."""
+    """If True, allow any number of circle tests."""

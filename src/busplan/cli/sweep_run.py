@@ -1,4 +1,4 @@
-"""A sweep on its way: blocks are computed, written and counted one by one."""
+"""Run a sweep: compute, write and count block by block."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,13 +13,13 @@ from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.blocks import Block
+    from busplan.analysis.sweep.blocks import SweepBlock
     from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.cli.sweep_job import SweepJob
     from busplan.drawings.sweep_plot import FigureData
 
 _CIRCLES_AT_ONCE: Final = 4
-"""Points that each process tests between two looks at signals."""
+"""Points that each process tests between two checks for signals."""
 
 
 def available_processors() -> int:
@@ -33,9 +33,9 @@ def run_sweep(job: "SweepJob") -> None:
     Raises
     ------
     BusplanError
-        A file that cannot be written, a figure that cannot be drawn, or a point without a circle test.
+        A file cannot be written, a figure cannot be drawn, or the circle test of a point cannot be run.
     StoppedError
-        Ctrl-C, SIGTERM, SIGHUP or a lost worker; what was written is valid, and says that it is partial.
+        Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
     from busplan.analysis.network import bus_of
     from busplan.answers.sweep.top import Tally
@@ -47,11 +47,11 @@ def run_sweep(job: "SweepJob") -> None:
     tally, expected = Tally(bus_of(job.profile), job.timing_models), job.grid.points
     with ExitStack() as stack:
         with signals_noted() as noted:
-            # Opened before the work: a path that cannot be written is said at once.
+            # Opened before the work, so that a path that cannot be written fails at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
             sink = sink_for(job, file, tally)
-            takers: list[Callable[[Block], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
+            takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
             lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
@@ -71,12 +71,12 @@ def run_sweep(job: "SweepJob") -> None:
 
 def _work(
     job: "SweepJob",
-    takers: "Sequence[Callable[[Block], None]]",
+    takers: "Sequence[Callable[[SweepBlock], None]]",
     *,
     progress: Callable[[], tuple[int, int]],
     stopped: Callable[[], bool],
 ) -> WorkerLostError | None:
-    """Hand each block to all takers, until all are done, or what stops it; gives the error of a lost worker."""
+    """Pass each block to all takers, until the end or a stop; return the error of a lost worker."""
     try:
         with progress_bar("sweep") as report, _blocks(job) as blocks:
             for block in blocks:
@@ -111,8 +111,8 @@ def _require_circles(job: "SweepJob") -> None:
 
 
 @contextmanager
-def _blocks(job: "SweepJob") -> "Iterator[Iterable[Block]]":
-    """Blocks of a size that suits what is done with them."""
+def _blocks(job: "SweepJob") -> "Iterator[Iterable[SweepBlock]]":
+    """Blocks of a suitable size."""
     from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
     from busplan.answers.sweep.rows import TEXT_POINTS
 

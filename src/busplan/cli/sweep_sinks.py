@@ -10,7 +10,7 @@ from busplan.errors import BusplanError
 from busplan.forms import Form, render
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.blocks import Block
+    from busplan.analysis.sweep.blocks import SweepBlock
     from busplan.answers.sweep.rows import Style
     from busplan.answers.sweep.top import Tally
     from busplan.cli.sweep_job import SweepJob
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class Sink(Protocol):
     """Where blocks go."""
 
-    def add(self, block: "Block") -> None:
+    def add(self, block: "SweepBlock") -> None:
         """Take one more block."""
 
     def finish(self, *, complete: bool) -> None:
@@ -77,7 +77,7 @@ class _LinesSink:
         self._columns, self._form, self._write = job.columns, form, write
         write(csv_header(job.columns) if form == "csv" else jsonl_header(job.profile.name, job.grid, job.timing_models))
 
-    def add(self, block: "Block") -> None:
+    def add(self, block: "SweepBlock") -> None:
         """Write one more block."""
         from busplan.answers.sweep.rows import block_text
 
@@ -96,7 +96,7 @@ class _JsonSink:
         self._columns, self._write = job.columns, write
         write(json_header(job.profile.name, job.grid, job.timing_models))
 
-    def add(self, block: "Block") -> None:
+    def add(self, block: "SweepBlock") -> None:
         """Write one more block."""
         from busplan.answers.sweep.rows import json_rows
 

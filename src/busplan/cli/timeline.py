@@ -12,7 +12,7 @@ from busplan.cli.answering import answer
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     NO_CHANGES,
-    Changes,
+    KeyChanges,
     ProfileArgument,
     form_of_file,
     load_changed,
@@ -81,7 +81,7 @@ def timeline_command(
             show_default=False,
         ),
     ] = None,
-    changes: Changes = NO_CHANGES,
+    changes: KeyChanges = NO_CHANGES,
     timing: Annotated[
         str | None,
         typer.Option(
@@ -138,7 +138,7 @@ def timeline_command(
 
 
 def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
-    """The form that is asked for, by name or by the file's ending; what cannot be drawn is said before any work."""
+    """Form by --format or the file's ending; fail before the work if it cannot be drawn."""
     chosen = form_of_file(format_, output, forms=_ENDINGS, default="table")
     if chosen == "png":
         if output is None:
@@ -149,7 +149,7 @@ def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
     return chosen
 
 
-def _network(profile: str, changes: Changes, period: str | None) -> "Profile":
+def _network(profile: str, changes: KeyChanges, period: str | None) -> "Profile":
     from busplan.profile.toml import override
 
     plan = load_changed(profile, changes)
@@ -172,7 +172,7 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
 
 
 def _picture(shown: "Schedule", form: Picture) -> str | bytes:
-    """The drawing alone, as a file of its own."""
+    """The drawing as a file of its own."""
     from busplan.answers.timeline import headline
     from busplan.forms.columns import sentence_text
 

@@ -1,4 +1,4 @@
-"""`--vary KEY=VALUES`: which keys of the profile go through which values."""
+"""Parse `--vary KEY=VALUES`."""
 
 from typing import TYPE_CHECKING
 
@@ -9,19 +9,19 @@ if TYPE_CHECKING:
 
 
 def parse_axes(texts: list[str], *, kind: str) -> dict[str, "Values"]:
-    """Read every --vary, in their order.
+    """Parse all --vary options, in order.
 
     Parameters
     ----------
     texts
-        The options' values.
+        Values of the options.
     kind
-        Kind of bus, which knows words that stand in the place of a number.
+        Kind of bus, which defines the words allowed instead of numbers.
 
     Raises
     ------
     BusplanError
-        None of them, a key twice, or no values that make sense.
+        No option, a repeated key, or invalid values.
     """
     if not texts:
         raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")

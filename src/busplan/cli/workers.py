@@ -1,4 +1,4 @@
-"""Processes that share the work: they end with this one, whatever ended it, and hold none of its streams."""
+"""Worker processes: they end with the parent, even if it is killed, and do not hold its streams."""
 
 import os
 import signal
@@ -14,26 +14,26 @@ from busplan.cli.interrupt import ENDING
 from busplan.errors import WorkerLostError
 
 Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
 
 class Map(Protocol):
-    """The built-in `map`, by other processes."""
+    """The built-in `map`, in other processes."""
 
-    def __call__(self, function: Callable[[Task], Answer], tasks: Iterable[Task], /) -> list[Answer]:
-        """Give the answers in the order of the tasks."""
+    def __call__(self, function: Callable[[Task], Result], tasks: Iterable[Task], /) -> list[Result]:
+        """Return the results in the order of the tasks."""
 
 
 @contextmanager
 def workers(number: int) -> Iterator[Map]:
-    """Start worker processes; gives a `map` by them, which raises `WorkerLostError` when one of them is killed.
+    """Start worker processes and give a `map`, which raises `WorkerLostError` if one of them is killed.
 
-    The standard library's pools do not bear that workers, or their parent, are killed.
+    The standard library's pools may hang when a worker or the parent is killed.
     """
     with ExitStack() as crew:
-        # Python's own helper for processes lets the signals go that are held here.
+        # Start Python's resource tracker first, because it would unblock the signals blocked below.
         ensure_running()
-        # What ends a whole group of processes is for the one that hands the work out: workers never hear of it.
+        # Signals to the whole process group are for the parent only: workers inherit the blocked mask.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
         try:
             pipes = [_started(crew) for _ in range(number)]
@@ -43,7 +43,7 @@ def workers(number: int) -> Iterator[Map]:
 
 
 def _started(crew: ExitStack) -> Connection:
-    # Fresh processes: a fork would take this one's threads by surprise.
+    # Spawn: forking a process with threads is unsafe.
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_work, args=(theirs,), daemon=True)
@@ -51,18 +51,18 @@ def _started(crew: ExitStack) -> Connection:
     process.start()
     theirs.close()
     crew.callback(process.join)
-    # All answers are there then, or nobody waits for them any more.
+    # At this point all results are received or no longer needed.
     crew.callback(process.kill)
     return ours
 
 
-def _shared(pipes: list[Connection], function: Callable[[Task], Answer], tasks: Iterable[Task]) -> list[Answer]:
-    """Give each worker one task at a time."""
+def _shared(pipes: list[Connection], function: Callable[[Task], Result], tasks: Iterable[Task]) -> list[Result]:
+    """Send each worker one task at a time."""
     left = enumerate(tasks)
-    found: dict[int, Answer] = {}
+    found: dict[int, Result] = {}
     free, busy = list(pipes), dict[Connection, int]()
     while True:
-        # First a worker, then a task: each task that is taken is handed out.
+        # zip takes a worker before a task, so no task is lost.
         for pipe, (place, task) in zip(free, left, strict=False):
             with _lost():
                 pipe.send((function, task))
@@ -88,7 +88,7 @@ def _lost() -> Iterator[None]:
 
 
 def _work(pipe: Connection) -> None:
-    """Do what comes down the pipe, until the parent is done."""
+    """Run tasks from the pipe until it is closed."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1):
         os.dup2(nowhere, stream)
@@ -99,8 +99,8 @@ def _work(pipe: Connection) -> None:
             pipe.send(_tried(function, task))
 
 
-def _tried(function: Callable[[Task], Answer], task: Task) -> tuple[Answer | None, Exception | None]:
-    """The answer, or the error, which the one that hands the work out tells."""
+def _tried(function: Callable[[Task], Result], task: Task) -> tuple[Result | None, Exception | None]:
+    """Result of a task, or its error, which the parent raises."""
     try:
         return function(task), None
     except Exception as error:  # noqa: BLE001 - as above

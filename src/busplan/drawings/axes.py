@@ -1,4 +1,4 @@
-"""How many axes the bus carries over its period: a staircase for each timing model, and the profile's own place."""
+"""Most axes over the period: a staircase for each timing model, and the profile's own point."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
@@ -18,15 +18,15 @@ _TOP: Final = 50
 _HEIGHT: Final = 230
 _BELOW: Final = 44
 _MOST_LABELS: Final = 6
-"""Periods that a phone has room for."""
+"""Most period labels: more do not fit on a phone."""
 _CSS: Final = ("first", "second")
-"""Classes of the curves, in the order of the timing models."""
+"""CSS classes of the curves, in the order of the timing models."""
 _WIDE: Final = 1000
-"""Units of the stretched drawing: a staircase has no shape to keep."""
+"""Width of the curves' viewBox, which is stretched to the width of the drawing."""
 
 
 class _Plane:
-    """Places in the drawing: periods in percent on a logarithmic scale, axes in px from the top."""
+    """Coordinates: periods in percent on a logarithmic scale, axes in px from the top."""
 
     def __init__(self, from_us: float, to_us: float, most_axes: int) -> None:
         self.from_us, self.to_us = from_us, to_us
@@ -34,17 +34,17 @@ class _Plane:
         self.top_axes = self.axis_step * ceil(most_axes * 1.08 / self.axis_step)
 
     def x(self, period_us: float) -> float:
-        """Where a period lies, 0 to 100."""
+        """Position of a period, 0 to 100."""
         share = log10(period_us / self.from_us) / log10(self.to_us / self.from_us)
         return 100 * min(1.0, max(0.0, share))
 
     def y(self, axes: float) -> float:
-        """Where a number of axes lies, in px."""
+        """Position of a number of axes, in px."""
         return _TOP + _HEIGHT * (1 - axes / self.top_axes)
 
 
 class AxesDrawing(Drawing):
-    """The most axes over a range of periods about the profile's own.
+    """The most axes over a range of periods around the profile's own.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class AxesDrawing(Drawing):
         self._profile, self._steps = profile, steps
 
     def svg(self) -> str:
-        """Draw a staircase for each timing model, and the profile's own place."""
+        """Draw a staircase for each timing model, and the profile's own point."""
         profile, steps = self._profile, self._steps
         root = drawing("Most axes over the communication period, under each timing model", css="chart axes")
         root.set("height", str(_TOP + _HEIGHT + _BELOW))
@@ -79,7 +79,7 @@ class AxesDrawing(Drawing):
 
 
 def drawn_range(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:
-    """Periods to draw: from the first that carries anything to where the profile's nodes fit, and twice its own."""
+    """Range of periods: from the first that carries a node to where the profile's nodes fit, at least twice its own."""
     own_us, nodes = profile.cycle.period_us, profile.bus.nodes
     all_us = [one.from_us for one in steps if one.from_us]
     lasts = [times_us[-1] * 1.25 for times_us in all_us]
@@ -90,13 +90,13 @@ def drawn_range(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, fl
 
 
 def _step(most: int) -> int:
-    """The 1, 2 or 5 times a power of ten that divides a number of axes into at most five parts."""
+    """Round step that divides a number of axes into at most five parts."""
     smallest = max(1.0, most / 5)
     return next(int(step.size) for step in round_steps(smallest) if step.size >= smallest)
 
 
 def _grid(root: Element, plane: _Plane) -> None:
-    """Lines for round numbers of axes, and round periods below."""
+    """Draw lines at round numbers of axes, and labels of round periods."""
     for axes in range(0, plane.top_axes + 1, plane.axis_step):
         y = str(round(plane.y(axes)))
         SubElement(root, "line", {"x1": "0", "x2": "100%", "y1": y, "y2": y, "class": "rule"})
@@ -111,14 +111,14 @@ def _grid(root: Element, plane: _Plane) -> None:
 
 
 def _figures(root: Element, plane: _Plane) -> None:
-    """Round numbers of axes on their lines, the highest with its unit."""
+    """Draw round numbers of axes on their lines, the highest with its unit."""
     for axes in range(0, plane.top_axes + 1, plane.axis_step):
         text = plural(axes, "axis") if axes == plane.top_axes else str(axes)
         text_at(root, text, x="0", y=round(plane.y(axes)) - 4, css="small halo")
 
 
 def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
-    """A piece of each curve with its name."""
+    """Draw a piece of each curve with its name."""
     for number, (css, one) in enumerate(zip(_CSS, steps, strict=False)):
         place = SubElement(root, "svg", {"x": str(110 * number), "overflow": "visible"})
         SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {css}"})
@@ -127,7 +127,7 @@ def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
 
 
 def _round_periods(plane: _Plane) -> list[float]:
-    """Round periods inside the drawing, as many as a phone has room for."""
+    """Round periods inside the drawing, at most `_MOST_LABELS`."""
     powers = range(floor(log10(plane.from_us)), ceil(log10(plane.to_us)) + 1)
     for factors in ((1, 2, 5), (1, 3), (1,)):
         found = [float(f"{factor}e{power}") for power in powers for factor in factors]
@@ -138,7 +138,7 @@ def _round_periods(plane: _Plane) -> list[float]:
 
 
 def _path(one: NodeSteps, plane: _Plane) -> str:
-    """The staircase from the left edge to the right one."""
+    """Path of the staircase from the left edge to the right one."""
     commands = chain(_commands(one, plane), [f"H{_WIDE}"])
     return "".join(commands)
 
@@ -153,7 +153,7 @@ def _commands(one: NodeSteps, plane: _Plane) -> Iterator[str]:
 
 
 def _own(root: Element, plane: _Plane, own_us: float, own_axes: int) -> None:
-    """The profile's own period as a line, and its own axes as a point on it."""
+    """Draw the profile's period as a line, and its axes as a point on it."""
     at = plane.x(own_us)
     x, y = f"{at:.5g}%", round(plane.y(own_axes))
     line = {"x1": x, "x2": x, "y1": str(_TOP - 4), "y2": str(_TOP + _HEIGHT), "class": "own"}
@@ -167,7 +167,7 @@ def _own(root: Element, plane: _Plane, own_us: float, own_axes: int) -> None:
 
 
 def _mark(root: Element, css: str, *, x: str, y: float) -> None:
-    """A point of a curve: a square on the first, a diamond on the second."""
+    """Draw a point of a curve: a square on the first, a diamond on the second."""
     place = SubElement(root, "svg", {"x": x, "y": f"{y:.1f}", "overflow": "visible"})
     turn = {} if css == _CSS[0] else {"transform": "rotate(45)"}
     SubElement(place, "rect", {"x": "-4.5", "y": "-4.5", "width": "9", "height": "9", "class": f"mark {css}", **turn})

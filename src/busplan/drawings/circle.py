@@ -1,4 +1,4 @@
-"""The circle with its error magnified, as ballbar reports draw it."""
+"""The circle with its error magnified, as in ballbar reports."""
 
 from collections.abc import Iterator, Sequence
 from math import ceil, cos, pi, sin
@@ -7,33 +7,34 @@ from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.drawings.circle_characters import contour_lines
-from busplan.drawings.circle_plot import ERROR_SHARE, nice_step
 from busplan.forms.blocks import Drawing
 from busplan.forms.lines import Line
+from busplan.forms.numbers import ROUNDING_UM
+from busplan.forms.scale import ring_step
 from busplan.forms.svg import drawing, markup, text_at
 
 _WIDTH: Final = 470
 _HEIGHT: Final = 400
 _NOMINAL: Final = 140
 """Drawn radius of the nominal circle."""
-_LEAST_MM: Final = 1e-9
-"""Largest error that still counts as none."""
+ERROR_SHARE: Final = 0.25
+"""Largest drawn error as a share of the drawn radius."""
 _WIDEST: Final = 3.0
-"""How many times the largest error a tolerance may be to be drawn: a ring far out would flatten what is inside."""
+"""A tolerance is drawn up to this multiple of the largest error: a larger ring would flatten the error."""
 
 
 class Magnified(NamedTuple):
-    """How a circle is drawn."""
+    """Scale of a drawing."""
 
     largest_mm: float
-    """What reaches the edge: the largest error, or the tolerance outside it."""
+    """Error at the edge: the largest error, or the tolerance if that is larger."""
     ring_um: float
-    """From one ring to the next."""
+    """Distance between rings."""
     tolerance_mm: float | None
-    """The ring of the tolerance; None where there is none or it lies far outside."""
+    """Ring of the tolerance; None if there is none or it lies far outside."""
 
     def times(self, radius_mm: float) -> float:
-        """How many times larger the error is drawn than the circle."""
+        """Magnification of the error relative to the circle."""
         return ERROR_SHARE / self.largest_mm * radius_mm
 
     def radius(self, error_mm: float) -> float:
@@ -42,7 +43,7 @@ class Magnified(NamedTuple):
 
 
 def magnified(profile: ContourProfile, *, tolerance_mm: float | None) -> Magnified | None:
-    """Find the scale of a drawing; None where there is no error to show.
+    """Find the scale of a drawing; None if there is no error to show.
 
     Parameters
     ----------
@@ -52,11 +53,11 @@ def magnified(profile: ContourProfile, *, tolerance_mm: float | None) -> Magnifi
         Largest contour error that is allowed, where there is a limit [mm].
     """
     largest_mm = max((abs(one) for one in (*profile.low_mm, *profile.high_mm) if one is not None), default=0.0)
-    if largest_mm < _LEAST_MM:
+    if largest_mm * 1e3 < ROUNDING_UM:
         return None
     drawn = tolerance_mm if tolerance_mm is not None and 0 < tolerance_mm <= _WIDEST * largest_mm else None
     edge_mm = max(largest_mm, drawn or 0.0)
-    return Magnified(edge_mm, nice_step(edge_mm * 1e3), drawn)
+    return Magnified(edge_mm, ring_step(edge_mm * 1e3), drawn)
 
 
 class CircleDrawing(Drawing):
@@ -77,7 +78,7 @@ class CircleDrawing(Drawing):
         self.scale = magnified(profile, tolerance_mm=tolerance_mm)
 
     def svg(self) -> str | None:
-        """Draw the magnified circle; None where there is no error to show."""
+        """Draw the magnified circle; None if there is no error to show."""
         scale = self.scale
         if scale is None:
             return None
@@ -95,12 +96,12 @@ class CircleDrawing(Drawing):
         return markup(root)
 
     def characters(self, width: int) -> list[Line] | None:
-        """Draw the error over the angle; None where there is none to show."""
+        """Draw the error over the angle; None if there is no error to show."""
         return None if self.scale is None else contour_lines(self._profile, width=width)
 
 
 def _cross(root: Element) -> None:
-    """The two axes, and their angles where they end."""
+    """Draw the two axes with angles at their ends."""
     far = _NOMINAL * (1 + ERROR_SHARE) + 8
     for number, (x, y, anchor) in enumerate(((1, 0, "start"), (0, -1, "middle"), (-1, 0, "end"), (0, 1, "middle"))):
         line = {"x1": x * 40, "y1": y * 40, "x2": x * far, "y2": y * far}
@@ -113,7 +114,7 @@ def _ring(root: Element, radius: float, *, css: str) -> None:
 
 
 def _outlines(profile: ContourProfile, scale: Magnified) -> Iterator[str]:
-    """The band between smallest and largest error, a closed outline for each part of the circle without a gap."""
+    """Outlines of the band between smallest and largest error, one for each part of the circle without a gap."""
     sectors = len(profile.low_mm)
     for run in _runs(profile.low_mm):
         out = [_point(profile.high_mm[index], index, sectors, scale) for index in run]
@@ -125,7 +126,7 @@ def _outlines(profile: ContourProfile, scale: Magnified) -> Iterator[str]:
 
 
 def _runs(values: Sequence[float | None]) -> Iterator[list[int]]:
-    """Neighbouring sectors that have a value; one run may go over the end into the beginning."""
+    """Runs of neighbouring sectors that have a value; one run may wrap around the end."""
     size = len(values)
     first = next((index for index in range(size) if values[index] is None), -1)
     run: list[int] = []

@@ -1,27 +1,27 @@
-"""The contour error over the angle, in characters that every terminal has."""
+"""The contour error over the angle, in ASCII characters."""
 
 from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.forms.lines import Line
+from busplan.forms.numbers import ROUNDING_UM
 
 _COLUMNS: Final = (72, 60, 48, 36, 24)
-"""Columns that a plot may have, the most that fit: one for every 5 degrees, or for more."""
+"""Possible widths of a plot: one column for 5, 6, 7.5, 10 or 15 degrees. The widest that fits is used."""
 _ROWS: Final = 9
-_ROUNDING_UM: Final = 1e-6
-"""Smallest error, in um, that is shown as one: a picometre is rounding."""
+
 _ONE_DIGIT_UM: Final = 0.05
-"""From here on one digit after the point shows something."""
+"""Larger errors are written with one decimal."""
 
 
 def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
-    """Draw smallest and largest error of each part of the circle.
+    """Draw the smallest and largest error of each part of the circle.
 
     Parameters
     ----------
     profile
-        Contour error around the circle, in sectors that a multiple of each number of columns makes.
+        Contour error around the circle; its number of sectors is a multiple of each of `_COLUMNS`.
     width
         Columns of the whole drawing.
     """
@@ -43,7 +43,7 @@ def contour_lines(profile: ContourProfile, *, width: int) -> list[Line]:
 
 
 def _rows(profile: ContourProfile, bottom: float, top: float, ends: tuple[str, str]) -> Iterator[tuple[str, str]]:
-    """Label and cells of each row, from the top."""
+    """Label and cells of each row, from top to bottom."""
     height = (top - bottom) / _ROWS
     labels = {0: ends[0], _ROWS - 1: ends[1]}
     for number in range(_ROWS):
@@ -64,8 +64,8 @@ def _cell(low: float | None, high: float | None, *, lower: float, upper: float, 
 
 
 def _label(value_mm: float) -> str:
-    """An end of the scale, with as many digits as tell it from 0."""
+    """Label of an end of the scale, with enough digits to differ from 0."""
     value_um = value_mm * 1e3
-    if abs(value_um) < _ROUNDING_UM:
+    if abs(value_um) < ROUNDING_UM:
         return "0"
     return f"{value_um:+.1f}" if abs(value_um) >= _ONE_DIGIT_UM else f"{value_um:+.1g}"

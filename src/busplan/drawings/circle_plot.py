@@ -1,4 +1,4 @@
-"""The circle test as a figure, as ballbar reports draw it. Needs the extra `plot` (matplotlib)."""
+"""The circle test as a matplotlib figure, as in ballbar reports. Needs the extra `plot`."""
 
 from importlib import import_module
 from importlib.util import find_spec
@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from busplan.drawings.circle import ERROR_SHARE
 from busplan.errors import BusplanError
-from busplan.forms.scale import round_steps
+from busplan.forms.numbers import ROUNDING_UM
+from busplan.forms.scale import ring_step
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures, CircleTest
@@ -17,18 +19,16 @@ if TYPE_CHECKING:
 
 PLOT_FORMATS: Final = ("png", "svg", "pdf")
 _MAX_POINTS: Final = 8000
-"""Points of one curve: more than a sheet can show, few enough for a small file."""
-ERROR_SHARE: Final = 0.25
-"""Largest error in the polar plot as a share of the drawn radius."""
+"""Most points of one curve: more would not be visible."""
 
 
 def require_matplotlib(option: str = "--plot") -> None:
-    """Refuse early, before anything is simulated, where no figure can be drawn.
+    """Refuse to start if no figure can be drawn.
 
     Parameters
     ----------
     option
-        What asked for the figure.
+        Option that asked for the figure.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def require_matplotlib(option: str = "--plot") -> None:
 
 
 def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
-    """Draw every simulated period on one sheet: the magnified polar error, and the contour error over time.
+    """Draw the magnified polar error and the contour error over time of every simulated period.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
     Returns
     -------
     bytes
-        The file's content; the same for the same test.
+        Content of the file. The same test always gives the same bytes.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
     if not pairs:
         raise BusplanError("--plot: nothing to draw, no period fits the bus")
     buffer = BytesIO()
-    # Names in a profile are text: a dollar sign starts no formula. A fixed salt keeps an SVG's ids the same.
+    # A dollar sign in a name starts no formula. A fixed salt makes the ids of an SVG reproducible.
     with rc_context({"text.parse_math": False, "svg.hashsalt": "busplan"}):
         figure = Figure(figsize=(11.0, 4.6 * len(pairs)), layout="constrained")
         axes = figure.subplots(len(pairs), 2, squeeze=False, width_ratios=(1, 1.4))
@@ -88,7 +88,7 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
 
 
 def metadata(file_format: str) -> dict[str, None]:
-    """No date: the same test gives the same bytes."""
+    """Metadata without a date, so that the same test gives the same bytes."""
     return {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(file_format, {})
 
 
@@ -101,17 +101,12 @@ def _every(points: int) -> int:
     return max(1, ceil(points / _MAX_POINTS))
 
 
-def nice_step(largest: float) -> float:
-    """The 1, 2 or 5 times a power of ten that divides up to `largest` into two to five parts."""
-    return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
-
-
 def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
-    """Nominal circle, rings a round number of micrometres apart, and the path with its error magnified."""
+    """Draw the nominal circle, rings, and the path with its error magnified."""
     trace = run.trace(every=_every(run.steps))
     error_um = trace.contour_error_mm * 1e3
-    largest_um = max(float(np.abs(error_um).max()), 1e-6)
-    step_um = nice_step(largest_um)
+    largest_um = max(float(np.abs(error_um).max()), ROUNDING_UM)
+    step_um = ring_step(largest_um)
     per_um = ERROR_SHARE / largest_um
     turn = np.linspace(0.0, 2 * np.pi, 361)
     rings = range(-ceil(largest_um / step_um), ceil(largest_um / step_um) + 1)
@@ -138,7 +133,7 @@ def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
 
 
 def _over_time(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
-    """Contour error over time, with its mean and maximum."""
+    """Draw the contour error over time, with its mean and maximum in the title."""
     trace = run.trace(every=_every(run.steps))
     axes.plot(trace.time_us / 1e6, trace.contour_error_mm * 1e3, linewidth=0.7, color="tab:red")
     axes.axhline(0.0, color="black", linewidth=0.8)

@@ -1,4 +1,4 @@
-"""A sweep as a figure: curves over one key, heat maps over two. Needs the extra `plot` (matplotlib)."""
+"""A sweep as a matplotlib figure: curves over one key, heat maps over two. Needs the extra `plot`."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from busplan.analysis.sweep.blocks import Block
+from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.drawings.circle_plot import metadata, require_matplotlib
 from busplan.errors import BusplanError
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MAX_DRAWN: Final = 250_000
-"""Points of a figure: more than a sheet can show."""
+"""Most points of a figure: more would not be visible."""
 _MAX_KEYS: Final = 2
 
 
 def require_drawable(grid: Grid) -> None:
-    """Refuse a grid that no figure shows, before it is computed.
+    """Refuse a grid that cannot be drawn, before it is computed.
 
     Raises
     ------
     BusplanError
-        More than two keys vary, more points than a sheet shows, or matplotlib is not installed.
+        More than two keys vary, there are too many points, or matplotlib is not installed.
     """
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
     if len(varied) > _MAX_KEYS:
@@ -36,20 +36,20 @@ def require_drawable(grid: Grid) -> None:
 
 
 class FigureData:
-    """One figure over the whole grid, under each timing model, gathered block by block."""
+    """One figure over the whole grid under each timing model, collected block by block."""
 
     def __init__(self, grid: Grid, *, figure: str, timing_models: Sequence[str]) -> None:
         self._grid, self._figure, self._models = grid, figure, timing_models
         self._values = np.full((grid.points, len(timing_models)), np.nan)
 
-    def add(self, block: Block) -> None:
-        """Take one more block."""
+    def add(self, block: SweepBlock) -> None:
+        """Add a block."""
         start = block.chunk.start
         rows = block.rows(self._figure).reshape(-1, len(self._models))
         self._values[start : start + block.chunk.points] = rows
 
     def draw(self, title: str, *, file_format: str) -> bytes:
-        """Draw what was gathered, the timing models side by side; the same bytes for the same sweep.
+        """Draw the collected values, the timing models side by side; the same sweep gives the same bytes.
 
         Parameters
         ----------
@@ -79,7 +79,7 @@ class FigureData:
 
     def _curves(self, axes: "Axes", key: str) -> None:
         places, labels = self._places(key)
-        # A few points are marked each; many make a line of themselves.
+        # Mark single points only if there are few.
         marker = "." if len(places) <= 100 else ""  # noqa: PLR2004
         for number, model in enumerate(self._models):
             axes.plot(places, self._values[:, number], label=model, marker=marker, linestyle=("-", "--")[number % 2])
@@ -110,7 +110,7 @@ class FigureData:
         figure.colorbar(image, ax=figure.axes, label=self._figure)
 
     def _places(self, key: str) -> tuple[Array, list[str] | None]:
-        """Where a key's values lie along its axis, and what they are called where that is not by their number."""
+        """Positions of a key's values along its axis, and their labels unless these are the numbers."""
         values = self._grid.axes[key].part(0, self._grid.axes[key].size)
         if values.dtype == object or not (np.diff(values) > 0).all():
             return np.arange(values.size), [str(one) for one in values]

@@ -1,4 +1,4 @@
-"""Where the microseconds go: the terms of the cycle as bars under each timing model, and what is left of the slice."""
+"""Terms of the cycle as bars under each timing model, and the rest of the slice."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
@@ -15,13 +15,13 @@ _THIN: Final = 12
 _THICK: Final = 28
 _GAP: Final = 10
 _LETTER_PERCENT: Final = 4.5
-"""Width from which on a bar holds its letter on a phone."""
+"""Narrowest bar that has room for its letter on a phone."""
 _MAGNIFIED_BELOW: Final = 0.5
-"""Share of the slice below which the cycle is drawn a second time, as wide as the page."""
+"""If the cycle takes less than this share of the slice, it is drawn a second time in full width."""
 
 
 LEFT: Final = MARGIN._replace(label="left of the slice", ink="idle", letter="L")
-"""What the terms leave; it follows them in the bars and in their legend."""
+"""The rest of the slice; it follows the terms in bars and legend."""
 
 
 class _Segment(NamedTuple):
@@ -31,12 +31,12 @@ class _Segment(NamedTuple):
 
 
 class TermsDrawing(Drawing):
-    """The terms to the scale of the slice and, where they are small in it, once more to their own.
+    """The terms on the scale of the slice and, if they are small, once more on their own scale.
 
     Parameters
     ----------
     results
-        Figures of one period, a set for each timing model.
+        Figures of one period, one set for each timing model.
     """
 
     def __init__(self, results: Sequence[CapacityFigures]) -> None:
@@ -57,7 +57,7 @@ class TermsDrawing(Drawing):
 
 
 def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: int, end_us: float, thin: bool) -> int:
-    """A bar for each model over one scale; the height below them."""
+    """Draw a bar for each model on one scale, and return the y below them."""
     text_at(root, head, x="0", y=y + 15, css="head")
     top = y = y + LINE
     scale, height = Scale(0.0, end_us), _THIN if thin else _THICK
@@ -75,13 +75,13 @@ def _bars(root: Element, results: Sequence[CapacityFigures], head: str, *, y: in
 
 
 def _drawn(one: CapacityFigures, end_us: float) -> tuple[Figure, ...]:
-    """The terms, and what they leave where the drawing reaches the end of the slice."""
+    """The terms, and the rest of the slice if the scale reaches its end."""
     terms = kind_named(one.kind).term_figures
     return (*terms, LEFT) if end_us >= one.available_us else terms
 
 
 def _segments(one: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segment]:
-    """The terms that take time, behind one another."""
+    """The terms that take time, one after the other."""
     start_us = 0.0
     for term in terms:
         size_us = getattr(one, term.key)
@@ -91,7 +91,7 @@ def _segments(one: CapacityFigures, terms: Sequence[Figure]) -> Iterator[_Segmen
 
 
 def _segment(root: Element, part: _Segment, scale: Scale, *, y: int, height: int) -> None:
-    """A bar, and its letter where there is room for it."""
+    """Draw a bar, and its letter if there is room."""
     title = f"{part.term.label}, {decimals_of(part.end_us - part.start_us, 3)} us"
     scale.rect(root, part, y=y, height=height, css=f"bar {part.term.ink}", title=title)
     start, end = scale.percent(part.start_us), scale.percent(part.end_us)

@@ -1,4 +1,4 @@
-"""What an answer is made of, and one module for each form that it is written in."""
+"""The blocks of an answer, and one module for each form that writes them."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -11,23 +11,23 @@ Form = Literal["table", "markdown", "html", "csv", "json"]
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )
-"""Forms by the ending of a file's name."""
+"""Form by file name extension."""
 
 
 def render(report: "Report", form: Form) -> str:
-    """Write an answer in a form; only its own module is loaded.
+    """Write an answer in a form, loading only the module of that form.
 
     Parameters
     ----------
     report
         The answer.
     form
-        Which form; a terminal's own colours and width are for `terminal.text`.
+        The form. For the colours and width of a terminal, call `terminal.text`.
 
     Raises
     ------
     BusplanError
-        The answer does not take this form.
+        The answer is not available in this form.
     """
     match form:
         case "table":

@@ -1,7 +1,7 @@
-"""What an answer is made of: sentences, tables, charts and commands, in sections.
+"""The blocks of an answer: sentences, tables, charts and commands, in sections.
 
-A block says what there is, and never how it looks: a figure keeps its exact value, a state is said, not coloured. Each
-form writes every block in its own way.
+A block holds content, not appearance: a figure keeps its exact value, and a state is a word, not a colour. Each form
+writes every block in its own way.
 """
 
 from abc import ABC, abstractmethod
@@ -12,65 +12,65 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 from busplan.buses.figure import Figure, Ink
 from busplan.forms.lines import Line
 
-Made = TypeVar("Made")
+BlockOrPart = TypeVar("BlockOrPart")
 State = Literal["passes", "fails", "warns", "neutral"]
-"""What something says of the plan."""
-Document = dict[str, Any]
+"""Verdict that a piece of text carries; it sets the colour."""
+JsonDocument = dict[str, Any]
 Record = dict[str, Any]
-"""One row of plain data, by column."""
+"""One row of plain data: value by column."""
 
 
-class Value(NamedTuple):
-    """One figure: exact, with what it takes to write it."""
+class ShownValue(NamedTuple):
+    """The exact value of one figure, and how to write it."""
 
     value: Any
-    """As the JSON document has it; None where there is none."""
+    """Value as in the JSON document; None if there is none."""
     key: str = ""
-    """Its key, in the register of figures and in JSON; its end says the unit of the value."""
+    """Key in the register of figures and in JSON; its suffix is the unit of the value."""
     unit: str = ""
-    """Unit to write it in: "um" for a key in mm, "%" for a share."""
+    """Unit to write the value in: "um" for a key in mm, "%" for a share."""
     decimals: int | None = None
-    """Decimals of a number; None for as many as it has."""
+    """Decimals of a number; None for all it has. A number too small for them is written with three digits instead."""
     signed: bool = False
-    """Whether a plus is written, too."""
+    """If True, a positive number has a plus sign."""
     at: str = ""
-    """Place in the answer's JSON document (RFC 6901); empty where it has none."""
+    """JSON pointer (RFC 6901) to the value in the answer's document; empty if it is not there."""
     state: State = "neutral"
     command: str = ""
-    """Id of the `Command` whose document that is, where the answer holds several."""
+    """Key of the `Command` whose document `at` points into; empty if the answer has one document."""
     digits: int | None = None
-    """Significant digits of a number without `decimals`; None for as many as it has."""
+    """Significant digits of a number without `decimals`; None for all it has."""
     fixed: bool = False
-    """Whether what is too small for `decimals` is rounding, and written as zero."""
+    """If True, always round to `decimals`: a number too small for them is written as zero."""
     grouped: bool = False
-    """Whether commas part its thousands."""
+    """If True, commas separate the thousands of a number without `decimals`."""
 
 
 class Words(NamedTuple):
-    """Words with a state."""
+    """Text with a state."""
 
     text: str
     state: State = "neutral"
 
 
 class Code(NamedTuple):
-    """Words of a file, a shell or a user, as they are."""
+    """Verbatim text: a name, a key, a path or an argument."""
 
     text: str
 
 
 class SectionLink(NamedTuple):
-    """A name that leads to a section."""
+    """Name that links to a section."""
 
     text: str
     key: str
     """Key of the section."""
     origin: str
-    """Where it is from, as a shell takes it: names may be the same."""
+    """PROFILE argument, quoted for a shell; tells profiles of one name apart."""
 
 
 class Swatch(NamedTuple):
-    """A part of the time: its colour, its letter or mark, and what it is called."""
+    """Entry of a drawing's legend: colour, letter or mark, and name."""
 
     ink: Ink
     letter: str
@@ -78,35 +78,35 @@ class Swatch(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A value as a bar on a scale that it shares with the rows above and below; zero is on the scale."""
+    """A value as a bar, on the scale of all rows of its column; the scale includes zero."""
 
-    value: Value
+    value: ShownValue
     least: float
     most: float
 
 
 class Command(NamedTuple):
-    """A command, as a shell takes it."""
+    """A shell command."""
 
     line: str
     purpose: str = ""
-    """What it gives, in a few words."""
+    """Its output, in a few words."""
     key: str = ""
-    """Id that values refer to."""
+    """Key that `ShownValue.command` refers to."""
 
 
-Part = str | Value | Code
+Part = str | ShownValue | Code
 """A piece of a sentence."""
 
 
 class Sentence(NamedTuple):
-    """Words with figures between them, one sentence or a few that belong together."""
+    """Text with figures in it: one sentence, or a few."""
 
     parts: tuple[Part, ...]
     state: State = "neutral"
 
 
-Cell = str | Value | Words | Code | SectionLink | Swatch | Bar | Command | Sentence
+Cell = str | ShownValue | Words | Code | SectionLink | Swatch | Bar | Command | Sentence
 
 
 class TableColumn(NamedTuple):
@@ -116,7 +116,7 @@ class TableColumn(NamedTuple):
     unit: str = ""
     kind: Literal["words", "figures", "drawing"] = "figures"
     group: str = ""
-    """What stands above it and its neighbours of the same group."""
+    """Heading above the neighbouring columns of the same group."""
 
 
 class TableRow(NamedTuple):
@@ -124,9 +124,9 @@ class TableRow(NamedTuple):
 
     cells: tuple[Cell, ...]
     level: int = 0
-    """1 for a part of the row above it."""
-    sought: bool = False
-    """Whether it is the row that a reader looks for."""
+    """1 if the row is a part of the row above it, which has level 0."""
+    highlighted: bool = False
+    """If True, the row is bold: it is the one to look at first."""
 
 
 class Table(NamedTuple):
@@ -136,46 +136,46 @@ class Table(NamedTuple):
     rows: tuple[TableRow, ...]
     caption: Sentence | None = None
     stacks: bool = False
-    """Whether its rows are read one by one: nobody compares them down a column."""
+    """If True, a narrow screen shows each row as a list of its cells: nobody compares them down a column."""
 
 
 class Facts(NamedTuple):
-    """Figures with their names, in a row."""
+    """A line of named figures."""
 
-    items: tuple[tuple[str, Value | Code], ...]
+    items: tuple[tuple[str, ShownValue | Code], ...]
 
 
 class Drawing(ABC):
-    """What a chart shows, drawn in the ways that it has; None in a way that it has not."""
+    """A picture that can be drawn in several ways; a way that it does not support gives None."""
 
     stylesheet: ClassVar[str] = ""
-    """Style of its SVG, once a page."""
+    """CSS of its SVG, included once in a page."""
     shape: ClassVar[Literal["wide", "round"]] = "wide"
 
     @abstractmethod
     def svg(self) -> str | None:
-        """Draw it as markup that fills the width of its place."""
+        """Draw it as SVG that fills the width of its container."""
 
-    def characters(self, width: int) -> list[Line] | None:  # noqa: ARG002 - not every drawing has this way
-        """Draw it in characters, in so many columns."""
+    def characters(self, width: int) -> list[Line] | None:  # noqa: ARG002 - optional
+        """Draw it in characters, `width` columns wide."""
         return None
 
     def mermaid(self) -> str | None:
-        """Write it for Mermaid."""
+        """Write it as a Mermaid diagram."""
         return None
 
 
 class Chart(NamedTuple):
-    """A drawing with what it shows in words."""
+    """A drawing with a caption."""
 
     drawing: Drawing
     caption: Sentence
     legend: Sentence | None = None
-    """How its SVG is read, behind the caption; where it is drawn in characters, they say it themselves."""
+    """How to read the SVG; follows the caption. A drawing in characters contains its own legend."""
 
 
 class Snippet(NamedTuple):
-    """Lines to copy into a file."""
+    """Lines for the reader to copy into a file."""
 
     lines: tuple[str, ...]
     language: str = "toml"
@@ -188,7 +188,7 @@ class CalculationStep(NamedTuple):
     symbol: str
     formula: str
     numbers: str
-    result: Value | Words
+    result: ShownValue | Words
 
 
 class Calculation(NamedTuple):
@@ -198,16 +198,16 @@ class Calculation(NamedTuple):
 
 
 class Question(NamedTuple):
-    """A question with its answer in a word, why, and the figures to look at first."""
+    """A question, its answer in a word or two, the reasons, and the main figures."""
 
     question: str
     answer: Words
     sentences: tuple[Sentence, ...]
     facts: Facts
     at: str = ""
-    """Place of the sentences, joined, in the JSON document; empty where they have none."""
+    """JSON pointer to the joined sentences; empty if they are not in the document."""
     command: str = ""
-    """As for `Value`."""
+    """As in `ShownValue`."""
 
 
 class Chapter(NamedTuple):
@@ -216,40 +216,40 @@ class Chapter(NamedTuple):
     title: Sentence
     blocks: "tuple[Block, ...]"
     kind: str = ""
-    """What it is about, for a style sheet."""
+    """Name for the style sheet: the section has the CSS class `part-<kind>`."""
     key: str = ""
-    """Its name on a page, where a link leads to it."""
+    """Anchor that links point to; empty if none does."""
 
 
 Block = Sentence | Facts | Table | Chart | Command | Snippet | Calculation | Question | Chapter
 
 
 class Report(NamedTuple):
-    """An answer, ready for every form; each part is made when a form asks for it."""
+    """An answer, ready for every form; each part is computed when a form needs it."""
 
     title: Sentence
-    """Heading of a page."""
+    """Title of a page."""
     blocks: Callable[[], Sequence[Block]]
-    """For people."""
+    """Content for people."""
     document: Callable[[], Mapping[str, Any]]
-    """For JSON: the record, and not the blocks."""
+    """Content for JSON: plain data, not blocks."""
     records: Callable[[], Sequence[Record]] | None = None
-    """For CSV: the rows of the record; None where they are no one table."""
+    """Rows for CSV; None if the answer is more than one table."""
     is_page: bool = False
-    """Whether it is a page of its own, whose title stands in every form; other answers may be part of one."""
+    """If True, every form shows the title; other answers may be part of a page."""
 
 
 def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
-    """Put figures into words.
+    """Make a sentence from a template.
 
     Parameters
     ----------
     template
-        The words, with {} for each part.
+        The text, with {} for each part.
     parts
-        What stands there.
+        Figures, code or text that replace the {}.
     state
-        What it says of the plan.
+        State of the sentence.
 
     Examples
     --------
@@ -258,7 +258,7 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
     """
     pieces = list(Formatter().parse(template))
     words = [piece[0] for piece in pieces]
-    # Behind the last part there may be no words.
+    # The template may end in a part.
     words += [""] * (pieces[-1][1] is not None)
     found: list[Part] = [words[0]]
     for part, behind in zip(parts, words[1:], strict=True):
@@ -267,67 +267,67 @@ def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:
 
 
 def joined(*sentences: Sentence, by: str = " ") -> Sentence:
-    """Put sentences, or pieces of one, behind one another; the state is that of the first."""
+    """Join sentences, or pieces of one, with a separator; the state is that of the first."""
     parts: list[Part] = []
     for one in sentences:
         parts += [by, *one.parts] if parts else one.parts
     return Sentence(tuple(parts), sentences[0].state)
 
 
-def figure_value(figure: Figure, value: Any, *, at: str = "") -> Value:
-    """A value of a registered figure, as tables write it; a truth that should be and is not fails."""
+def figure_value(figure: Figure, value: Any, *, at: str = "") -> ShownValue:
+    """Value with the unit and decimals of a registered figure; False fails where True is better."""
     fails = figure.sort == "truth" and figure.better == "more" and value is False
     decimals = figure.decimals if figure.sort == "number" else None
-    return Value(
+    return ShownValue(
         value, figure.key, figure.column or figure.unit, decimals, at=at, state="fails" if fails else "neutral"
     )
 
 
-def value_of(figure: Figure, owner: object, *, at: str) -> Value:
-    """The value that an owner has of a registered figure, under its key.
+def attribute_value(figure: Figure, owner: object, *, at: str) -> ShownValue:
+    """Value of a registered figure, read from the attribute of its key.
 
     Parameters
     ----------
     figure
         The figure.
     owner
-        What has it as an attribute.
+        Object with an attribute named `figure.key`.
     at
-        Place of the owner in the JSON document.
+        JSON pointer to the owner.
     """
     return figure_value(figure, getattr(owner, figure.key), at=f"{at}/{figure.key}")
 
 
-def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> Value:
-    """A number of things."""
-    return Value(value, key, at=at, grouped=grouped)
+def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> ShownValue:
+    """A count, written without a unit."""
+    return ShownValue(value, key, at=at, grouped=grouped)
 
 
 def state_of(passes: object) -> State:
-    """State of what passes or fails."""
+    """State of a result that passes or fails."""
     return "passes" if passes else "fails"
 
 
-def values_in(item: object) -> Iterator[Value]:
-    """Every figure of a block, or of several, in reading order."""
-    if isinstance(item, Value):
+def values_in(item: object) -> Iterator[ShownValue]:
+    """Every figure in a block, or in several, in reading order."""
+    if isinstance(item, ShownValue):
         yield item
     elif isinstance(item, tuple):
         for one in item:
             yield from values_in(one)
 
 
-def with_values(item: Made, change: Callable[[Value], Value]) -> Made:
-    """Copy a block with every figure of it changed.
+def with_values(item: BlockOrPart, change: Callable[[ShownValue], ShownValue]) -> BlockOrPart:
+    """Copy a block, replacing every figure in it.
 
     Parameters
     ----------
     item
-        The block, or what it is made of.
+        The block, or a piece of one.
     change
-        From a figure to the one in its place.
+        Function from a figure to its replacement.
     """
-    if isinstance(item, Value):
+    if isinstance(item, ShownValue):
         return change(item)  # type: ignore[return-value]
     if not isinstance(item, tuple):
         return item

@@ -1,21 +1,21 @@
-"""Tables in columns of characters; no figure is ever cut or wrapped."""
+"""Tables in character columns; figures are never cut or wrapped."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 
-from busplan.forms.blocks import Bar, Cell, Sentence, Swatch, Table, TableColumn, TableRow, Value, Words
+from busplan.forms.blocks import Bar, Cell, Sentence, ShownValue, Swatch, Table, TableColumn, TableRow, Words
 from busplan.forms.lines import Line, Mark, Tone
-from busplan.forms.numbers import with_unit, written
+from busplan.forms.numbers import figure_text, with_unit
 from busplan.printable import printable
 
 
 def cell_text(cell: Cell) -> str:
-    """Write a cell in plain characters."""
+    """Write a cell as plain text."""
     match cell:
         case str():
             return cell
-        case Value():
-            return written(cell)
+        case ShownValue():
+            return figure_text(cell)
         case Swatch():
             return f"{cell.letter} {cell.text}"
         case Bar():
@@ -27,17 +27,17 @@ def cell_text(cell: Cell) -> str:
 
 
 def sentence_text(sentence: Sentence) -> str:
-    """Write a sentence in plain characters."""
-    return "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in sentence.parts)
+    """Write a sentence as plain text."""
+    return "".join(with_unit(part) if isinstance(part, ShownValue) else cell_text(part) for part in sentence.parts)
 
 
 def table_lines(table: Table) -> list[Line]:
-    """Lay out a table: words to the left, figures to the right, a rule below the headings.
+    """Lay out a table: words left, figures right, a rule below the headings.
 
     Parameters
     ----------
     table
-        The table; what is only drawn is left out, for its figure stands beside it.
+        The table. Columns of drawings are left out: the figure is in another column.
     """
     shown = [number for number, column in enumerate(table.columns) if column.kind != "drawing"]
     columns = [table.columns[number] for number in shown]
@@ -62,7 +62,7 @@ def _one_line(cell: Cell) -> str:
 
 
 def _heads(columns: Sequence[TableColumn]) -> list[tuple[str, ...]]:
-    """Lines of headings, from the top: group, heading and unit, where a column has them."""
+    """Heading lines from the top: group, heading and unit, aligned at the bottom."""
     stacks = [[*filter(None, (column.unit, column.heading, column.group))] for column in columns]
     return [tuple(line) for line in zip_longest(*stacks, fillvalue="")][::-1]
 
@@ -77,7 +77,7 @@ def _laid(cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]) -> 
 def _marks(
     row: TableRow, shown: Sequence[int], cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]
 ) -> Iterator[Mark]:
-    """Where the cells stand that have a state; the row that is sought is one mark."""
+    """Marks of the cells that have a state; a highlighted row is one more mark."""
     start = 0
     for number, cell, width, words in zip(shown, cells, widths, left, strict=True):
         tone = _tone(row.cells[number])
@@ -85,9 +85,9 @@ def _marks(
             begin = start if words else start + width - len(cell)
             yield Mark(begin, begin + len(cell), tone)
         start += width + 2
-    if row.sought:
+    if row.highlighted:
         yield Mark(0, start, "heading")
 
 
 def _tone(cell: Cell) -> Tone:
-    return cell.state if isinstance(cell, Value | Words | Sentence) else "neutral"
+    return cell.state if isinstance(cell, ShownValue | Words | Sentence) else "neutral"

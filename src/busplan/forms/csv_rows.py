@@ -1,4 +1,4 @@
-"""The rows of a record as CSV."""
+"""Rows of an answer as CSV."""
 
 import csv
 import io
@@ -10,27 +10,27 @@ from busplan.forms.blocks import Report
 
 _BLOCK: Final = 1 << 16
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
-"""How a text begins that spreadsheets take for a formula: it may run a program, or send the sheet away."""
+"""First characters of a text that spreadsheets run as a formula: it could start a program or send data away."""
 
 
 def to_csv(rows: Sequence[Mapping[str, object]]) -> str:
-    """Write rows of the same keys as CSV with a header; a list becomes words with spaces between.
+    """Write rows with the same keys as CSV with a header; a list becomes words separated by spaces.
 
     Raises
     ------
     ValueError
-        A row has a key that the first has not.
+        A row has a key that the first row lacks.
     """
     return "".join(csv_blocks(rows, columns=list(rows[0]))) if rows else ""
 
 
 def csv_blocks(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
-    """Write rows as CSV block by block, so that a long table needs no memory of its own.
+    """Write rows as CSV block by block, so that memory does not grow with the table.
 
     Raises
     ------
     ValueError
-        A row has a key that is no column.
+        A row has a key that is not a column.
     """
     buffer = io.StringIO()
     writer = csv.DictWriter(buffer, fieldnames=columns, lineterminator="\n")
@@ -45,7 +45,7 @@ def csv_blocks(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) 
 
 
 def csv_cell(value: object) -> object:
-    """Make a value what a cell holds: a text that a spreadsheet would run as a formula begins with an apostrophe.
+    """Convert a value to a CSV cell; text that a spreadsheet would run as a formula gets an apostrophe in front.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def csv_cell(value: object) -> object:
 
 
 def spelled(value: object) -> object:
-    """Write a truth in small letters, and a list as words; anything else stays what it is."""
+    """Write a boolean in lower case and a list as words; return anything else unchanged."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):
@@ -71,8 +71,8 @@ def text(report: Report) -> str:
     Raises
     ------
     BusplanError
-        Its figures are no one table.
+        The answer is more than one table.
     """
     if report.records is None:
-        raise BusplanError("CSV is one table, and this answer has several; its JSON has all of them")
+        raise BusplanError("--format csv: this answer has several tables and CSV holds one; use --format json")
     return to_csv(report.records())

@@ -1,4 +1,4 @@
-"""An answer as one HTML file: no network, no script, light and dark, phone and paper."""
+"""An answer as one self-contained HTML file: no network, no script; light, dark, narrow and printed styles."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -13,16 +13,16 @@ from busplan.forms import blocks as made_of
 from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
 from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.inks import DARK, fills
-from busplan.forms.numbers import unit_text, written
+from busplan.forms.numbers import figure_text, unit_text
 from busplan.forms.signed_bar import signed_bar
 from busplan.printable import json_text, printable_lines
 
-_TYPES: Final = ("Value", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
+_TYPES: Final = ("ShownValue", "Words", "Code", "SectionLink", "Swatch", "Bar", "Command", "Sentence")
 _BLOCKS: Final = ("Facts", "Table", "Chart", "Snippet", "Calculation", "Question", "Chapter")
 
 
 def page(report: Report) -> str:
-    """Write an answer; whatever a profile is called, it is text.
+    """Write an answer as HTML; text from profiles is escaped.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def page(report: Report) -> str:
     Returns
     -------
     str
-        The whole document; the same for the same answer.
+        The whole document. The same answer always gives the same document.
     """
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
@@ -49,21 +49,21 @@ def page(report: Report) -> str:
     environment.filters |= {
         "exact": lambda value: json_text(value.value),
         "exact_unit": lambda value: unit_of(value.key),
-        "written": written,
+        "figure_text": figure_text,
         "unit": unit_text,
         "plain": sentence_text,
         "runs": lambda found: list(_runs(found)),
         "groups": _groups,
         "words": cell_text,
         "bar": _bar,
-        # An SVG of ours is markup: its writer has escaped what it says.
+        # SVG from `forms.svg` is escaped already.
         "svg": Markup,
         "holds_sections": lambda section: any(isinstance(one, Chapter) for one in section.blocks),
     }
     found = report.blocks()
     light, dark = fills(".chart")
     styles = dict.fromkeys(chart.drawing.stylesheet for chart in _charts(found))
-    colours = Markup(f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n")  # noqa: S704 - constants of ours
+    colours = Markup(f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n")  # noqa: S704 - our own constants
     return environment.get_template("page.html.j2").render(
         title=report.title,
         blocks=found,
@@ -73,7 +73,7 @@ def page(report: Report) -> str:
 
 
 def _shown(piece: object) -> object:
-    """What a template writes: nothing in it commands a terminal that shows the file."""
+    """Text without control characters: a terminal may show the file."""
     return printable_lines(piece) if isinstance(piece, str) and not isinstance(piece, Markup) else piece
 
 
@@ -86,7 +86,7 @@ def _charts(blocks: Sequence[Block]) -> Iterator[Chart]:
 
 
 def _runs(blocks: Sequence[Block]) -> Iterator[tuple[str, list[Block]]]:
-    """Neighbouring blocks that are set in one way."""
+    """Runs of neighbouring blocks with the same layout."""
     for role, run in groupby(blocks, key=_role):
         yield role, list(run)
 
@@ -103,12 +103,12 @@ def _role(block: Block) -> str:
 
 
 def _groups(table: Table) -> list[tuple[str, int]]:
-    """The headings above the columns' own with how many columns each spans; nothing where there are none."""
+    """Group headings with the number of columns that each spans; empty if no column has a group."""
     found = [(name, len(list(run))) for name, run in groupby(column.group for column in table.columns)]
     return found if any(name for name, _ in found) else []
 
 
 def _bar(bar: Bar) -> Markup:
-    title = f"{written(bar.value)} {bar.value.unit}"
+    title = f"{figure_text(bar.value)} {bar.value.unit}"
     drawn = signed_bar(float(bar.value.value), least=bar.least, most=bar.most, title=title)
-    return Markup(drawn)  # noqa: S704 - an SVG of ours
+    return Markup(drawn)  # noqa: S704 - our own SVG

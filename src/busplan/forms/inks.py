@@ -1,4 +1,4 @@
-"""The colours of a drawing and of its legend, on white and on black."""
+"""Colours of drawings and their legends, on a light and on a dark background."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -7,16 +7,16 @@ from typing import Final, NamedTuple
 from busplan.buses.figure import Ink
 
 DARK: Final = "@media screen and (prefers-color-scheme:dark)"
-"""Where colours on black hold: paper is white."""
+"""Media query for the colours on a dark background; printed pages are light."""
 
 
 class InkColours(NamedTuple):
-    """The colours of one ink."""
+    """Colours of one ink."""
 
     light: str
-    """On white."""
+    """On a light background."""
     dark: str
-    """On black."""
+    """On a dark background."""
 
 
 INKS: Final[Mapping[Ink, InkColours]] = MappingProxyType(
@@ -35,11 +35,11 @@ INKS: Final[Mapping[Ink, InkColours]] = MappingProxyType(
         "out": InkColours("#2a9d8f", "#5cc9bb"),
     }
 )
-"""Every ink; its name is a class of style sheets."""
+"""Colours by ink; the name of an ink is its CSS class."""
 
 
 def fills(scope: str) -> tuple[str, str]:
-    """Rules that colour each ink inside a selector, on white and on black."""
+    """CSS rules that fill each ink inside a selector: for a light background and for a dark one."""
     light, dark = (
         "".join(f"{scope} .{ink}{{fill:{colours[side]}}}\n" for ink, colours in INKS.items()) for side in (0, 1)
     )

@@ -1,4 +1,4 @@
-"""The record of an answer as one JSON document."""
+"""An answer as one JSON document."""
 
 from collections.abc import Mapping
 
@@ -7,16 +7,16 @@ from busplan.printable import json_text
 
 
 def to_json(document: Mapping[str, object]) -> str:
-    """Write one JSON document, indented, with a line end.
+    """Write a JSON document, indented, with a final newline.
 
     Raises
     ------
     ValueError
-        A number is not finite: such a document must not leave the program.
+        A number is not finite.
     """
     return json_text(document, indent=2) + "\n"
 
 
 def text(report: Report) -> str:
-    """Write the document of an answer."""
+    """Write an answer as JSON."""
     return to_json(report.document())

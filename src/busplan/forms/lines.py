@@ -1,6 +1,6 @@
-"""Lines of text, plain or with colours.
+"""Lines of text, plain or coloured.
 
-The layout is ours because a piped report must not pay for loading a renderer.
+Plain lines are laid out here, so that piped output does not load rich.
 """
 
 import io
@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.printable import printable
 
 Tone = Literal["passes", "fails", "warns", "title", "heading", "neutral", "drawn"]
-"""How a line is meant: a state, a title, words, or what keeps its columns: headings and lines of a table."""
+"""Style of a line. "heading" and "drawn" lines (tables and drawings) are never wrapped."""
 _STYLES: Final[dict[Tone, str]] = {
     "passes": "bold green",
     "fails": "bold red",
@@ -24,7 +24,7 @@ _NARROWEST: Final = 40
 
 
 class Mark(NamedTuple):
-    """A piece of a line with a tone of its own."""
+    """Part of a line with its own tone."""
 
     start: int
     end: int
@@ -32,7 +32,7 @@ class Mark(NamedTuple):
 
 
 class Line(NamedTuple):
-    """One line, or one sentence that may be wrapped into several."""
+    """One line; a sentence may be wrapped into several."""
 
     text: str
     tone: Tone = "neutral"
@@ -43,18 +43,18 @@ BLANK: Final = Line("")
 
 
 def plain_text(lines: Iterable[Line]) -> str:
-    """Write lines without colours, each with its line end; nothing in them commands a terminal."""
+    """Write lines without colours, each with a newline and with control characters escaped."""
     return "".join(f"{printable(line.text)}\n" for line in lines)
 
 
 def styled_text(lines: Iterable[Line]) -> str:
-    """Write lines for a terminal, with its colours and in its width; NO_COLOR is honoured."""
+    """Write lines for a terminal, in its colours and width; NO_COLOR is honoured."""
     from rich.console import Console
     from rich.text import Text
 
     buffer = io.StringIO()
     console = Console(file=buffer, force_terminal=True, highlight=False, markup=False, emoji=False)
-    # On a terminal too narrow for a sentence, and for the lines of a table, the terminal breaks: no figure is ever cut.
+    # On a narrower terminal, and in tables, the terminal itself breaks lines, so that no figure is cut.
     console.width = max(console.width, _NARROWEST)
     for line in lines:
         text = Text(printable(line.text), style=_STYLES[line.tone])

@@ -1,4 +1,4 @@
-"""An answer as Markdown, for a repository's page or a comment: nothing of a profile's text is markup."""
+"""An answer as Markdown, for a repository page or a comment; text from profiles is escaped."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -18,10 +18,10 @@ from busplan.forms.blocks import (
     Report,
     SectionLink,
     Sentence,
+    ShownValue,
     Snippet,
     Swatch,
     Table,
-    Value,
     Words,
 )
 from busplan.forms.columns import cell_text
@@ -29,7 +29,7 @@ from busplan.forms.markdown_words import code, escaped, table
 from busplan.forms.numbers import with_unit
 
 _COMMENT_LEVEL: Final = 3
-"""Level of the title of what is no page: it is read inside another one, as a comment on a change."""
+"""Title level of an answer that is not a page: it is read inside one, as in a comment on a change."""
 
 
 def text(report: Report) -> str:
@@ -47,7 +47,7 @@ def text(report: Report) -> str:
 
 
 def _blocks(blocks: Sequence[Block], *, level: int) -> Iterator[str]:
-    """Lines of blocks, a blank one in front of each; commands in a row are one listing."""
+    """Lines of blocks, with a blank line before each; neighbouring commands are one listing."""
     for are_commands, run in groupby(blocks, key=lambda block: isinstance(block, Command)):
         if are_commands:
             yield from ("", "```sh", *(one.line for one in run if isinstance(one, Command)), "```")
@@ -97,13 +97,13 @@ def _facts(facts: Facts) -> str:
 
 
 def _sentence(sentence: Sentence) -> str:
-    # As a whole: what begins a line or makes a link may lie across a figure. Code is text whatever it holds.
+    # Escape text and figures together: markup may span both. Code is escaped by itself.
     pieces: list[str] = []
     for is_code, run in groupby(sentence.parts, key=lambda part: isinstance(part, Code)):
         if is_code:
             pieces += map(_part, run)
         else:
-            words = "".join(with_unit(part) if isinstance(part, Value) else cell_text(part) for part in run)
+            words = "".join(with_unit(part) if isinstance(part, ShownValue) else cell_text(part) for part in run)
             before, after = (" " if words[at : at + 1].isspace() else "" for at in (0, len(words) - 1))
             pieces.append(f"{before}{escaped(words)}{after}")
     return "".join(pieces).strip()
@@ -111,7 +111,7 @@ def _sentence(sentence: Sentence) -> str:
 
 def _part(part: Part) -> str:
     match part:
-        case Value():
+        case ShownValue():
             return escaped(with_unit(part))
         case Code():
             return code(part.text)
@@ -119,24 +119,24 @@ def _part(part: Part) -> str:
 
 
 def _table(one: Table) -> list[str]:
-    # A drawing has no place here; what it shows stands in figures beside it.
+    # Columns of drawings are left out: the figure is in another column.
     shown = [number for number, column in enumerate(one.columns) if column.kind != "drawing"]
     columns = [one.columns[number] for number in shown]
     headings = [
         escaped(", ".join(filter(None, (" ".join(filter(None, (column.group, column.heading))), column.unit)))) or " "
         for column in columns
     ]
-    rows = ([_in_row(_cell(row.cells[number]), sought=row.sought) for number in shown] for row in one.rows)
+    rows = ([_in_row(_cell(row.cells[number]), highlighted=row.highlighted) for number in shown] for row in one.rows)
     return table(headings, rows, left=[column.kind == "words" for column in columns])
 
 
-def _in_row(words: str, *, sought: bool) -> str:
-    return f"**{words}**" if sought and words and not words.startswith("**") else words
+def _in_row(words: str, *, highlighted: bool) -> str:
+    return f"**{words}**" if highlighted and words and not words.startswith("**") else words
 
 
 def _cell(cell: Cell) -> str:
     match cell:
-        case Value() | Words() | Sentence():
+        case ShownValue() | Words() | Sentence():
             words = _sentence(cell) if isinstance(cell, Sentence) else escaped(cell_text(cell))
             return f"**{words}**" if cell.state == "fails" and words else words
         case SectionLink():
@@ -145,7 +145,7 @@ def _cell(cell: Cell) -> str:
         case Command() | Code():
             return code(cell_text(cell))
         case Swatch():
-            # Its mark stands for a colour, which is not here.
+            # The mark stands for a colour, and Markdown has none.
             return escaped(cell.text)
     return escaped(cell_text(cell))
 
@@ -157,7 +157,7 @@ def _steps(steps: Calculation) -> list[str]:
             escaped(step.reference),
             code(f"{step.symbol} = {step.formula}" if step.formula else step.symbol),
             code(step.numbers) if step.numbers else "",
-            escaped(with_unit(step.result) if isinstance(step.result, Value) else step.result.text),
+            escaped(with_unit(step.result) if isinstance(step.result, ShownValue) else step.result.text),
         ]
         for number, step in enumerate(steps.steps, start=1)
     )

@@ -1,4 +1,4 @@
-"""GitHub's Markdown: tables and words in which nothing of a profile's text is markup."""
+"""GitHub Markdown: escaped text, code and tables."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -7,12 +7,12 @@ from typing import Final
 from busplan.printable import printable
 
 _INSIDE: Final = re.compile(r"[\\`*_\[\]<>~&@:$]|(?<=www)\.")
-"""Markup inside a line, and what makes a link, a mention or a formula of bare words."""
+"""Markup inside a line, and characters that turn plain words into a link, a mention or a formula."""
 _AT_START: Final = re.compile(r"^(\d*)([-+#=.)])(?=\s|$|[-=#])")
-"""What makes a list, a heading or a rule of the line that it begins."""
+"""Markup at the start of a line: a list, a heading or a rule."""
 
 BAR: Final = r"\|"
-"""A bar inside a cell, also inside code: the table is taken apart before its cells are read."""
+"""Escaped bar in a cell; code needs it, too: Markdown splits a table into cells first."""
 
 
 def escaped(text: str) -> str:
@@ -27,7 +27,7 @@ def escaped(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Write text as code: nothing in it is markup, no mention and no link, and nothing commands a terminal.
+    """Write text as inline code; control characters are escaped.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int |
     Parameters
     ----------
     headings
-        One a column.
+        One for each column, in Markdown.
     rows
-        Cells, as many as headings; Markdown already, but for the bars that would part them.
+        Cells in Markdown, as many as headings; bars are escaped here.
     left
-        Which columns are words, set to the left, or how many of the first; figures are set to the right.
+        Which columns are left-aligned: one flag each, or how many of the first. The others are right-aligned.
 
     Returns
     -------

@@ -1,36 +1,36 @@
-"""How a figure is written: its digits and its unit."""
+"""Write figures: digits and unit."""
 
 from math import isnan
 from typing import Final
 
 from busplan.buses.figure import unit_of
-from busplan.forms.blocks import Value
+from busplan.forms.blocks import ShownValue
 
 MISSING: Final = "-"
 _DIGITS: Final = 12
-"""Digits of a number that has as many as it takes: float rounding is not among them."""
-_FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6}
-"""From the unit of a key to the one it is written in."""
+"""Most digits of a number; further ones are float rounding."""
+_FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us", "s"): 1e-6, ("us", "us/byte"): 1.0}
+"""Factor from the unit of a key to the unit it is written in; the key `per_byte_us` is in us/byte."""
 _MILLISECOND_US: Final = 1e3
 _SECOND_US: Final = 1e6
 _SILENT: Final = frozenset(("", "1", "nodes", "axes"))
-"""Units that words say, where a figure stands in a sentence."""
-_ROUNDING_UM: Final = 1e-6
-"""Smallest length, in um, that is more than rounding: a picometre."""
+"""Units that a sentence does not repeat behind a figure: a noun names them."""
+ROUNDING_UM: Final = 1e-6
+"""Lengths below a picometre, in um, are float rounding."""
 
 
-def written(value: Value) -> str:
+def figure_text(value: ShownValue) -> str:
     """Write a figure without its unit.
 
     Examples
     --------
-    >>> written(Value(0.0036, "max_contour_error_mm", "um", 3)), written(Value(0.97, "utilisation", "%", 2))
-    ('3.600', '97.00')
-    >>> written(Value(None)), written(Value(True)), written(Value(16.0)), written(Value(("time", "nodes")))
-    ('-', 'yes', '16', 'time, nodes')
-    >>> written(Value([2.38808777, 4000.0], digits=4)), written(Value(-4e-16, decimals=3, fixed=True))
+    >>> figure_text(ShownValue(0.0036, "max_contour_error_mm", "um", 3))
+    '3.600'
+    >>> [figure_text(ShownValue(one)) for one in (None, True, 16.0, ("time", "nodes"))]
+    ['-', 'yes', '16', 'time, nodes']
+    >>> figure_text(ShownValue([2.38808777, 4000.0], digits=4)), figure_text(ShownValue(-4e-16, decimals=3, fixed=True))
     ('2.388, 4000', '0.000')
-    >>> written(Value(1234567)), written(Value(1234567, grouped=True))
+    >>> figure_text(ShownValue(1234567)), figure_text(ShownValue(1234567, grouped=True))
     ('1234567', '1,234,567')
     """
     match value.value:
@@ -41,30 +41,30 @@ def written(value: Value) -> str:
         case int() | float():
             return _number(value)
         case list() | tuple():
-            return ", ".join(written(value._replace(value=one)) for one in value.value) or MISSING
+            return ", ".join(figure_text(value._replace(value=one)) for one in value.value) or MISSING
     return str(value.value)
 
 
-def with_unit(value: Value) -> str:
-    """Write a figure with its unit, as a sentence has it.
+def with_unit(value: ShownValue) -> str:
+    """Write a figure with its unit, as in a sentence.
 
     Examples
     --------
-    >>> with_unit(Value(3.9691, "margin_us", "us", 3)), with_unit(Value(0.5, "utilisation", "%", 1))
+    >>> with_unit(ShownValue(3.9691, "margin_us", "us", 3)), with_unit(ShownValue(0.5, "utilisation", "%", 1))
     ('3.969 us', '50.0%')
     """
-    return f"{written(value)}{unit_text(value)}"
+    return f"{figure_text(value)}{unit_text(value)}"
 
 
-def unit_text(value: Value) -> str:
-    """Write what stands behind a figure in a sentence."""
-    if value.unit in _SILENT or written(value) == MISSING:
+def unit_text(value: ShownValue) -> str:
+    """Unit behind a figure in a sentence, with its space."""
+    if value.unit in _SILENT or figure_text(value) == MISSING:
         return ""
     return "%" if value.unit == "%" else f" {value.unit}"
 
 
 def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
-    """Write a number with so many decimals, unless it is too small for them.
+    """Write a number with fixed decimals; one too small for them is written with three digits.
 
     Examples
     --------
@@ -77,8 +77,8 @@ def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
     return f"{sign}{number:.3g}"
 
 
-def period_value(period_us: float, *, at: str = "", command: str = "") -> Value:
-    """A communication period in the unit that people say it in.
+def period_value(period_us: float, *, at: str = "", command: str = "") -> ShownValue:
+    """A communication period in s, ms or us, by its size.
 
     Examples
     --------
@@ -86,16 +86,16 @@ def period_value(period_us: float, *, at: str = "", command: str = "") -> Value:
     ['4 ms', '250 us', '1.2345 ms', '2 s']
     """
     unit = "s" if period_us >= _SECOND_US else "ms" if period_us >= _MILLISECOND_US else "us"
-    return Value(period_us, "period_us", unit, at=at, command=command)
+    return ShownValue(period_us, "period_us", unit, at=at, command=command)
 
 
 def period(period_us: float) -> str:
-    """Write a communication period as people say it."""
+    """Write a communication period in s, ms or us, by its size."""
     return with_unit(period_value(period_us))
 
 
 def plural(number: int, noun: str) -> str:
-    """Write a number of things with their noun.
+    """Write a count with its noun.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def plural(number: int, noun: str) -> str:
 
 
 def nouns(number: int, noun: str) -> str:
-    """The noun of so many things.
+    """Singular or plural of a noun, by its count.
 
     Examples
     --------
@@ -118,15 +118,23 @@ def nouns(number: int, noun: str) -> str:
     return f"{noun.removesuffix('is')}es" if noun.endswith("is") else f"{noun}s"
 
 
-def _number(value: Value) -> str:
-    factor = _FACTORS.get((unit_of(value.key), value.unit), 1.0)
+def _factor(value: ShownValue) -> float:
+    """Factor to the unit a value is written in; KeyError for an unknown pair. A key without a unit has that unit."""
+    own = unit_of(value.key)
+    if own == value.unit or not value.unit or (not own and value.unit != "%"):
+        return 1.0
+    return _FACTORS[own, value.unit]
+
+
+def _number(value: ShownValue) -> str:
+    factor = _factor(value)
     number = value.value if factor == 1.0 else value.value * factor
     if isnan(number):
         return MISSING
-    if value.unit == "um" and abs(number) < _ROUNDING_UM:
+    if value.unit == "um" and abs(number) < ROUNDING_UM:
         number = 0.0
     if value.decimals is not None:
-        # Plus zero: a negative one is no number to show.
+        # Adding 0.0 turns -0.0 into 0.0.
         number = round(number, value.decimals) + 0.0 if value.fixed else number
         return decimals_of(number, value.decimals, signed=value.signed)
     sign, comma = "+" if value.signed and number > 0 else "", "," if value.grouped else ""

@@ -1,4 +1,4 @@
-"""Round marks for any scale."""
+"""Round tick marks for any scale."""
 
 from math import ceil, floor, log10
 from typing import NamedTuple
@@ -12,19 +12,19 @@ class RoundStep(NamedTuple):
 
     @property
     def size(self) -> float:
-        """As a number."""
+        """The step as a number."""
         return self.factor * 10.0**self.power
 
 
 class Tick(NamedTuple):
-    """One mark of a scale."""
+    """One tick mark of a scale."""
 
     at_us: float
     label: str
 
 
 def round_steps(near: float) -> tuple[RoundStep, ...]:
-    """Round steps about a size, from well below it to well above it.
+    """Round steps around a size, from a tenth of its power of ten to ten times that.
 
     Parameters
     ----------
@@ -40,15 +40,26 @@ def round_steps(near: float) -> tuple[RoundStep, ...]:
     return tuple(RoundStep(factor, power + more) for more in (-1, 0, 1) for factor in (1, 2, 5))
 
 
+def ring_step(largest: float) -> float:
+    """Round step that divides up to `largest` into two to five parts.
+
+    Examples
+    --------
+    >>> ring_step(3.0), ring_step(12.0)
+    (1.0, 5.0)
+    """
+    return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
+
+
 def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
-    """Round marks inside a window, 1, 2 or 5 times a power of ten apart.
+    """Tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
 
     Parameters
     ----------
     from_us, to_us
         The window [us].
     most
-        Most marks, 1 or more.
+        Largest number of marks, 1 or more.
 
     Examples
     --------
@@ -57,7 +68,7 @@ def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
     >>> [tick.label for tick in ticks(0.0, 0.3, most=4)]
     ['0.0', '0.1', '0.2', '0.3']
     """
-    # A step that is longer than this meets the window no more often than `most`, wherever the window begins.
+    # A step longer than this gives at most `most` marks, wherever the window begins.
     smallest_us = (to_us - from_us) / most * (1 + 1e-6)
     step = next(one for one in round_steps(smallest_us) if one.size > smallest_us)
     step_us = step.size

@@ -1,4 +1,4 @@
-"""A bar to the left or to the right of zero, for a cell of a table."""
+"""A bar left or right of zero, for a table cell."""
 
 from xml.etree.ElementTree import SubElement
 
@@ -8,16 +8,16 @@ _HEIGHT = 16
 
 
 def signed_bar(value: float, *, least: float, most: float, title: str) -> str:
-    """Draw one value on a scale that it shares with the rows above and below.
+    """Draw one value as a bar on a scale.
 
     Parameters
     ----------
     value
-        What the bar shows.
+        Value of the bar.
     least, most
-        Ends of the scale; zero lies between them or is one of them.
+        Ends of the scale, least <= 0 <= most.
     title
-        What it shows, for who cannot see it.
+        Title for screen readers.
     """
     root = drawing(title, css="chart bars")
     root.set("height", str(_HEIGHT))

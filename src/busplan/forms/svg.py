@@ -1,4 +1,4 @@
-"""What every SVG of ours is made of: it fills the width it is given, in percent, and its words keep their size."""
+"""Parts of every SVG: widths are in percent, so that it fills its container and text keeps its size."""
 
 from typing import Final, Protocol
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -6,15 +6,15 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from busplan.forms.scale import ticks
 
 LINE: Final = 20
-"""Height of a line of words."""
+"""Height of a line of text."""
 _NAMESPACE: Final = "http://www.w3.org/2000/svg"
 _TICKS: Final = 5
 _SHORT: Final = 6
-"""Characters of a figure that so many marks leave room for on a phone."""
+"""Longest label, in characters, for which `_TICKS` marks fit on a phone."""
 
 
 class Span(Protocol):
-    """What has a start and an end."""
+    """Something with a start and an end."""
 
     @property
     def start_us(self) -> float:
@@ -26,14 +26,14 @@ class Span(Protocol):
 
 
 def drawing(title: str, *, css: str) -> Element:
-    """Begin a picture as wide as its place; who draws it sets its height.
+    """Begin a drawing as wide as its container; the caller sets its height.
 
     Parameters
     ----------
     title
-        What it shows, for who cannot see it.
+        Title for screen readers.
     css
-        Its class: no style reaches beyond it.
+        CSS class that scopes its styles.
     """
     root = Element("svg", {"xmlns": _NAMESPACE, "class": css, "width": "100%", "role": "img"})
     SubElement(root, "title").text = title
@@ -41,46 +41,46 @@ def drawing(title: str, *, css: str) -> Element:
 
 
 def inside(parent: Element, *, x_percent: float, width_percent: float, y: int) -> Element:
-    """A part of the picture with its own width; what stands at its edge may reach over it."""
+    """A nested drawing with its own width; content at its edge may overflow."""
     box = {"x": f"{x_percent:g}%", "width": f"{width_percent:g}%", "y": str(y), "overflow": "visible"}
     return SubElement(parent, "svg", box)
 
 
 def text_at(parent: Element, text: str, *, x: str, y: int, css: str = "", anchor: str = "start") -> None:
-    """Words at a place."""
+    """Draw text at a place."""
     SubElement(parent, "text", {"x": x, "y": str(y), "class": css, "text-anchor": anchor}).text = text
 
 
 def markup(root: Element) -> str:
-    """Write the picture; what it says is text, whatever it holds."""
+    """Write a drawing as SVG; text is escaped."""
     indent(root)
     return tostring(root, encoding="unicode") + "\n"
 
 
 class Scale:
-    """From times to shares of a width.
+    """Map times to percent of a width.
 
     Parameters
     ----------
     from_us, to_us
-        What the width spans [us].
+        Times at the left and the right edge [us].
     """
 
     def __init__(self, from_us: float, to_us: float) -> None:
         self._from_us, self._to_us = from_us, to_us
 
     def percent(self, time_us: float) -> float:
-        """Where a time lies, 0 to 100."""
+        """Position of a time, 0 to 100, clipped to the edges."""
         return min(100.0, max(0.0, 100 * (time_us - self._from_us) / (self._to_us - self._from_us)))
 
     def rect(self, parent: Element, span: Span, *, y: int, height: int, css: str, title: str) -> None:
-        """Draw a time as a bar; what it is comes up where a pointer rests on it."""
+        """Draw a time span as a bar; its title is a tooltip."""
         start, end = self.percent(span.start_us), self.percent(span.end_us)
         box = {"x": f"{start:.5g}%", "width": f"{end - start:.5g}%", "y": str(y), "height": str(height), "class": css}
         SubElement(SubElement(parent, "rect", box), "title").text = title
 
     def marks(self, parent: Element, *, top: int, bottom: int) -> int:
-        """Draw round times as lines with their figures below; the height below them."""
+        """Draw tick marks as lines with labels below, and return the y below them."""
         marks = ticks(self._from_us, self._to_us, most=_TICKS)
         if max((len(tick.label) for tick in marks), default=0) > _SHORT:
             marks = ticks(self._from_us, self._to_us, most=_TICKS // 2)

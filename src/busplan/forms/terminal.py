@@ -1,4 +1,4 @@
-"""An answer in lines of text: for a terminal, with its colours and width, or plain, for a pipe and a file."""
+"""An answer as lines of text: coloured for a terminal, plain for a pipe or a file."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
@@ -15,29 +15,29 @@ from busplan.forms.blocks import (
     Question,
     Report,
     Sentence,
+    ShownValue,
     Snippet,
     Table,
-    Value,
 )
 from busplan.forms.columns import cell_text, sentence_text, table_lines
 from busplan.forms.lines import BLANK, Line, plain_text, styled_text
 from busplan.forms.numbers import with_unit
 
 WIDTH: Final = 80
-"""Columns of a drawing where there is no terminal."""
+"""Width of a drawing if there is no terminal, in columns."""
 
 
 def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
-    """Write an answer in lines.
+    """Write an answer as lines of text.
 
     Parameters
     ----------
     report
         The answer.
     width
-        Columns that a drawing fills.
+        Width of drawings, in columns.
     styled
-        Whether to write for a terminal, with its colours.
+        If True, write the colours of a terminal.
     """
     blocks = [Chapter(report.title, tuple(report.blocks()))] if report.is_page else report.blocks()
     lines = block_lines(blocks, width=width)
@@ -45,14 +45,14 @@ def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
 
 
 def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line]:
-    """Write blocks as lines: sentences below one another, a blank line around everything else.
+    """Write blocks as lines, with blank lines around everything but sentences.
 
     Parameters
     ----------
     blocks
-        What to write.
+        The blocks.
     width
-        Columns that a drawing fills.
+        Width of drawings, in columns.
     """
     before: Block | None = None
     for block in blocks:
@@ -66,7 +66,7 @@ def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line
 
 
 def _belong(one: Block, other: Block) -> bool:
-    """Whether two blocks stand below one another without a blank line."""
+    """Whether no blank line separates two blocks."""
     return any(isinstance(one, kind) and isinstance(other, kind) for kind in (Sentence | Facts, Command))
 
 
@@ -100,13 +100,13 @@ def _caption(caption: Sentence | None) -> list[Line]:
 
 
 def _part(part: Part) -> str:
-    return with_unit(part) if isinstance(part, Value) else cell_text(part)
+    return with_unit(part) if isinstance(part, ShownValue) else cell_text(part)
 
 
 def _step(number: int, step: CalculationStep) -> Iterator[Line]:
-    """A line in symbols, one in numbers and the result, each where it says more than the one before."""
+    """A line in symbols, one in numbers and one with the result; empty ones are left out."""
     head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
-    result = with_unit(step.result) if isinstance(step.result, Value) else step.result.text
+    result = with_unit(step.result) if isinstance(step.result, ShownValue) else step.result.text
     distinct = (text for text in (step.formula, step.numbers, result) if text)
     if number > 1:
         yield BLANK

@@ -1,4 +1,4 @@
-"""The reference pages: plain Markdown beside this module, one page a topic.
+"""The reference pages: Markdown files next to this module, one for each topic.
 
 The repository shows them, the README links to them, and `busplan manual TOPIC` prints them.
 """
@@ -17,7 +17,7 @@ def topics() -> dict[str, str]:
     Returns
     -------
     dict
-        Heading of each page by its topic, which is the name of its file; sorted by topic.
+        Heading of each page by topic (its file name), sorted by topic.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def page(topic: str) -> str:
     Returns
     -------
     str
-        GitHub's Markdown.
+        The page in GitHub Markdown.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which profiles a list of paths means: files, folders, shipped names, standard input."""
+"""Find the profiles of a list of paths: files, folders, shipped names, standard input."""
 
 import os
 import re
@@ -15,7 +15,7 @@ _SKIPPED_FOLDERS = {"node_modules", "__pycache__"}
 
 
 class ProfileSource(NamedTuple):
-    """One profile to read, and what to call it; or a path that could not be followed."""
+    """One profile to read with its name in messages; or a path that leads to none."""
 
     path: Path
     name: str
@@ -24,15 +24,15 @@ class ProfileSource(NamedTuple):
 
 
 class Collection(NamedTuple):
-    """What a list of paths means."""
+    """Profiles of a list of paths."""
 
     sources: tuple[ProfileSource, ...]
     skipped: tuple[str, ...]
-    """TOML files below a folder that claim no `schema_version`."""
+    """TOML files below a folder without a `schema_version`."""
 
 
 def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collection:
-    """Find the profiles that a list of paths means, each once.
+    """Find the profiles of a list of paths, each once.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
         Files, folders (every *.toml below that claims a `schema_version`; hidden folders are left out), shipped names,
         and "-" for standard input.
     stdin_name
-        What to call standard input.
+        Name of standard input in messages.
 
     Returns
     -------
     Collection
-        Sources in the order of the arguments, and by name within a folder; a path that means nothing is one too, with
-        its failure. Names are from the working folder for all that lies below it, however it was written.
+        Sources in the order of the arguments, sorted by name in a folder; a path without a profile is a source with a
+        failure. Names are relative to the working folder for files below it.
     """
     sources: dict[str, ProfileSource] = {}
     names: set[str] = set()
@@ -56,7 +56,7 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
             key = _place(source.path).as_posix() if source.failure is None else source.failure
             if key in sources:
                 continue
-            # A shipped profile and a file can be called alike: the second says where it is.
+            # A shipped profile and a file can have the same name: the second one gets its full path.
             taken = source.failure is None and source.name in names
             sources[key] = source._replace(name=source.path.absolute().as_posix()) if taken else source
             names.add(source.name)
@@ -64,7 +64,7 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
 
 
 def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[ProfileSource]:
-    """What one argument means: one source, or all below a folder."""
+    """Sources of one argument: one, or all below a folder."""
     try:
         path, name = locate(argument)
         if argument == "-":
@@ -80,7 +80,7 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[Pr
 
 
 def _place(path: Path) -> Path:
-    """The one place of a path: from the working folder where it lies below it, otherwise from the root."""
+    """Normal form of a path: relative to the working folder for files below it, otherwise absolute."""
     if not path.is_absolute() and ".." not in path.parts:
         return path
     real = Path(os.path.realpath(path)) if path.name == ".." else Path(os.path.realpath(path.parent), path.name)
@@ -89,13 +89,13 @@ def _place(path: Path) -> Path:
 
 
 def _name(path: Path) -> str:
-    """What a file is called: by its place where that is short, otherwise as it was given."""
+    """Name of a file: relative to the working folder if it is below it, otherwise as given."""
     place = _place(path)
     return (path if place.is_absolute() else place).as_posix()
 
 
 def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
-    """Every profile below a folder, in the order of their names, and every folder that cannot be looked into."""
+    """Every profile below a folder, sorted by name, and every folder that cannot be read."""
     unreadable: list[OSError] = []
     found = False
     for root, folders, files in os.walk(folder, onerror=unreadable.append):
@@ -118,7 +118,7 @@ def _below(folder: Path, skipped: list[str]) -> Iterator[ProfileSource]:
 
 
 def _claims(path: Path) -> bool:
-    """Whether a TOML file says that it is a profile; one that cannot be read may be one."""
+    """Whether a TOML file has a `schema_version`; True if it cannot be read, so that reading it reports the error."""
     try:
         if not path.is_file():
             return False

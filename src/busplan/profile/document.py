@@ -1,4 +1,4 @@
-"""One TOML text: its data, and the line and column of what stands in it."""
+"""A TOML text: its data, and the line and column of its parts."""
 
 import re
 import tomllib
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from busplan.profile.positions import KeyPath, Place
 
 TomlTable: TypeAlias = dict[str, Any]
-"""A table of a TOML document as Python reads it."""
+"""A TOML table as Python data."""
 _TOMLLIB_MESSAGE: Final = r"(?s)(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)\Z"
 _LONG_INTEGER: Final = r"[0-9_]{4000,}"
 _MAX_NESTING: Final = 100
@@ -24,11 +24,11 @@ _LONG_KEY: Final = (
     r"""(?m)(?:^|[\[{,])[ \t]*+((?:(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
     f"{{{_MAX_KEY_PARTS}}})"
 )
-"""A dotted key of very many parts, which costs the standard library's parser the square of their number."""
+"""A dotted key of many parts, for which the standard library's parser takes quadratic time."""
 
 
 class Lines:
-    """From offsets in a text to line and column, both counted from 1, columns in characters."""
+    """Convert between offsets in a text and lines and columns, both counted from 1, columns in characters."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -47,14 +47,14 @@ class Lines:
 
 
 def text_of(content: bytes, *, name: str, wanted: str) -> str:
-    """Turn a file's bytes into text, a byte order mark left out.
+    """Decode a file, without its byte order mark.
 
     Raises
     ------
     PlacedError
-        Not UTF-8: where, and what is wanted.
+        Not UTF-8, with the place and the expected content.
     """
-    # The mark goes first: what the codec that knows it says of places, it says of the bytes behind.
+    # Remove the mark first: utf-8-sig would report offsets without it.
     content = content.removeprefix(BOM_UTF8)
     try:
         return content.decode()
@@ -67,40 +67,40 @@ def text_of(content: bytes, *, name: str, wanted: str) -> str:
 
 @dataclass(frozen=True)
 class Document:
-    """One TOML text with the name it is called by in messages."""
+    """A TOML text with its name in messages."""
 
     name: str
     text: str
 
     @cached_property
     def lines(self) -> Lines:
-        """Line and column of every offset."""
+        """Lines of the text."""
         return Lines(self.text)
 
     @property
     def places(self) -> "dict[KeyPath, Place]":
-        """Place of every key; the text must be one that tomllib accepts."""
+        """Place of every key; only for text that tomllib accepts."""
         return self._scanned[0]
 
     @property
     def comments(self) -> list[int]:
-        """Offset of every comment, its hash included; the text must be one that tomllib accepts."""
+        """Offset of the hash of every comment; only for text that tomllib accepts."""
         return self._scanned[1]
 
     @cached_property
     def _scanned(self) -> "tuple[dict[KeyPath, Place], list[int]]":
-        from busplan.profile.positions import scan  # only who asks for places pays for the scanner
+        from busplan.profile.positions import scan  # loaded only if places are needed
 
         return scan(self.text)
 
     def nearest(self, path: "KeyPath") -> int:
-        """Offset of a key, or of the nearest table around one that is not there; the start of the text at last."""
+        """Offset of a key; if it is missing, of the nearest table around it, or 0."""
         while path and path not in self.places:
             path = path[:-1]
         return self.places[path].key_start if path else 0
 
     def syntax_error(self, offset: int, message: str) -> PlacedError:
-        """Make the error for a text that is no TOML, at an offset."""
+        """Make the error for invalid TOML at an offset."""
         line, column = self.lines.line_and_column(offset)
         return PlacedError(self.name, (PlacedProblem(line, column, "syntax", message),))
 
@@ -110,11 +110,11 @@ class Document:
         Raises
         ------
         PlacedError
-            The text is no TOML; with the place where it stops being so.
+            The text is not valid TOML, with the place of the error.
         """
         long_key = self._long_key()
         if long_key:
-            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
+            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts; no profile has one")
         try:
             return tomllib.loads(self.text)
         except RecursionError:
@@ -124,14 +124,14 @@ class Document:
             raise self._refusal(error) from None
 
     def _long_key(self) -> re.Match[str] | None:
-        # A key stands on one line, so that its points can be counted first: that is much faster than looking for keys.
+        # A key is on one line, so count dots first: that is much faster than the search.
         if all(line.count(".") < _MAX_KEY_PARTS for line in self.text.split("\n")):
             return None
         return re.search(_LONG_KEY, self.text)
 
     def _refusal(self, error: ValueError) -> PlacedError:
         match = re.match(_TOMLLIB_MESSAGE, str(error))
-        if match is None:  # the one error that is Python's own and not TOML's
+        if match is None:  # the only error without a place: Python's limit of digits
             long_integer = re.search(_LONG_INTEGER, self.text)
             offset = long_integer.start() if long_integer else 0
             return self.syntax_error(offset, "not valid TOML: a number with too many digits")
@@ -142,7 +142,7 @@ class Document:
 
 
 def _first_deep_bracket(text: str) -> int:
-    """Offset of the first bracket that is nested deeper than any profile."""
+    """Offset of the first bracket that is nested too deeply."""
     depth = 0
     for match in re.finditer(r"[\[\]{}\n]", text):
         depth += {"[": 1, "{": 1, "]": -1, "}": -1, "\n": 0}[match.group()]

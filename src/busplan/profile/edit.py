@@ -1,8 +1,7 @@
-r"""Change values of a profile's text in place: what is not changed keeps its bytes, its comments and its layout.
+r"""Change values in the text of a profile and keep everything else: bytes, comments and layout.
 
-Three changes are made: another value where one stands, a line more in a section, a line less. A layout that would
-need more is refused, with the lines to change by hand. Nothing here is trusted: the finished text is parsed, and
-compared with the data that was asked for.
+A value is replaced, or a line is added to or removed from a section. A layout that needs more is refused, with the
+lines to change by hand. As a check, the new text is parsed and compared with the wanted data.
 """
 
 import re
@@ -26,39 +25,39 @@ _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
 
 
 class _LayoutError(Exception):
-    """A change that cannot be made safely, with what stands in its way."""
+    """A change that the layout does not allow, with the reason."""
 
 
 def edited_file(
     content: bytes, changes: Mapping[str, object], *, name: str, notes: Mapping[str, str] | None = None
 ) -> bytes:
-    r"""Bytes of a profile's file with other values; a byte order mark and CRLF line ends stay.
+    r"""Return a profile's file with new values; a byte order mark and CRLF line ends are kept.
 
     Parameters
     ----------
     content
         The file, a valid profile.
     changes
-        New value by dotted key, None to remove the key if it is there: {"bus.nodes": 3, "bus.max_hops": None}. A value
-        is a boolean, an int, a float, a text, or a sequence of them; one that is equal already stays as written. A key
-        that is not there yet is added behind the last one of its section, a section at the end.
+        New value by dotted key, None to remove the key: {"bus.nodes": 3, "bus.max_hops": None}. A value is a bool, an
+        int, a float, a str, or a sequence of them; an equal value keeps its text. A new key is added after the last one
+        of its section, a new section at the end.
     name
-        What to call the file in messages.
+        Name of the file in messages.
     notes
-        A comment of one line by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It takes
-        the place of a comment there that begins alike, up to the colon.
+        One-line comment by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It replaces a
+        comment there with the same beginning, up to the colon.
 
     Returns
     -------
     bytes
-        The new file: a valid profile with exactly the data asked for.
+        The new file, a valid profile with exactly the wanted data.
 
     Raises
     ------
     BusplanError
-        The changes make no valid profile; or the layout cannot take them, with the lines to change by hand.
+        The new profile is not valid; or the layout does not allow the changes, with the lines to change by hand.
     TypeError
-        What is given as a value can be none in TOML: a caller's mistake.
+        TOML has no such value.
 
     Examples
     --------
@@ -80,7 +79,7 @@ def edited_file(
             table[last] = value
     _require_profile(name, data)
     after = _texts(data)
-    # What is set comes before what is removed: a comment that stays of the latter is not the last of its section.
+    # Set keys before removing keys: new lines must not follow the comment of a removed line.
     changed = {key: after.get(key) for key in {**after, **before} if after.get(key) != before.get(key)}
     try:
         result = _encoded(_edited(document, changed, notes, wanted=after), like=content)
@@ -93,7 +92,7 @@ def edited_file(
 
 
 def _texts(data: Mapping[str, Any]) -> dict[str, str]:
-    """Every value as text, so that equal means equal in type as well."""
+    """Every value as text, so that equal values have equal types."""
     return {key: value_text(value) for key, value in flat(data)}
 
 
@@ -120,7 +119,7 @@ def _encoded(text: str, *, like: bytes) -> bytes:
 
 
 def _by_hand(changed: Mapping[str, str | None], notes: Mapping[str, str]) -> Iterator[str]:
-    """Lines that make the changes, ready to be copied: those above the first section come first."""
+    """Lines to copy for the changes; keys outside sections come first."""
     sections = dict.fromkeys([*sorted(key.rpartition(".")[0] for key in changed), *notes])
     for section in sections:
         if section in notes:
@@ -136,7 +135,7 @@ def _by_hand(changed: Mapping[str, str | None], notes: Mapping[str, str]) -> Ite
 def _edited(
     document: Document, changed: Mapping[str, str | None], notes: Mapping[str, str], *, wanted: dict[str, str]
 ) -> str:
-    """Make each change in the text of the one before."""
+    """Make the changes one after the other."""
     for key, text in changed.items():
         path = tuple(key.split("."))
         if text is None:
@@ -152,7 +151,7 @@ def _edited(
 
 
 def _replaced(document: Document, path: KeyPath, new: str) -> str:
-    """The text with another value; a comment behind it stays in its column."""
+    """Replace a value; a comment behind it stays in its column."""
     text, (_, _, start, end) = document.text, document.places[path]
     if any(start <= comment < end for comment in document.comments):
         raise _LayoutError(f"there are comments among the values of {path[-1]}")
@@ -163,19 +162,19 @@ def _replaced(document: Document, path: KeyPath, new: str) -> str:
 
 
 def _with_line(document: Document, path: KeyPath, value: str) -> str:
-    """The text with one more line in its section, or with a new section at its end."""
+    """Add a line to a section, or a new section at the end."""
     text, table, line = document.text, path[:-1], f"{path[-1]} = {value}\n"
     if table and table not in document.places:
         return f"{_whole_lines(text)}\n[{'.'.join(map(str, table))}]\n{line}"
     own = [place for key, place in document.places.items() if key[:-1] == table and place.value_start > place.key_end]
-    header = [_header(document, table)] if table else []  # no profile is without keys above its sections
+    header = [_header(document, table)] if table else []  # every profile has keys above its sections
     last = max(header + own, key=lambda place: place.value_end)
     start, end = _line_start(text, last.key_start), _line_end(text, last.value_end)
     return f"{_whole_lines(text[:end])}{_indent(text, start)}{line}{text[end:]}"
 
 
 def _without(document: Document, path: KeyPath) -> str:
-    """The text without the lines of a key; their comments stay, on lines of their own."""
+    """Remove the lines of a key; their comments get lines of their own."""
     text, place = document.text, document.places[path]
     start, end = _line_start(text, place.key_start), _line_end(text, place.value_end)
     if text[start : place.key_start].strip():
@@ -185,7 +184,7 @@ def _without(document: Document, path: KeyPath) -> str:
 
 
 def _noted(document: Document, table: KeyPath, note: str) -> str:
-    """The text with a comment above the comments of a section, so that a suppression stays next to its line."""
+    """Add a comment above the other comments of a section, so that a suppression stays next to its line."""
     text = document.text
     top = _line_start(text, _header(document, table).key_start)
     line = f"{_indent(text, top)}# {printable(note)}\n"

@@ -1,4 +1,4 @@
-"""A profile as dotted keys: each value in force, whether the file says it, and where a new one goes."""
+"""A profile as dotted keys with their values."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple
@@ -11,12 +11,12 @@ class KeyValue(NamedTuple):
     """The value of one key."""
 
     value: object
-    """None where nothing is said and nothing is assumed."""
+    """None if the key has neither a value nor a default."""
     source: Literal["file", "default"]
 
 
 def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
-    """Take a profile apart into its keys, those with their defaults among them.
+    """List all keys of a profile, including those with default values.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
 
 
 def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Yield dotted key and value of all that is no table."""
+    """Yield dotted key and value of everything but tables."""
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{prefix}{name}.")
@@ -49,7 +49,7 @@ def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, o
 
 
 def holder(data: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
-    """Find the table that has or may have a dotted key, made where it is missing, and the key's name in it.
+    """Find the table of a dotted key, created if it is missing, and the name of the key in it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From the data of a profile to the model of its kind of bus."""
+"""Model and keys of a profile, by its kind of bus."""
 
 from collections.abc import Iterator, Mapping
 from types import UnionType
@@ -11,28 +11,28 @@ from busplan.buses import kind_named, kind_names
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 _NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
-"""Sections of every profile that no cycle depends on; what a kind of bus adds to them is its cycle's."""
+"""Sections whose common keys no cycle depends on; a cycle may depend on keys that a kind of bus adds to them."""
 
 
 def kind_of(data: Mapping[str, object]) -> str | None:
-    """The kind of bus that a profile's data names; None where it names none that is known."""
+    """The kind of bus in a profile's data; None if it is missing or unknown."""
     section = data.get("bus")
     kind = section.get("kind") if isinstance(section, Mapping) else None
     return kind if isinstance(kind, str) and kind in kind_names() else None
 
 
 def profile_model(kind: str | None) -> type[Profile]:
-    """The model of profiles of a kind of bus; of an unknown one that of what all kinds share."""
+    """Model of the profiles of a kind of bus; for None, the common model of all kinds."""
     return Profile if kind is None else kind_named(kind).profile_model()
 
 
 def is_of_a_kind(path: tuple[int | str, ...]) -> bool:
-    """Whether any kind of bus has a key: then it may be right, once the kind is known."""
+    """Whether any kind of bus has a key; then it may be valid once the kind is known."""
     return any(True for kind in kind_names() for _ in _fields(profile_model(kind), path))
 
 
 def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[FieldInfo]:
-    """What models say of a key: each member of a union that has it; of an element, its array."""
+    """Fields of a key, one for each member of a union that has it; for an element, the field of its array."""
     field = model.model_fields.get(str(path[0]))
     inner = [] if field is None else models_of(field.annotation)
     if field is not None and (len(path) == 1 or not inner):
@@ -51,7 +51,7 @@ def models_of(annotation: Any) -> list[type[BaseModel]]:
 
 
 def number_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Dotted keys of a model whose value is one number, in the order of the schema."""
+    """Dotted keys of a model whose value is a number, in the order of the schema."""
     for name, field in model.model_fields.items():
         inner = models_of(field.annotation)
         for one in inner:
@@ -61,14 +61,14 @@ def number_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 
 def cycle_keys(kind: str) -> tuple[str, ...]:
-    """Keys in numbers that the cycle of a kind of bus may depend on."""
+    """Numeric keys that the cycle of a kind of bus may depend on."""
     others = {key for key in number_keys(Profile) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
     keys = dict.fromkeys(number_keys(profile_model(kind)))
     return tuple(key for key in keys if "." in key and key not in others)
 
 
 def words_of(kind: str, key: str) -> tuple[str, ...]:
-    """Words that a key takes in the place of a number."""
+    """Words that a key allows instead of a number."""
     fields = _fields(profile_model(kind), tuple(key.split(".")))
     return tuple(text for one in fields if _is_number(one.annotation) for text in _texts(one.annotation))
 
@@ -76,7 +76,7 @@ def words_of(kind: str, key: str) -> tuple[str, ...]:
 def _is_number(annotation: Any) -> bool:
     if annotation in (int, float):
         return True
-    # A literal's arguments are values, and a tuple's are elements.
+    # Do not look into literals and tuples.
     return get_origin(annotation) in (Union, UnionType, Annotated) and any(map(_is_number, get_args(annotation)))
 
 

@@ -1,4 +1,4 @@
-"""Measured latencies from CSV text: every problem of the file at its line and column, all at once."""
+"""Read measured latencies from CSV; every problem of the file is reported with its line and column."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ from busplan.profile.document import text_of
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US
 
 MAX_MEASUREMENTS_BYTES: Final = 20_000_000
-"""About a million measurements. More is some other file."""
+"""About a million measurements; a larger file is something else."""
 
 REQUIRED_COLUMNS: Final = ("payload_bytes", "latency_us")
 OPTIONAL_COLUMNS: Final = ("transaction", "request_and_acknowledge_us")
@@ -29,24 +29,24 @@ _TIMES: Final = {
     "ns": "divide by 1000",
 }
 _SIZES: Final = {"": "", "byte": "", "b": "", "bits": "divide by 8", "quadlets": "multiply by 4"}
-"""How to get from a unit that people write to ours; nothing where it may be ours."""
+"""How to convert a unit in a column name to our unit; empty if it may be ours already."""
 
 
 class Measurement(NamedTuple):
     """One measured transaction, or the mean of many."""
 
     line: int
-    """Where it stands, counted from 1."""
+    """Line in the file, from 1."""
     transaction: TransactionKind
     payload_bytes: int
     latency_us: float
     """T_lant, measured."""
     request_and_acknowledge_us: float | None
-    """T1 + T2, where measured."""
+    """T1 + T2, if measured."""
 
 
 class _Cell(NamedTuple):
-    """One value of a line, without space and quotes around it."""
+    """One value of a line, without surrounding spaces and quotes."""
 
     text: str
     column: int
@@ -56,15 +56,15 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     r"""Read measurements from the bytes of a CSV file.
 
     The first line that is neither empty nor a comment (#) is the header. Columns are payload_bytes and latency_us, and
-    where known transaction (read or write; write without it) and request_and_acknowledge_us, the measured T1 + T2; in
-    any order. Commas between values, a point in numbers.
+    optionally transaction (read or write, default write) and request_and_acknowledge_us, the measured T1 + T2, in any
+    order. Values are separated by commas; numbers have a decimal point.
 
     Parameters
     ----------
     content
         The file.
     name
-        What to call it in messages.
+        Name of the file in messages.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     Raises
     ------
     PlacedError
-        Anything that is wrong with the file, with its place.
+        All problems of the file, with their places.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def _decoded(content: bytes, *, name: str) -> str:
 
 
 def _rows(text: str) -> Iterator[tuple[int, list[_Cell]]]:
-    """Lines that hold values, with their number."""
+    """Lines with values, and their numbers."""
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         values = line.partition("#")[0]
         if values.strip():
@@ -144,7 +144,7 @@ def _header_problems(line: int, header: Sequence[_Cell]) -> Iterator[PlacedProbl
         elif cell.text not in _COLUMNS:
             yield problem(cell, f"column {_shown(cell.text)}: {_meant(cell.text)}")
     for name in REQUIRED_COLUMNS:
-        # A column under another name or in another unit has had its say.
+        # A column with another name or unit has its own message already.
         if name not in names and not any(_is_about(other, name) for other in names if other not in _COLUMNS):
             yield problem(header[0], f"column {name} is missing; {_EXPECTED}", "missing-key")
 
@@ -154,7 +154,7 @@ def _is_about(written: str, name: str) -> bool:
 
 
 def _meant(written: str) -> str:
-    """Say what to do about a column that is none of ours."""
+    """Say what to do about an unknown column."""
     match = _QUANTITY.fullmatch(written.strip().lower())
     if match:
         quantity = match["quantity"]
@@ -173,7 +173,7 @@ def _meant(written: str) -> str:
 def _measurement(
     line: int, values: dict[str, _Cell], cells: Sequence[_Cell], columns: Sequence[str]
 ) -> Measurement | list[PlacedProblem]:
-    """Make a measurement of one line, or say all that is wrong with it."""
+    """Parse one line, or list all its problems."""
     if len(cells) != len(columns):
         hint = "; is there a decimal comma? Write 48.7" if len(cells) > len(columns) else ""
         message = f"{len(cells)} value{'s' * (len(cells) > 1)} for {len(columns)} columns{hint}"
@@ -208,5 +208,5 @@ def _measurement(
 
 
 def _shown(text: str) -> str:
-    """Show a value as written, kept short."""
+    """Quote a value, shortened."""
     return repr(text if len(text) <= 40 else f"{text[:40]}...")  # noqa: PLR2004

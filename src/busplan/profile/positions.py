@@ -1,8 +1,7 @@
-"""Where every key and value of a TOML text stands.
+"""Find the place of every key and value of a TOML text.
 
-The standard library's parser gives values without places. This scanner gives places without values, and trusts
-the parser: it reads only text that `tomllib` has accepted, so it needs to find the ends of things and no errors.
-It keeps its own stack, so that depth of nesting costs no recursion.
+The standard library's parser gives values without places; this scanner gives places without values. It reads only text
+that `tomllib` has accepted, so it needs no error handling. It has its own stack instead of recursion.
 """
 
 import re
@@ -15,10 +14,10 @@ KeyPath = tuple[str | int, ...]
 
 
 class Place(NamedTuple):
-    """Where a key stands, and where its value does: offsets into the text, ends excluded.
+    """Place of a key and of its value, as offsets into the text, ends excluded.
 
-    An element of an array has no key; its key span is its value span. A table has no value text of its own when it
-    is spread over the file (`[a]`, `a.b = 1`); its value span is its key span.
+    An element of an array has no key: its key span is its value span. A table without a text of its own (`[a]`,
+    `a.b = 1`) has its key span as value span.
     """
 
     key_start: int
@@ -31,7 +30,7 @@ _SPACE: Final = re.compile(r"[ \t]*")
 _SPACE_AND_LINES: Final = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
 _COMMENT: Final = re.compile(r"#[^\n]*")
 _KEY_PART: Final = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'""")
-# A multi-line string may end in one or two quotes of its own before the closing three. A date may have a space inside.
+# A multi-line string may end in one or two quotes before the closing three. A date may contain a space.
 _SCALAR: Final = re.compile(
     r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
     r"""|[^,\]}#\s](?:[^,\]}#\r\n]*[^,\]}#\s])?""",
@@ -46,9 +45,9 @@ _PLAIN_LINE: Final = re.compile(
     )?+(?P<comment>\#[^\n]*+)?+(?:\n|\Z)""",
     re.VERBOSE,
 )
-"""What most lines of a profile are: a bare key with a scalar or a list of numbers, a header, a comment, nothing.
+"""Most lines of a profile: a bare key with a scalar or a list of numbers, a header, a comment, or an empty line.
 
-They are read at one go, which is several times faster than the scanner.
+One match reads such a line, several times faster than the scanner.
 """
 _ELEMENT: Final = re.compile(r"[^\s,\[\]]+")
 
@@ -78,7 +77,7 @@ class _Scanner:
             self.at = match.end()
 
     def skip_lines(self) -> None:
-        """Skip space, line ends and comments, and remember where the comments begin."""
+        """Skip space, line ends and comments, and record the comments."""
         start = self.at
         self.skip(_SPACE_AND_LINES)
         if self.text.find("#", start, self.at) >= 0:
@@ -101,7 +100,7 @@ class _Scanner:
         return self.places
 
     def plain_line(self, match: re.Match[str], table: KeyPath) -> KeyPath:
-        """Take in a line that was read at one go, and give the path that the next one's keys belong to."""
+        """Record a line that one match has read; return the table of the next line."""
         key, _, array, header, comment = match.groups()
         self.at = match.end()
         if comment is not None:
@@ -117,7 +116,7 @@ class _Scanner:
         return table
 
     def header(self) -> KeyPath:
-        """Read [a.b] or [[a.b]] and give the path its keys belong to."""
+        """Read [a.b] or [[a.b]]; return the table of the next line."""
         is_array = self.text.startswith("[[", self.at)
         self.at += 1 + is_array
         parts = self.dotted_key()
@@ -125,7 +124,7 @@ class _Scanner:
         return self.enter(parts, is_array=is_array)
 
     def enter(self, parts: list[tuple[str, int, int]], *, is_array: bool = False) -> KeyPath:
-        """Take in the name of a header, and give the path its keys belong to."""
+        """Record the name of a header; return the table of the next line."""
         path: KeyPath = ()
         for number, (part, start, end) in enumerate(parts, start=1):
             path = (*path, part)
@@ -136,7 +135,7 @@ class _Scanner:
             if path in self.last_element:
                 path = (*path, self.last_element[path])
         if not is_array:
-            # A table's own header says more than the [a.b] that first implied it.
+            # A table's own header replaces the place of an earlier [a.b] that implied it.
             _, start, end = parts[-1]
             self.places[path] = Place(start, end, start, end)
         return path
@@ -147,7 +146,7 @@ class _Scanner:
         while True:
             self.skip(_SPACE)
             match = _KEY_PART.match(self.text, self.at)
-            if match is None:  # only for text that tomllib has not accepted
+            if match is None:  # impossible for text that tomllib has accepted
                 raise ValueError(f"no key at offset {self.at}")
             parts.append((_key_value(match.group()), match.start(), match.end()))
             self.at = match.end()
@@ -157,7 +156,7 @@ class _Scanner:
             self.at += 1
 
     def key(self, table: KeyPath) -> KeyPath:
-        """Read a key and its equals sign; its value's end is not known yet."""
+        """Read a key and its equals sign; the value follows."""
         path = table
         for part, start, end in self.dotted_key():
             path = (*path, part)
@@ -167,7 +166,7 @@ class _Scanner:
         return path
 
     def close(self, path: KeyPath, start: int) -> None:
-        """Set the value span of a key that has one; an element of an array is its own key."""
+        """Set the value span of a key or of an element of an array."""
         key_start, key_end = self.places.get(path, (start, self.at))[:2]
         self.places[path] = Place(key_start, key_end, start, self.at)
 
@@ -176,7 +175,7 @@ class _Scanner:
         open_containers: list[_Container] = []
         path = self.key(table)
         while True:
-            # One value stands at `at`: open it if it is a container, otherwise step over it.
+            # A value begins at `at`: open a container, or skip a scalar.
             start = self.at
             if self.text[start] in "[{":
                 self.at += 1
@@ -190,7 +189,7 @@ class _Scanner:
             path = following
 
     def next_in(self, open_containers: list[_Container]) -> KeyPath | None:
-        """Close what ends here; the path of the next value, or None after the last."""
+        """Close containers that end here; return the path of the next value, None after the last one."""
         while open_containers:
             container = open_containers[-1]
             self.skip_lines()
@@ -210,7 +209,7 @@ class _Scanner:
 
 
 def _key_value(written: str) -> str:
-    """The key behind its quotes and escapes, as the standard library reads it."""
+    """Key without quotes and escapes, decoded by the standard library."""
     if written[0] in "\"'":
         return next(iter(tomllib.loads(f"{written} = 0")))
     return written
@@ -227,9 +226,9 @@ def scan(text: str) -> tuple[dict[KeyPath, Place], list[int]]:
     Returns
     -------
     places
-        Key paths in the order they first stand, with their places as offsets into `text`.
+        Place by key path, in order of first appearance.
     comments
-        Offsets of the hashes that begin a comment.
+        Offset of the hash of every comment.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""From pydantic's validation errors to findings in the profile's own words."""
+"""Translate pydantic's validation errors into problems of profile keys."""
 
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -16,7 +16,7 @@ from busplan.profile.positions import KeyPath
 from busplan.profile.write import value_text
 
 _TAG: Final = "kind"
-"""The key that chooses the member of every union of tables."""
+"""The key that selects the member of a union of tables."""
 _WRONG_TYPE: Final = {
     "int_type": "a whole number",
     "float_type": "a number",
@@ -41,13 +41,13 @@ _OUT_OF_RANGE: Final = {
 
 
 class KeyFinding(NamedTuple):
-    """One problem: where in the data, and what."""
+    """One problem of a key."""
 
     path: KeyPath
     message: str
     kind: ProblemKind
     shows_value: bool = True
-    """Whether the value as written belongs into the message."""
+    """If True, the message shows the value."""
 
     @property
     def key(self) -> str:
@@ -69,9 +69,9 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
     Parameters
     ----------
     error
-        What pydantic raised for `data`.
+        Error of pydantic for `data`.
     data
-        The data that was checked.
+        The validated data.
 
     Yields
     ------
@@ -103,14 +103,14 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
 
 
 def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
-    """The kind of bus, where it is a text and none that is known: it says which other keys there are."""
+    """Problem of a kind of bus that is unknown: the common model cannot find it."""
     bus = data.get("bus")
     if kind_of(data) is None and isinstance(bus, dict) and isinstance(bus.get("kind"), str):
         yield KeyFinding(("bus", "kind"), f"expected {' or '.join(map(value_text, kind_names()))}", "out-of-range")
 
 
 def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyPath, type[BaseModel]]:
-    """The keys of a location of pydantic's, which has the tag of each union among them; and the last one's section."""
+    """Key path of a pydantic location, without the tags of unions in it, and the section of its last key."""
     path: list[int | str] = []
     members, section = [model], model
     for part in location:
@@ -126,12 +126,12 @@ def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyP
 
 
 def _tag(model: type[BaseModel]) -> tuple[Any, ...]:
-    """What the key of a union's member says that it is this one."""
+    """Values of the key `kind` that select a member of a union."""
     return get_args(model.model_fields[_TAG].annotation) if _TAG in model.model_fields else ()
 
 
 def _tags(path: KeyPath, section: type[BaseModel]) -> list[str]:
-    """The words that choose the member of a union."""
+    """All values of the key `kind` of a union, as TOML."""
     return [value_text(tag) for one in models_of(section.model_fields[str(path[-1])].annotation) for tag in _tag(one)]
 
 
@@ -140,7 +140,7 @@ def _parsed(key: str) -> KeyPath:
 
 
 def _expected(details: ErrorDetails) -> str:
-    """Say what would be right for an error of one value."""
+    """Message for an error of one value."""
     kind, context = details["type"], details.get("ctx", {})
     if kind == "float_type" and type(details["input"]) is int:
         return "is a number too large for any quantity"
@@ -170,16 +170,16 @@ def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
 
 
 def refusal(error: ValidationError | None, data: dict[str, Any], document: Document) -> PlacedError:
-    """Make the error for a document: every problem at its place, in the order of places.
+    """Make the error for a document, with all problems in the order of their places.
 
     Parameters
     ----------
     error
-        What pydantic raised for `data`; None where all is well but for the kind of bus.
+        Error of pydantic for `data`; None if only the kind of bus is wrong.
     data
-        The data that was checked.
+        The validated data.
     document
-        Where it stands.
+        The document of the data.
     """
     found = _unknown_kind(data) if error is None else findings(error, data)
     placed = sorted(((document.nearest(one.path), one) for one in found), key=lambda pair: pair[0])
@@ -195,7 +195,7 @@ def _problem(document: Document, offset: int, found: KeyFinding) -> PlacedProble
 
 
 def _written(document: Document, found: KeyFinding) -> str:
-    """The value as it is written; a table that is spread over the file has none."""
+    """Source text of the value; empty for a table without a text of its own."""
     place = document.places.get(found.path)
     if place is None or (place.value_start == place.key_start and isinstance(found.path[-1], str)):
         return ""
@@ -210,7 +210,7 @@ def _shortened(written: str, limit: int = 40) -> str:
 def refused_changes(
     error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:
-    """Make the error for changes of a profile: each problem with the option or key that asked for it."""
+    """Make the error for changes of a profile; each problem names its option or key."""
     messages = []
     for found in _unknown_kind(data) if error is None else findings(error, data):
         value = f" {changes[found.key]}" if found.key in changes else ""

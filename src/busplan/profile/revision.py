@@ -1,4 +1,4 @@
-"""Profiles as they stood in a revision of the git checkout they lie in: REV:path."""
+"""Read a profile from a git revision: REV:path."""
 
 import os
 import re
@@ -13,35 +13,35 @@ from busplan.profile.shipped import load, locate
 from busplan.profile.toml import MAX_FILE_BYTES, LoadedProfile, decode, too_large, validate
 
 TIMEOUT_S: Final = 10.0
-"""What git may take for one answer; it reads a page of text from a disk."""
+"""Longest wait for git, which only reads a short file."""
 
 _FORM: Final = re.compile(r"(?P<revision>(?!-)(?:\{[^}]*\}|[^:{])+):(?P<path>.+)", re.DOTALL)
-"""A colon in braces belongs to the revision: main@{10:00}:line.toml. What begins with a dash would be an option."""
+"""A colon in braces belongs to the revision: main@{10:00}:line.toml. A dash at the start would be an option."""
 _BLOB: Final = re.compile(r"(?P<id>[0-9a-f]{40,64}) blob (?P<size>[0-9]+)\n")
-"""How git answers for a file that is there."""
+"""Git's answer for an existing file."""
 _NEVER: Final = ("\0", "\n", "\r")
-"""What git takes for the end of a name."""
+"""Characters that end a name for git."""
 _KEPT_VARIABLES: Final = ("GIT_CONFIG", "GIT_EXEC_PATH", "GIT_CEILING_DIRECTORIES", "GIT_DISCOVERY_", "GIT_NO_REPLACE")
-"""Of git's variables, those that say how to work. The others, which git sets for its hooks, name a repository."""
+"""Prefixes of git's variables that are kept; others, which git sets for hooks, would select another repository."""
 _AT_HOME: Final = ("-c", "protocol.allow=never", "-c", "core.fsmonitor=false")
-"""Reading a page of text from a disk asks no other machine, and runs no program that a repository names."""
+"""No network access, and no program configured in the repository."""
 _ALONE: Final = {"LC_ALL": "C", "GIT_TERMINAL_PROMPT": "0", "GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": ""}
-"""Likewise. A repository may allow itself a protocol, `protocol.ext.allow`; the variable's empty list comes first."""
+"""No network access, even if the configuration of the repository allows a protocol."""
 
 
 def load_revision(argument: str) -> LoadedProfile:
-    """Read and check the profile that an argument means: as `load`, and REV:path beside it.
+    """Read and check a profile as `load` does, or from REV:path.
 
     Parameters
     ----------
     argument
-        Shipped name, path, "-" for standard input; or a commit, branch or tag, a colon and a path, from the current
-        folder, in the git checkout that the path lies in. What is there under exactly that name comes first.
+        Shipped name, path, "-" for standard input; or a commit, branch or tag, a colon and a path, relative to the
+        current folder, in the git checkout of the path. An existing file of exactly that name comes first.
 
     Raises
     ------
     BusplanError
-        As `load`; or git does not read the file, with what git says.
+        As `load`; or git cannot read the file, with git's message.
     """
     form = _FORM.fullmatch(argument)
     if form is None or any(mark in argument for mark in _NEVER) or _is_there(argument):
@@ -59,8 +59,8 @@ def _is_there(argument: str) -> bool:
 
 
 def _content(argument: str, revision: str, path: Path) -> bytes:
-    """Bytes of the file, links followed as a checkout would."""
-    # The repository is that of the path's folder, or of the nearest one above it that is still there.
+    """Content of the file in the revision, links followed."""
+    # The folder of the path may no longer exist: use the nearest existing one above it.
     folder = path.parent
     try:
         while not folder.is_dir():
@@ -71,7 +71,7 @@ def _content(argument: str, revision: str, path: Path) -> bytes:
     check = ("cat-file", "--batch-check", "--follow-symlinks")
     file = _BLOB.fullmatch(_git(argument, folder, *check, names=name).decode(errors="replace"))
     if file is None:
-        # Asked for the object itself, git says why it reads none; a link it reads as a text.
+        # Reading the object itself gives git's error message; for a link it succeeds.
         _git(argument, folder, "cat-file", "blob", name)
         raise BusplanError(f"{argument}: leads to no file of revision {revision}; name the file itself, not a link")
     if int(file["size"]) > MAX_FILE_BYTES:
@@ -80,7 +80,7 @@ def _content(argument: str, revision: str, path: Path) -> bytes:
 
 
 def _git(argument: str, folder: Path, *command: str, names: str = "") -> bytes:
-    """Run git in a folder and give what it writes."""
+    """Run git in a folder and return its output."""
     git = shutil.which("git")
     if git is None:
         raise BusplanError(f"{argument}: no such file; to read REV:path needs git, and there is no git on PATH")
@@ -100,7 +100,7 @@ def _git(argument: str, folder: Path, *command: str, names: str = "") -> bytes:
         raise BusplanError(f"{argument}: git gave no answer within {TIMEOUT_S:g} s") from None
     except OSError as error:
         raise BusplanError(f"{argument}: git cannot be run: {error.strerror}") from None
-    # What git warns of is another revision than the one that was meant: a name of two things, a log that is too short.
+    # A warning means that git may have chosen another revision: an ambiguous name, or a reflog that is too short.
     if done.returncode or done.stderr:
         said = printable(" ".join(done.stderr.decode(errors="backslashreplace").split()))
         raise BusplanError(f"{argument}: no file of that name; of REV:path git says: {said or 'nothing'}")

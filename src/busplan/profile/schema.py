@@ -11,12 +11,12 @@ _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 
 
 def profile_schema() -> dict[str, Any]:
-    """Give the JSON Schema of a profile, draft 2020-12, as pydantic derives it.
+    """Return the JSON Schema of a profile, draft 2020-12, made by pydantic.
 
     Returns
     -------
     dict
-        The schema, its dialect named first. Where there are several kinds of bus, `bus.kind` chooses among theirs.
+        The schema. With several kinds of bus, `bus.kind` selects one.
 
     Examples
     --------
@@ -28,7 +28,7 @@ def profile_schema() -> dict[str, Any]:
         (model,) = kinds.values()
         return {"$schema": _DIALECT, **model.model_json_schema(mode="validation")}
     references, definitions = models_json_schema([(model, "validation") for model in kinds.values()])
-    # A condition names the key that is wrong; a union of all kinds would say that none of them fits.
+    # With conditions, validators name the wrong key; with a union, they would say that no member matches.
     chosen = [
         {"if": _has_kind({"const": kind}), "then": references[model, "validation"]} for kind, model in kinds.items()
     ]

@@ -1,4 +1,4 @@
-"""The profiles that come with busplan."""
+"""Find and load profiles, shipped ones and files."""
 
 import os
 from functools import cache
@@ -23,15 +23,15 @@ def shipped_names() -> list[str]:
 
 
 def locate(argument: str) -> tuple[Path, str]:
-    """Find the file that a command's PROFILE argument means.
+    """Find the file of a PROFILE argument.
 
-    A shipped name means the shipped profile, whatever lies in the working directory, so that the answer does not
-    depend on where it is asked. A path is everything else: ./paper-4ms, paper-4ms.toml, or "-" for standard input.
+    A shipped name always means the shipped profile, so that the answer does not depend on the working directory.
+    Everything else is a path: ./paper-4ms, paper-4ms.toml, or "-" for standard input.
 
     Returns
     -------
     tuple
-        Path, and what to call it in messages.
+        Path, and name in messages.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def locate(argument: str) -> tuple[Path, str]:
 
 
 def _path(argument: str) -> Path:
-    """Path of an argument; ./- is a file, which must not become the "-" of standard input."""
+    """Path of an argument; the file ./- becomes absolute, because "-" means standard input."""
     path = Path(argument)
     return path.absolute() if str(path) == "-" else path
 
@@ -62,15 +62,15 @@ class MeasurementsFile(NamedTuple):
 
     path: Path
     name: str
-    """What to call it in messages."""
+    """Name in messages."""
     shipped: bool
-    """Whether it is an example of ours, with published figures."""
+    """Whether it is the shipped example, with published figures."""
 
 
 def locate_measurements(argument: str) -> MeasurementsFile:
-    """Find the file that a command's MEASUREMENTS argument means.
+    """Find the file of a MEASUREMENTS argument.
 
-    A file that is there comes first: measurements of one's own must never be taken for the shipped example.
+    An existing file comes first, so that the user's measurements are never mistaken for the shipped example.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def locate_measurements(argument: str) -> MeasurementsFile:
 
 
 def load(argument: str) -> LoadedProfile:
-    """Read and check the profile that a command's PROFILE argument means.
+    """Read and check the profile of a PROFILE argument.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def load(argument: str) -> LoadedProfile:
     Raises
     ------
     BusplanError
-        Not there, not readable, no TOML or no profile; every problem with its place.
+        The file does not exist, cannot be read or is not a valid profile; every problem has its place.
     """
     path, name = locate(argument)
     document = decode(read_bytes(path, name=name), name=name)

@@ -1,4 +1,4 @@
-"""A new profile from a shipped one, comments and layout kept."""
+"""A new profile from a shipped one, with its comments and layout."""
 
 import re
 from typing import Final
@@ -19,25 +19,25 @@ def starter_text(source: str, *, name: str) -> str:
     source
         Name of the shipped profile.
     name
-        Name of the new one.
+        Name of the new profile.
 
     Raises
     ------
     BusplanError
-        No such shipped profile, or a name that a profile cannot have.
+        No such shipped profile, or an invalid name.
     """
     if source not in shipped_names():
         raise BusplanError(f"--from {source}: no shipped profile; shipped are {', '.join(shipped_names())}")
     path, _ = locate(source)
     document = decode(read_bytes(path, name=source), name=source)
     place = document.places["name",]
-    # Nobody has looked at the new machine yet: what the gate may not say of the shipped one, it says of this one.
+    # Remove suppressions: they were decided for the shipped profile, not for the new machine.
     before, after = document.text[: place.value_start], document.text[place.value_end :]
     text = before + value_text(name) + _SUPPRESSION.sub("", after)
-    # The line that names the schema is right in the shipped folder alone.
+    # The path to the schema is valid only in the shipped folder.
     text = text.removeprefix("#:schema ./busplan.schema.json\n")
     try:
         validate(decode(text.encode(), name=source))
-    except (BusplanError, UnicodeEncodeError):  # the latter: a file name that is no UTF-8
+    except (BusplanError, UnicodeEncodeError):  # UnicodeEncodeError: a file name that is not UTF-8
         raise BusplanError(f"{name!r}: no name for a profile; expected 1 to 100 printable characters") from None
     return text

@@ -1,7 +1,7 @@
-"""Profiles from TOML text: read, check, and say where every problem stands.
+"""Read and validate profiles; every problem is reported with its place.
 
-Reading has three steps, each with its own kind of error: bytes to text, text to TOML data, data to `Profile`.
-Whatever fails, the message names file, line and column, the value, and what would be right.
+Reading has three steps, each with its own kind of error: bytes to text, text to TOML data, data to `Profile`. A message
+names file, line, column and value, and says what would be right.
 """
 
 import sys
@@ -17,62 +17,62 @@ from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
 
 MAX_FILE_BYTES: Final = 100_000
-"""A profile is a page of text. More is some other file, and reading it whole would only delay saying so."""
+"""A profile is a page of text; a larger file is something else."""
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
-"""Where the pipes are that a shell has opened: <(command) is /dev/fd/N, and has a writer."""
+"""Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
 
 
 class LoadedProfile(NamedTuple):
-    """A profile together with the text it was read from."""
+    """A profile and its text."""
 
     profile: Profile
     document: Document
 
 
 def decode(content: bytes, *, name: str) -> Document:
-    """Turn a file's bytes into text.
+    """Decode a file.
 
     Parameters
     ----------
     content
-        The bytes; a byte order mark is stepped over.
+        The bytes; a byte order mark is skipped.
     name
-        What to call the file in messages.
+        Name of the file in messages.
 
     Raises
     ------
     PlacedError
-        Too large, or not UTF-8; the latter with its place.
+        Too large, or not UTF-8.
     """
     if len(content) > MAX_FILE_BYTES:
         raise too_large(name)
     text = text_of(content, name=name, wanted="a profile is TOML in UTF-8")
-    # TOML's line ends are LF and CRLF; one kind inside keeps offsets the parser's and ours alike.
+    # With LF only, offsets of the parser and the scanner agree.
     return Document(name, text.replace("\r\n", "\n"))
 
 
 def too_large(name: str) -> PlacedError:
-    """Make the error for a file that is longer than a profile may be."""
+    """Make the error for a file that is too large for a profile."""
     message = f"the file is larger than {MAX_FILE_BYTES:,} bytes; a profile is a page of TOML"
     return PlacedError(name, (PlacedProblem(1, 1, "syntax", message),))
 
 
 def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
-    """Read a file, or standard input for the path "-", no further than it may be long and one byte more.
+    """Read a file, or standard input for the path "-", up to one byte more than the limit.
 
     Parameters
     ----------
     path
         The file, or "-".
     name
-        What to call it in messages.
+        Name of the file in messages.
     limit
-        How long it may be [bytes]; without it, as a profile.
+        Largest size [bytes]; by default that of a profile.
 
     Raises
     ------
     BusplanError
-        It is not there, is a directory, or cannot be read.
+        It does not exist, is a directory, or cannot be read.
     """
     try:
         if str(path) == "-":
@@ -80,7 +80,7 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
                 raise BusplanError(f"{name}: standard input is closed")
             return sys.stdin.buffer.read(limit + 1)
         if path.is_fifo() and not str(path).startswith(_OPENED):
-            # Opening it would wait for a writer, for ever.
+            # Opening it would wait for a writer forever.
             raise BusplanError(f"{name}: is a named pipe; give a regular file")
         with path.open("rb") as file:
             return file.read(limit + 1)
@@ -94,12 +94,12 @@ def read_bytes(path: Path, *, name: str, limit: int = MAX_FILE_BYTES) -> bytes:
 
 
 def validate(document: Document) -> Profile:
-    """Check a document against the profile's schema.
+    """Validate a document against the profile's schema.
 
     Raises
     ------
     PlacedError
-        No TOML, or no profile; one message for every problem of the file, in the order of their places.
+        Not TOML or not a profile; one message for each problem, in the order of their places.
     """
     data = document.data()
     kind, problem = kind_of(data), None
@@ -109,22 +109,22 @@ def validate(document: Document) -> Profile:
         problem = error
     if kind is not None and problem is None:
         return found
-    from busplan.profile.problems import refusal  # only a faulty profile pays for its errors
+    from busplan.profile.problems import refusal  # loaded only for an invalid profile
 
     raise refusal(problem, data, document)
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
-    """Make a profile with other values, checked like one that was read; what it leaves out it still leaves out.
+    """Return a profile with new values, validated; keys that it does not set stay unset.
 
     Parameters
     ----------
     profile
-        Where to start.
+        The profile.
     changes
         New value by dotted key: {"bus.nodes": 3}.
     origin
-        What to call a key in messages, where not by itself: {"bus.nodes": "--nodes"}.
+        Name of a key in messages, if it is not the key: {"bus.nodes": "--nodes"}.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""TOML text: of a value, and of a whole profile for a file that is not there yet."""
+"""Write values and whole profiles as TOML."""
 
 import json
 import math
@@ -9,14 +9,14 @@ from busplan.sections.profile import Profile
 
 
 def value_text(value: object) -> str:
-    r"""Write a value as TOML, in one line that commands no terminal.
+    r"""Write a value as TOML, in one line without control characters.
 
     Raises
     ------
     TypeError
-        No boolean, number, text or sequence of them.
+        Not a bool, a number, a str or a sequence of them.
     ValueError
-        A number that is not finite.
+        A number is not finite.
 
     Examples
     --------
@@ -32,7 +32,7 @@ def value_text(value: object) -> str:
             raise ValueError(f"{value} is not finite")
         return repr(float(value))
     if isinstance(value, str):
-        # JSON's escapes are TOML's, but for what is not printable.
+        # TOML has JSON's escapes; for other characters that are not printable, it needs \U.
         return printable(json.dumps(value, ensure_ascii=False), write=lambda one: f"\\U{ord(one):08x}")
     if isinstance(value, Sequence):
         return f"[{', '.join(map(value_text, value))}]"
@@ -40,7 +40,7 @@ def value_text(value: object) -> str:
 
 
 def profile_text(profile: Profile) -> str:
-    """Write a profile: what it says, and nothing that it leaves to its default.
+    """Write a profile as TOML, without keys that it does not set.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def profile_text(profile: Profile) -> str:
     Returns
     -------
     str
-        TOML that reads to the same profile. Comments are not part of a profile: to keep those of a file, edit it.
+        TOML that parses to the same profile, without comments; `profile.edit` keeps the comments of a file.
 
     Examples
     --------
@@ -58,8 +58,8 @@ def profile_text(profile: Profile) -> str:
     >>> profile_text(load("paper-4ms").profile).splitlines()[0]
     'schema_version = 1'
     """
-    import tomli_w  # noqa: PLC0415 - only who writes a whole profile pays for it
+    import tomli_w  # noqa: PLC0415 - needed only here
 
-    # TOML has no null: a key that is None is a key that is left out.
+    # TOML has no null: leave out keys that are None.
     data = profile.model_dump(exclude_unset=True, exclude_none=True)
     return tomli_w.dumps(data, multiline_strings=True)

@@ -1,1 +1,1 @@
-"""The gate: what is wrong with a profile, one small function a rule, each with a stable code."""
+"""The gate: rules that check a profile, each a small function with a stable code."""

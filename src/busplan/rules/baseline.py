@@ -1,4 +1,4 @@
-"""The baseline: what each profile could carry when it was recorded, keyed by path and figure, never by line."""
+"""The baseline: recorded axes and margins of each profile, by path and figure."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -12,19 +12,19 @@ from busplan.rules.finding import Subject
 
 _SCHEMA: Final = 1
 MAX_BASELINE_BYTES: Final = 32_000_000
-"""Two hundred bytes a profile make records of any repository; more is some other file."""
+"""At 200 bytes for each profile, enough for any repository; a larger file is something else."""
 _ROUNDING: Final = 1e-9
-"""Relative allowance for a figure that was written and read again, or computed on another machine."""
+"""Relative tolerance for rounding by JSON or by another machine."""
 
 _CURE: Final = "remove it, and record one with --update-baseline"
-"""A file that is no baseline may be anything: it is never overwritten."""
+"""A file that is not a baseline is never overwritten."""
 
 Recorded = Mapping[str, float]
 """Figures of one profile by name: "paper.max_axes"."""
 
 
 def figures_of(subject: Subject) -> dict[str, float]:
-    """The figures that no profile may lose, by name."""
+    """Figures of a profile to record, by name."""
     return {
         f"{one.timing_model}.{name}": getattr(one, name)
         for one in sorted((subject.deciding, *subject.others), key=lambda one: one.timing_model)
@@ -33,7 +33,7 @@ def figures_of(subject: Subject) -> dict[str, float]:
 
 
 def regressions(now: Recorded, before: Recorded) -> Iterator[RuleProblem]:
-    """What a profile has lost against its record."""
+    """Figures that have become smaller than recorded."""
     for name, value in now.items():
         if name not in before:
             continue
@@ -53,7 +53,7 @@ def read_baseline(text: str, *, name: str) -> dict[str, dict[str, float]]:
     Raises
     ------
     BusplanError
-        It is no baseline of this version.
+        It is not a baseline of this version.
     """
     try:
         document = json.loads(text)
@@ -75,7 +75,7 @@ def _are_figures(value: object) -> bool:
 
 
 def write_baseline(recorded: Mapping[str, Recorded]) -> str:
-    """Write a baseline, profiles sorted by path so that a change shows as the lines that changed."""
+    """Write a baseline, sorted by path so that diffs are small."""
     document = {
         "schema": _SCHEMA,
         "command": "baseline",

@@ -1,4 +1,4 @@
-"""Rules that hold for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
+"""Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
 
 from collections.abc import Iterator
 from math import ceil
@@ -37,7 +37,7 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The bus carries fewer further nodes than [limits] asks for."""
+    """The bus carries fewer further nodes than [limits] requires."""
     limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
     spare = (one.safe_nodes or 0) - one.nodes
     if limit is not None and spare < limit:
@@ -45,7 +45,7 @@ def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The bus carries fewer further axes than [limits] asks for."""
+    """The bus carries fewer further axes than [limits] requires."""
     limit, one = subject.profile.limits.min_spare_axes, subject.deciding
     spare = one.safe_axes - one.axes
     if limit is not None and spare < limit:
@@ -58,7 +58,7 @@ def _spare(spare: int, limit: int) -> str:
 
 
 def _room(subject: RuleSubject, nodes: int) -> str:
-    """What limits the nodes, and how that many would have room."""
+    """What limits the nodes, and how to make room for a number of them."""
     one = subject.deciding
     limit = bus_of(subject.profile).limit(one.safe_limited_by)
     cure = subject.room(nodes) if limit is None or limit.is_safety else limit.way_out
@@ -66,7 +66,7 @@ def _room(subject: RuleSubject, nodes: int) -> str:
 
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """An execution time that nobody has measured."""
+    """The execution time is an assumption."""
     if subject.profile.node.execution.grade == "assumed":
         yield RuleProblem(
             "node.execution.grade",
@@ -102,7 +102,7 @@ RULES: Final = (
         "error",
         "the slice is fuller than limits.max_utilisation",
         "[limits] max_utilisation keeps a share of the slice free, for retries, growth and what the model does "
-        "not know.",
+        "not cover.",
         over_utilisation,
     ),
     Rule(

@@ -1,6 +1,6 @@
-"""Rules of the circle test: does the loop have its margin, does the circle hold its tolerances?
+"""Rules of the circle test: does the loop have its margins, does the circle hold its tolerances?
 
-They share one run of the test, made only for profiles that say something of servo, circle or tolerance.
+They share one run of the test, only for profiles with a section for it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,9 +15,9 @@ _NAMED: Final = ("circle", "servo", "delivery", "cycle")
 
 
 def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
-    """Run the circle test of a profile: the code of each rule that is broken, with its problem.
+    """Run the circle test of a profile, and yield the code of each broken rule with its problem.
 
-    A cycle that does not fit has its own rule, and no circle.
+    A cycle that does not fit breaks another rule, and has no circle.
     """
     from busplan.analysis.circle.failures import CONTOUR_MEASURES
     from busplan.analysis.circle.roundness import circle_test, to_attack
@@ -36,7 +36,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     )
     for failure in result.failures:
         stability = failure.name in ("stability", "min_phase_margin_deg", "min_gain_margin_db")
-        # Margins have default limits: what is not said in the file cannot be where its finding stands.
+        # A finding needs a key in the file: a default limit has none.
         name = "circular_deviation_mm" if failure.name == "constant_speed_deg" else failure.name
         said = name in subject.profile.tolerance.model_fields_set
         key = f"tolerance.{name}" if said else "servo.position_gain_per_s"
@@ -47,7 +47,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
 
 
 def _key_of(name: str, profile: Profile) -> str:
-    """Key of a parameter of the servo core, where the file says it."""
+    """Key of a servo parameter in the file, or the nearest section."""
     for section in _NAMED:
         if name in getattr(profile, section).model_fields_set:
             return f"{section}.{name}"
@@ -55,7 +55,7 @@ def _key_of(name: str, profile: Profile) -> str:
 
 
 def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
-    """Codes of the rules that have an answer: none without a test, one alone where the test could not be run."""
+    """Codes of the rules that were checked: none without a test, only BP203 if the test cannot be run."""
     if subject.profile.asks_for_circle and not subject.deciding.fits:
         return set()
     impossible = {code for code, _ in problems if code == "BP203"}
@@ -69,7 +69,7 @@ RULES: Final = (
         "error",
         "the circle misses a tolerance",
         "The circle test of this profile, at its own period, does not hold a contour tolerance of [tolerance]. "
-        "`busplan circle-test PROFILE --contributions` ranks what makes it so.",
+        "`busplan circle-test PROFILE --contributions` ranks the error sources.",
     ),
     Rule(
         "BP202",
@@ -77,8 +77,8 @@ RULES: Final = (
         "error",
         "the position loop lacks its stability margin",
         "The discrete position loop, with everything that delays it, is unstable or has less phase or gain margin "
-        "than [tolerance] asks for. Delay inside a loop makes its circle better while it eats the margin, so no "
-        "circle passes without one.",
+        "than [tolerance] requires. Delay in a loop can make its circle rounder while it reduces the margins, so a "
+        "circle without margins fails.",
     ),
     Rule(
         "BP203",

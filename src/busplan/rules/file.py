@@ -1,4 +1,4 @@
-"""Rules of the file's shape. They have no check of their own: reading the profile finds what they name."""
+"""Rules of the file format. They have no check of their own: reading the profile finds the problems."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -20,7 +20,7 @@ BY_KIND: Final[Mapping[ProblemKind, Rule]] = {
         "unknown-key",
         "error",
         "the profile has no such key",
-        "A key that busplan does not know is most often a slip of the keyboard, and the value it should have set "
+        "A key that busplan does not know is most often a typing error, and the value it should have set "
         "is then missing or a default. `busplan schema` lists all keys for editors that complete and check while "
         "you type.",
     ),

@@ -1,4 +1,4 @@
-"""What a rule says, and what it says it of."""
+"""Findings of rules, and the profile that rules check."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -25,7 +25,7 @@ class Finding(NamedTuple):
 
 
 class Subject:
-    """One profile with what the rules ask of it, computed once and only when asked."""
+    """A profile with the figures that rules need, each computed once, at first use."""
 
     def __init__(self, loaded: LoadedProfile) -> None:
         self.profile = loaded.profile
@@ -56,7 +56,7 @@ class Subject:
         return tuple(model for model in model_names(self.profile) if model != deciding)
 
     def after(self, changes: Mapping[str, object]) -> CapacityFigures:
-        """Capacity under the timing model that decides, with other values by dotted key."""
+        """Capacity under the timing model that decides, with new values by dotted key."""
         return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
     def cure(self) -> str:

@@ -1,4 +1,4 @@
-"""The gate itself: one document in, its findings out."""
+"""Check documents against all rules."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, NamedTuple
@@ -19,23 +19,23 @@ Status = Literal["ok", "findings", "error"]
 
 
 class FileResult(NamedTuple):
-    """What the gate says of one file."""
+    """Result of one file."""
 
     path: str
     profile: str | None
-    """The profile's name, where it could be read."""
+    """Name of the profile; None if it cannot be read."""
     findings: tuple[Finding, ...]
     """In the order of their places."""
     figures: dict[str, float]
-    """What a baseline records; empty where the profile could not be read, or nobody asked."""
+    """Figures for a baseline; empty if the profile cannot be read or they were not requested."""
     source: tuple[str, ...] = ()
-    """The lines that findings stand on, in their order, for reports that show them."""
+    """Source line of each finding."""
     failure: str | None = None
-    """Why the file could not be checked at all."""
+    """Why the file could not be checked; None if it was checked."""
 
     @property
     def status(self) -> Status:
-        """Whether the file is fine, has findings, or could not be checked."""
+        """Whether the file has no findings, has findings, or could not be checked."""
         if self.failure is not None:
             return "error"
         return "findings" if self.findings else "ok"
@@ -53,11 +53,11 @@ def check_source(
     Parameters
     ----------
     source
-        The file; one that cannot be read or followed is a result too.
+        The file; if it cannot be read, the result has a failure.
     with_circle
         Whether to run the circle test of profiles that ask for one.
     recorded
-        What no profile may lose, by the name of its file; nothing without it.
+        Baseline figures by file name; None for no baseline.
     record
         Whether to give the figures that a baseline records.
     """
@@ -83,23 +83,23 @@ def check_document(
     Parameters
     ----------
     document
-        The text, under the name that findings call it by.
+        The text and its name.
     with_circle
         Whether to run the circle test of profiles that ask for one.
     baseline
-        What the profile may not lose; nothing without it.
+        Baseline figures of the profile; None for no baseline.
     record
         Whether to give the figures that a baseline records.
 
     Returns
     -------
     FileResult
-        Findings in the order of their places, suppressed ones left out.
+        Findings in the order of their places, without suppressed ones.
     """
     try:
         profile = validate(document)
     except PlacedError as error:
-        # Not to be suppressed: nothing else of the file has been checked.
+        # These cannot be suppressed: nothing else of the file was checked.
         return _result(document, None, list(_of_file(error)), {})
     subject = Subject(LoadedProfile(profile, document))
     own = cycle_rules(profile.bus.kind)
@@ -125,7 +125,7 @@ def _findings(subject: Subject, rules: Iterable[Rule]) -> Iterator[Finding]:
 
 
 def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
-    """Make the result for a file that is no text."""
+    """Make the result for a file that is not text."""
     lines = content.decode("utf-8-sig", errors="replace").split("\n")
     found = tuple(_of_file(error))
     return FileResult(name, None, found, {}, tuple(lines[one.line - 1] for one in found))
@@ -140,7 +140,7 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
 
 
 def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
-    """Put a problem at the line of its key, or of the table that should have it."""
+    """Make a finding at the line of the problem's key, or of the table that should have it."""
     document = subject.document
     line, column = document.lines.line_and_column(document.nearest(tuple(problem.key.split("."))))
     message = f"{problem.key}: {problem.message}"

@@ -1,4 +1,4 @@
-"""All rules of the gate by code. Codes are stable: one that is dropped is never used again."""
+"""All rules of the gate by code. Codes are stable: a dropped code is never used again."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -40,11 +40,11 @@ SUPPRESSION_WITHOUT_EFFECT: Final = Rule(
 NEVER_SUPPRESSED: Final = frozenset(
     rule.code for rule in (*BY_KIND.values(), SUPPRESSION_WITHOUT_REASON, SUPPRESSION_WITHOUT_EFFECT)
 )
-"""Codes of what must be mended: a file that cannot be read further, and suppressions themselves."""
+"""Rules that cannot be suppressed: those of the file format and of suppressions."""
 
 
 def all_rules() -> Mapping[str, Rule]:
-    """Every rule by its code, those of every kind of bus among them, in the order of the codes."""
+    """Every rule by code, including those of every kind of bus, sorted by code."""
     return _by_code(tuple(map(kind_named, kind_names())))
 
 
@@ -57,5 +57,5 @@ def _by_code(kinds: tuple[Bus, ...]) -> Mapping[str, Rule]:
 
 
 def cycle_rules(kind: str) -> tuple[Rule, ...]:
-    """Rules that look at a profile of a kind of bus, in the order of their codes."""
+    """Rules for profiles of a kind of bus, sorted by code."""
     return tuple(sorted((*bus.RULES, *kind_named(kind).rules), key=lambda rule: rule.code))

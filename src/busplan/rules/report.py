@@ -1,4 +1,4 @@
-"""All findings of one call of the gate, and what they add up to."""
+"""All findings of one run of the gate, and their summary."""
 
 from functools import cached_property
 from hashlib import sha256
@@ -10,7 +10,7 @@ from busplan.rules.gate import FileResult
 
 
 class Summary(NamedTuple):
-    """What a call of the gate adds up to."""
+    """Counts of one run of the gate."""
 
     files: int
     errors: int
@@ -18,7 +18,7 @@ class Summary(NamedTuple):
 
 
 class Located(NamedTuple):
-    """One finding with its file and a fingerprint that lines and other findings do not change."""
+    """A finding with its file, and a fingerprint that does not depend on lines and on other rules' findings."""
 
     path: str
     finding: Finding
@@ -27,7 +27,7 @@ class Located(NamedTuple):
 
 
 class CheckReport:
-    """Answer of one call of the gate."""
+    """Result of one run of the gate."""
 
     def __init__(self, files: tuple[FileResult, ...]) -> None:
         self.files = files
@@ -49,7 +49,7 @@ class CheckReport:
 
     @cached_property
     def located(self) -> tuple[Located, ...]:
-        """All findings in the order of files and places."""
+        """All findings by file and place."""
         found = []
         for file in self.files:
             seen: dict[tuple[str, str], int] = {}

@@ -15,10 +15,10 @@ _COMMENT: Final = re.compile(r"#\s*busplan:\s*ignore\s*\[(?P<codes>[^\]\n]*)\](?
 
 
 class Suppression(NamedTuple):
-    """One comment, and the line that it speaks of."""
+    """One comment, and the line that it applies to."""
 
     codes: tuple[str, ...]
-    """Empty where the comment is addressed to busplan and says nothing that it understands."""
+    """Rule codes; empty if the comment is not understood."""
     reason: str
     line: int
     column: int
@@ -26,7 +26,7 @@ class Suppression(NamedTuple):
 
 
 def suppressions(document: Document) -> Iterator[Suppression]:
-    """Find the suppressions of a text that is TOML."""
+    """Find the suppressions in a valid TOML text."""
     if MARK not in document.text:
         return
     for offset in document.comments:
@@ -43,16 +43,16 @@ def suppressions(document: Document) -> Iterator[Suppression]:
 
 
 def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> list[Finding]:
-    """Take out what is suppressed, and add what is wrong with the suppressions.
+    """Remove suppressed findings, and add findings on the suppressions themselves.
 
     Parameters
     ----------
     found
         All findings of the document.
     document
-        Its text.
+        The document.
     ran
-        Codes of the rules that have run: only they can show that a suppression has no effect.
+        Codes of the rules that have run: a suppression of others may have an effect.
     """
     left = list(found)
     own: list[Finding] = []

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from busplan.printable import commands
+from busplan.printable import has_controls
 from busplan.sections.base import Problem, Section, refused
 from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection
 from busplan.sections.execution import TableExecution
@@ -24,7 +24,7 @@ CIRCLE_SECTIONS: Final = ("servo", "mechanics", "delivery", "circle", "tolerance
 
 def _without_control_characters(allowed: str) -> Callable[[str], str]:
     def check(text: str) -> str:
-        if any(commands(one) and one not in allowed for one in text):
+        if any(has_controls(one) and one not in allowed for one in text):
             raise refused(Problem("must not hold control characters"))
         return text
 

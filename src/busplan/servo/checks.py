@@ -212,7 +212,7 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
     Yields
     ------
     Refused
-        What is wrong, with the nearest steps that fit.
+        The problem, with the nearest steps that fit.
 
     Examples
     --------

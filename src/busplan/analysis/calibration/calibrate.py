@@ -5,7 +5,15 @@ from collections.abc import Mapping, Sequence
 from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
-from busplan.analysis.calibration.execution_fit import METHODS, Form, Groups, Method, fit_execution, middles, theil_sen
+from busplan.analysis.calibration.execution_fit import (
+    METHODS,
+    ExecutionForm,
+    Groups,
+    Method,
+    fit_execution,
+    middles,
+    theil_sen,
+)
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Halves
 from busplan.errors import BusplanError
@@ -14,33 +22,33 @@ from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
 Way = Literal["timing-model", "measured-halves"]
-"""Where the two halves come from that are taken off a latency."""
+"""Source of the two halves that are subtracted from a latency."""
 
 OUTLIER_DEVIATIONS: Final = 3.5
-"""How many robust standard deviations from the fit make an outlier (Iglewicz and Hoaglin)."""
+"""Robust standard deviations from the fit that make an outlier (Iglewicz and Hoaglin)."""
 OUTLIER_SHARE: Final = 0.01
-"""How far from the fit an outlier lies at least, as a share of its latency: steps of a timer are no outliers."""
+"""Least distance of an outlier from the fit, as a share of its latency: the steps of a timer are no outliers."""
 _DEVIATION_PER_MAD: Final = 1.4826
 """Standard deviation of a normal distribution whose median absolute deviation is 1."""
 _FEWEST_FOR_OUTLIERS: Final = 3
 
 _EXACT_DECIMALS: Final = 6
-"""A picosecond: what is less is rounding of the subtraction, and no residual."""
+"""A picosecond: smaller residuals are rounding of the subtraction."""
 
 
 class Residual(NamedTuple):
-    """One measurement beside the fit."""
+    """One measurement compared with the fit."""
 
     line: int
     transaction: str
     payload_bytes: int
     latency_us: float
     packets_us: float
-    """What was taken off the latency: both halves, (T1+T2) + (T4+T5)."""
+    """Both halves, (T1+T2) + (T4+T5), which are subtracted from the latency."""
     execution_us: float
     """T_exec of this measurement."""
     residual_us: float
-    """T_exec less that of the fit."""
+    """T_exec minus that of the fit."""
 
 
 class PayloadFit(NamedTuple):
@@ -54,28 +62,28 @@ class PayloadFit(NamedTuple):
     execution_us: float
     """T_exec: the mean, or the median of a robust fit."""
     deviation_us: float | None
-    """Standard deviation of the repetitions' T_exec; none for a single one."""
+    """Standard deviation of T_exec over the repetitions; None for a single measurement."""
     range_us: float
-    """Largest less smallest T_exec of the repetitions."""
+    """Largest minus smallest T_exec of the repetitions."""
     fitted_us: float
     """T_exec of the fit."""
     residual_us: float
-    """`execution_us` less `fitted_us`."""
+    """`execution_us` minus `fitted_us`."""
     read_less_write_us: float | None
-    """T_exec of the reads less that of the writes, where there are both: the timing model says 0."""
+    """T_exec of the reads minus that of the writes, 0 in the timing model; None without both."""
     request_and_acknowledge_us: float | None
     """T1 + T2, measured."""
     model_request_and_acknowledge_us: float
     """T1 + T2 of the timing model, (13)."""
     unexplained_us: float | None
-    """T1 + T2, measured less modelled."""
+    """T1 + T2, measured minus modelled."""
 
 
 class Calibration(NamedTuple):
     """Answer of `calibrate`."""
 
     profile: Profile
-    """The profile as it was on the bench."""
+    """The network that was measured."""
     timing_model: str
     way: Way
     method: Method
@@ -84,11 +92,11 @@ class Calibration(NamedTuple):
     payloads: tuple[PayloadFit, ...]
     rms_residual_us: float
     largest: Residual
-    """The measurement that is farthest from the fit."""
+    """The measurement farthest from the fit."""
     outliers: tuple[Residual, ...]
-    """Measurements that are farther from the robust fit than the others' spread explains."""
+    """Measurements farther from the robust fit than the spread of the others explains."""
     robust: bool
-    """Whether the fit is the robust one, on which outliers have no pull."""
+    """Whether the fit is the robust one, which outliers do not influence."""
 
 
 def calibrate(
@@ -97,39 +105,39 @@ def calibrate(
     *,
     source: str,
     timing_model: str | None = None,
-    form: Form | None = None,
+    form: ExecutionForm | None = None,
     robust: bool = False,
     grade: Literal["measured", "derived"] = "measured",
 ) -> Calibration:
     """Find the execution time of a node from measured latencies.
 
-    What a latency holds beside T_exec is taken off: 2 (T1 + T2) where T1 + T2 was measured with it, otherwise
-    (T1 + T2) + (T4 + T5) of the timing model.
+    T_exec is the latency minus 2 (T1 + T2) if T1 + T2 was measured, otherwise minus (T1 + T2) + (T4 + T5) of the
+    timing model.
 
     Parameters
     ----------
     profile
         The network that was measured; the transactions are those of its farthest node.
     measurements
-        At least one; with T1 + T2 all, or none.
+        At least one; either all or none have T1 + T2.
     source
-        What to call the measurements in messages.
+        Name of the measurements in messages.
     timing_model
-        Timing model; without it the one that decides.
+        Timing model; by default the one that decides.
     form
-        Form of the execution time; without it the profile's own. A table holds the mean at each payload, a line is the
-        one of least squares over all measurements.
+        Form of the execution time; by default the profile's own. A table has the mean at each payload, a line is fitted
+        by least squares to all measurements.
     robust
-        The median at each payload instead, and the line of Theil and Sen through these medians: its slope is the
-        median of the slopes between any two payloads, its base the median of what is left. Both have no tuning
-        constant, and stay where they are until about 29 % of the payloads are wrong.
+        If True, use the median at each payload, and the Theil-Sen line through these medians: its slope is the median
+        of the slopes between any two payloads, its base the median of the remainders. The line has no tuning constant
+        and tolerates about 29 % of wrong payloads.
     grade
         How the execution time is known.
 
     Returns
     -------
     Calibration
-        The execution time, and how well it explains what was measured.
+        The execution time, and how well it fits the measurements.
 
     Raises
     ------
@@ -172,7 +180,7 @@ _Halves = Mapping[tuple[str, int], Halves]
 
 
 def _packets(profile: Profile, measurements: Sequence[Measurement], model: str) -> _Halves:
-    """What the packets take of every transaction and payload that was measured."""
+    """Time of the packets for every transaction and payload that was measured."""
     bus, network = bus_of(profile), network_of(profile)
     return {
         (kind, size): bus.halves(network, model=model, kind=kind, payload_bytes=size)
@@ -181,7 +189,7 @@ def _packets(profile: Profile, measurements: Sequence[Measurement], model: str) 
 
 
 def _packets_us(one: Measurement, halves: _Halves) -> float:
-    """What a latency holds beside T_exec [us]."""
+    """Latency minus T_exec [us]."""
     if one.request_and_acknowledge_us is not None:
         return 2 * one.request_and_acknowledge_us
     return halves[one.transaction, one.payload_bytes].latency_us
@@ -190,7 +198,7 @@ def _packets_us(one: Measurement, halves: _Halves) -> float:
 def _require_possible(
     profile: Profile, raw: Sequence[tuple[Measurement, float]], *, source: str, way: Way, model: str
 ) -> None:
-    """Refuse what cannot have been measured on this bus, all of it at once."""
+    """Refuse measurements that are impossible on this bus, all in one error."""
     payloads = bus_of(profile).payloads(network_of(profile))
     limit = payloads.most_bytes
     needed = "twice its T1 + T2 is" if way == "measured-halves" else f"the packets alone take in the {model} model"
@@ -237,8 +245,8 @@ def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | 
     return tuple(found)
 
 
-def _outliers(residuals: Sequence[Residual], groups: Groups, form: Form) -> tuple[Residual, ...]:
-    """Measurements that stand off the robust fit: of a table payload by payload, of a line over all."""
+def _outliers(residuals: Sequence[Residual], groups: Groups, form: ExecutionForm) -> tuple[Residual, ...]:
+    """Measurements far from the robust fit; the spread is that of the payload (table) or of all payloads (line)."""
     sturdy_us = middles(groups, robust=True)
     if form == "linear":
         base_us, per_byte_us = theil_sen(groups)

@@ -1,4 +1,4 @@
-"""The execution time that fits measured ones best: a table or a line, plain or robust."""
+"""Fit the execution time to measurements: a table or a line, plain or robust."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -8,28 +8,28 @@ from typing import Final, Literal
 from busplan.errors import BusplanError
 from busplan.sections.execution import LinearExecution, TableExecution
 
-Form = Literal["table", "linear"]
+ExecutionForm = Literal["table", "linear"]
 Method = Literal["mean", "median", "least squares", "Theil-Sen"]
 Groups = Mapping[int, Sequence[float]]
 """T_exec of the measurements at each payload [us]."""
 
-METHODS: Final[Mapping[tuple[Form, bool], Method]] = {
+METHODS: Final[Mapping[tuple[ExecutionForm, bool], Method]] = {
     ("table", False): "mean",
     ("table", True): "median",
     ("linear", False): "least squares",
     ("linear", True): "Theil-Sen",
 }
-"""What the fit of a form is, plain and robust."""
+"""Fit method by form and robustness."""
 
 _TIME_DECIMALS: Final = 3
 _PER_BYTE_DECIMALS: Final = 6
-"""A nanosecond, also over the largest payload."""
+"""Rounds by less than a nanosecond even at the largest payload."""
 
 
 def fit_execution(
-    groups: Groups, form: Form, *, robust: bool, grade: Literal["measured", "derived"], source: str
+    groups: Groups, form: ExecutionForm, *, robust: bool, grade: Literal["measured", "derived"], source: str
 ) -> LinearExecution | TableExecution:
-    """Execution time that fits T_exec by payload, in whole nanoseconds.
+    """Fit an execution time to T_exec by payload, in whole nanoseconds.
 
     Parameters
     ----------
@@ -38,11 +38,11 @@ def fit_execution(
     form
         "table" or "linear".
     robust
-        Median at each payload for the mean, the line of Theil and Sen for that of least squares.
+        If True, use the median instead of the mean, and the Theil-Sen line instead of least squares.
     grade
         How the execution time is known.
     source
-        What to call the measurements in messages.
+        Name of the measurements in messages.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def middles(groups: Groups, *, robust: bool) -> dict[int, float]:
 
 
 def least_squares(groups: Groups) -> tuple[float, float]:
-    """Base [us] and slope [us/byte] of the line of least squares over all measurements.
+    """Base [us] and slope [us/byte] of the least-squares line through all measurements.
 
     Examples
     --------
@@ -85,9 +85,9 @@ def least_squares(groups: Groups) -> tuple[float, float]:
 
 
 def theil_sen(groups: Groups) -> tuple[float, float]:
-    """Base [us] and slope [us/byte] of the line of Theil and Sen through the median at each payload.
+    """Base [us] and slope [us/byte] of the Theil-Sen line through the median at each payload.
 
-    The slope is the median of the slopes between any two payloads, the base the median of what it leaves.
+    The slope is the median of the slopes between any two payloads, the base the median of the remainders.
 
     References
     ----------

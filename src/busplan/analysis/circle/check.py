@@ -1,4 +1,4 @@
-"""The circle test as a question that a search asks many times: what does it not hold?"""
+"""The circle test for a search: the failures of many variants of one profile."""
 
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus
@@ -7,11 +7,11 @@ from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
 _PARTS = 1000
-"""Parts of one test that progress counts."""
+"""Progress steps of one test."""
 
 
 class CircleCheck:
-    """Answers for variants of one profile that differ in bus, cycle and payload alone; each simulation runs once.
+    """Runs circle tests of variants of one profile that differ only in bus, cycle and payload, each simulation once.
 
     Parameters
     ----------
@@ -27,14 +27,14 @@ class CircleCheck:
         self._known: dict[tuple[float, float], tuple[str, ...]] = {}
 
     def __call__(self, profile: Profile) -> tuple[str, ...]:
-        """Run the circle test: what it does not hold, or why it cannot be run; nothing when it passes.
+        """Run the circle test and list its failures, or why it cannot be run; empty if it passes.
 
         Parameters
         ----------
         profile
             A variant that fits its bus.
         """
-        # A loop on the node sees of the bus no more than the period; one on the host has the cycle inside it.
+        # A loop on the node depends on the period only; a loop on the host contains the cycle, too.
         on_host = profile.servo.loop == "host"
         delay_us = bus(profile).required_us if on_host else 0.0
         key = (profile.cycle.period_us, delay_us)

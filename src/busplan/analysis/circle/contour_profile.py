@@ -9,22 +9,22 @@ from busplan.servo.circle import CircleRun
 from busplan.servo.contour import blocks, contour_error
 
 CONTOUR_SECTORS: Final = 720
-"""Sectors of the drawn circle: half a degree each, finer than a printed line is wide."""
+"""Sectors of the drawn circle: half a degree each, narrower than a printed line."""
 
 
 class ContourProfile(NamedTuple):
-    """Smallest and largest contour error in each of equal sectors from the x axis on, in mm; None where none fell."""
+    """Smallest and largest contour error in equal sectors from the x axis on [mm]; None in a sector without points."""
 
     low_mm: tuple[float | None, ...]
     high_mm: tuple[float | None, ...]
 
     def condensed(self, *, sectors: int) -> "ContourProfile":
-        """The same in fewer sectors.
+        """Merge neighbouring sectors.
 
         Parameters
         ----------
         sectors
-            Number of equal sectors, which divides that of this profile [1].
+            New number of sectors, a divisor of the present one [1].
         """
         width = len(self.low_mm) // sectors
 
@@ -37,7 +37,7 @@ class ContourProfile(NamedTuple):
 
 
 def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> ContourProfile:
-    """Condense the part at constant speed of a circle test.
+    """Condense the constant-speed part of a circle test.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> Contou
 
 
 def drawn_profile(run: CircleRun | None) -> ContourProfile | None:
-    """Condense a circle test for its drawing; None where the table did not follow the circle, or was not simulated.
+    """Condense a circle test for drawing; None if the table did not follow the circle or was not simulated.
 
     Parameters
     ----------

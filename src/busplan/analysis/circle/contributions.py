@@ -1,4 +1,4 @@
-"""Which error source makes the circle less round: each is removed in turn, as a ballbar report ranks them."""
+"""Rank the error sources of a circle: each is removed in turn, as in a ballbar report."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,7 +10,7 @@ from busplan.servo.path import MAX_SETPOINTS, CirclePath, circle_path
 
 
 class Setup(NamedTuple):
-    """All that one simulation of the circle test is made of."""
+    """Input of one simulation of the circle test."""
 
     path: CirclePath
     x: Axis
@@ -25,7 +25,7 @@ class Setup(NamedTuple):
         return self.path.setpoints * self.timing.steps_per_period
 
     def with_axes(self, **changes: Any) -> "Setup":
-        """The same with other parameters on both axes."""
+        """Return a copy with parameters replaced on both axes."""
         return self._replace(x=replace(self.x, **changes), y=replace(self.y, **changes))
 
 
@@ -36,7 +36,7 @@ class Contribution(NamedTuple):
     max_contour_error_mm: float
     """Largest contour error when this source is removed [mm]."""
     removed_mm: float
-    """What its removal takes away from the largest contour error [mm]; negative where it hides another source."""
+    """Decrease of the largest contour error by its removal [mm]; negative if it hides another source."""
     mean_contour_error_mm: float
     """Mean contour error when this source is removed [mm]."""
     circular_deviation_mm: float
@@ -47,9 +47,9 @@ Removal = Callable[[Setup], Setup]
 
 
 def _with_setpoints_every_step(one: Setup) -> Setup:
-    """The same circle without its chords; as it is where the period does more than to cut the circle into them."""
+    """Return the setup with a set-point at every step; unchanged if the period has other effects than chords."""
     path, timing, delivery = one.path, one.timing, one.delivery
-    # A host's loop runs once a period; jitter, skew and losses come once a period and would not mean the same.
+    # A host's loop, jitter, skew and losses act once per period, so that another period would change them.
     irregular = delivery.jitter_us or delivery.skew_us or delivery.loss_probability
     if timing.loop == "host" or irregular or timing.steps_per_period == 1 or one.steps >= MAX_SETPOINTS:
         return one
@@ -84,14 +84,14 @@ _REMOVALS: Mapping[str, Removal] = {
     "scale": lambda one: one._replace(mechanics=replace(one.mechanics, scale_x_ppm=0.0, scale_y_ppm=0.0)),
     "squareness": lambda one: one._replace(mechanics=replace(one.mechanics, squareness_um_per_m=0.0)),
 }
-"""How each source is taken out. A feed-forward of 1 stands for none of its own error: the target's velocity itself."""
+"""How to remove each source. A velocity feed-forward of 1 has no error of its own."""
 
 
 def sources(one: Setup) -> dict[str, Setup]:
-    """The sources that a setup has, each with the setup that lacks it."""
+    """Error sources of a setup, each with the setup without it."""
     without = {source: remove(one) for source, remove in _REMOVALS.items()}
     if one.timing.loop == "host":
-        # The host's loop holds its command between periods: a line between set-points has no meaning there.
+        # A host's loop holds its command between periods: interpolation does not apply.
         del without["hold"]
     return {source: setup for source, setup in without.items() if setup != one}
 
@@ -113,11 +113,11 @@ def contributions(
     Returns
     -------
     tuple
-        What each source takes from the largest contour error, largest first.
+        The sources, the one with the largest `removed_mm` first.
 
     Notes
     -----
-    Sources act together, so what they take one by one need not add up to the whole.
+    Sources interact: their single contributions need not add up to the whole error.
     """
     without = {source: simulate(setup).contour for source, setup in sources(one).items()}
     ranked = (

@@ -1,4 +1,4 @@
-"""What a circle test does not hold: the bus, stability, the turn, margins and tolerances, each in words."""
+"""Failures of a circle test: the bus, stability, the turn, margins and tolerances, each with its message."""
 
 from collections.abc import Iterator
 from math import inf
@@ -13,22 +13,22 @@ from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
 
 CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
-"""Measures of roundness that have a tolerance, in the order in which they are looked at."""
+"""Measures of roundness that have a tolerance, in the order of the checks."""
 LEAST_ARC_DEG: Final = 270.0
-"""Arc that the circular deviation G needs: the least-squares centre of a shorter one follows its errors."""
+"""Shortest arc for the circular deviation G: the least-squares centre of a shorter one is not reliable."""
 
 
 class Stated(NamedTuple):
-    """A number in the words of a failure."""
+    """A number in the message of a failure."""
 
     value: float
     """In the unit of its key."""
     key: str
     """The figure of the circle test, or the tolerance."""
     unit: str
-    """Unit that it is written in."""
+    """Unit to write it in."""
     decimals: int | None
-    """None for as many as it has."""
+    """None for all it has."""
 
     def __str__(self) -> str:
         number = self.value * 1e3 if self.unit == "um" else self.value
@@ -36,7 +36,7 @@ class Stated(NamedTuple):
 
 
 class _Saying(NamedTuple):
-    """How a failure is put into words, with {value}, {limit}, and {beyond} for their distance."""
+    """Message template of a failure; {beyond} is the distance between {value} and {limit}."""
 
     words: str
     key: str = ""
@@ -44,7 +44,7 @@ class _Saying(NamedTuple):
     unit: str = ""
     decimals: int = 3
     limit_key: str = ""
-    """Key of the limit where it is no tolerance's own."""
+    """Key of the limit, if it is not the name of the failure."""
     limit_decimals: int | None = None
 
 
@@ -99,25 +99,25 @@ _FAILURES: Final[dict[str, _Saying]] = {
 
 
 class Failure(NamedTuple):
-    """One thing that the test does not hold: a tolerance by its key, a limit of the bus, or stability."""
+    """One failure of the test: a tolerance by its key, a limit of the bus, or stability."""
 
     name: str
     value: float | None
     limit: float | None
     said: str = ""
-    """What a broken limit of the bus says of itself."""
+    """Message of a broken limit of the bus; empty for other failures."""
 
     def document(self) -> dict[str, Any]:
-        """As the JSON document has it."""
+        """Return it as in the JSON document."""
         return {"name": self.name, "value": self.value, "limit": self.limit}
 
     @property
     def text(self) -> str:
-        """What does not hold, and by how much."""
+        """Message: what does not hold, and by how much."""
         return "".join(map(str, self.parts()))
 
     def parts(self) -> Iterator[str | Stated]:
-        """What does not hold, and by how much: words, and the numbers between them."""
+        """Words and numbers of the message."""
         if self.said:
             yield self.said
             return
@@ -137,8 +137,7 @@ class Failure(NamedTuple):
 def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float | None]:
     """Smallest phase margin [deg] and gain margin [dB] of both axes, and the crossover of the former [Hz].
 
-    One axis may have the smaller phase margin and the other the smaller gain margin. An unstable loop has neither, and
-    hides what the other axis has.
+    The two margins may come from different axes. If either loop is unstable, all are None.
     """
     axes = (run.margins_x, run.margins_y)
     if not all(one.stable for one in axes):
@@ -175,7 +174,7 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
 
 
 def circle_failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
-    """Tell what a simulated circle does not hold: stability first, then the turn, the margins and the contour.
+    """List the failures of a simulated circle: stability first, then the turn, the margins and the contour.
 
     Parameters
     ----------
@@ -192,7 +191,7 @@ def circle_failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
         ("min_phase_margin_deg", inf if phase_deg is None else phase_deg, tolerance.min_phase_margin_deg),
         ("min_gain_margin_db", inf if gain_db is None else gain_db, tolerance.min_gain_margin_db),
     )
-    # Radial errors do not show it: a table that stands still on the circle has none.
+    # Radial errors do not show this: a table that stands still on the circle has none.
     strayed = () if run.follows else (("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)
     high = (
         ("mean_contour_error_mm", contour.mean_contour_error_mm, tolerance.mean_contour_error_mm),

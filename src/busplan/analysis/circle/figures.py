@@ -1,4 +1,4 @@
-"""The figures of the circle test: symbol, unit, where each comes from, and what it is."""
+"""Register of the figures of the circle test."""
 
 from typing import Final
 

@@ -1,7 +1,7 @@
-"""The circle test: is the circle still round at this period, and does the bus carry it at all?
+"""The circle test: is the circle still round at this period?
 
-The bus comes first. A cycle that does not fit its period delivers no set-points, so there is nothing to simulate. Then
-stability: a host loop's delay makes the circle better while it eats the margin, so no circle passes without one.
+The bus is checked first: a cycle that does not fit its period delivers no set-points to simulate. Then stability: the
+delay of a host loop can make the circle rounder while it reduces the margins, so a circle without margins fails.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from busplan.servo.path import circle_setpoints
 
 
 class CircleFigures(NamedTuple):
-    """The circle test at one period. What was not simulated is None."""
+    """Circle test at one period. Figures of a simulation that did not run are None."""
 
     period_us: float
     feed_mm_per_min: float
@@ -51,9 +51,9 @@ class CircleFigures(NamedTuple):
     """How the servo values are known: measured, calibrated or assumed."""
     stable: bool | None
     phase_margin_deg: float | None
-    """The smaller one of both axes; None also where no loop gain reaches one."""
+    """The smaller one of both axes; None also if no loop gain reaches one."""
     gain_margin_db: float | None
-    """The smaller one of both axes, whichever has it; None also where no gain makes a loop unstable."""
+    """The smaller one of both axes; None also if no gain makes a loop unstable."""
     crossover_hz: float | None
     """Of the axis with the smaller phase margin."""
     mean_contour_error_mm: float | None
@@ -61,7 +61,7 @@ class CircleFigures(NamedTuple):
     radial_deviation_min_mm: float | None
     radial_deviation_max_mm: float | None
     circular_deviation_mm: float | None
-    """About the least-squares centre; None, as radius and centre, where `constant_speed_deg` is too short."""
+    """About the least-squares centre; None, like radius and centre, if `constant_speed_deg` is too short."""
     radius_deviation_mm: float | None
     centre_offset_mm: tuple[float, float] | None
     constant_speed_deg: float | None
@@ -69,11 +69,11 @@ class CircleFigures(NamedTuple):
     passed: bool
     failures: tuple[Failure, ...]
     contributions: tuple[Contribution, ...] | None
-    """Ranked, largest first; None where they were not asked for and nothing failed that they could explain."""
+    """Largest first; None if they were not requested and no contour measure failed."""
 
 
 def failed_measure(result: CircleFigures) -> str | None:
-    """Name of the first contour measure that misses its tolerance; None where only something else fails.
+    """Name of the first contour measure that misses its tolerance; None if there is none.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def failed_measure(result: CircleFigures) -> str | None:
 
 
 def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
-    """Tell which source takes most of the first contour measure that fails, and how much it takes [mm].
+    """Find the source whose removal reduces the first failed contour measure most, and the reduction [mm].
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
     Returns
     -------
     tuple or None
-        None where no contour measure fails, or no source takes anything of it.
+        None if no contour measure fails, or no removal reduces it.
     """
     measure = failed_measure(result)
     if measure is None or not result.contributions:
@@ -105,7 +105,7 @@ def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
 
 
 class CircleTest(NamedTuple):
-    """Answer of `circle_test`: the profile as it was tested, and the figures and simulation of each period."""
+    """Answer of `circle_test`: the profile, and the figures and simulation of each period."""
 
     profile: Profile
     results: tuple[CircleFigures, ...]
@@ -132,11 +132,11 @@ def circle_test(
     profile
         The network, its servo and its circle.
     periods_us
-        Communication periods T_s [us]; without them the profile's own.
+        Communication periods T_s [us]; by default the profile's own.
     with_contributions
-        Run again without each error source in turn; a contour tolerance that fails asks for it by itself.
+        If True, rank the error sources, which takes one more simulation for each.
     explain
-        If False, error sources are not ranked.
+        If True, a failed contour tolerance ranks the error sources, too.
     progress
         Called now and then with the steps simulated so far and those known to be needed.
 
@@ -160,8 +160,8 @@ def circle_test(
         override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
     ]
     counter = _Counter(progress)
-    # Everything is set up before anything is simulated: what is wrong with the last period is said at once. What the
-    # bus does not carry needs no path, however many set-points it has.
+    # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus
+    # needs no path.
     setups = [setup(variant) if bus(variant).fits else loop_timing(variant) for variant in variants]
     for one in setups:
         if isinstance(one, Setup):
@@ -174,7 +174,7 @@ def circle_test(
 
 
 class _Counter:
-    """Adds the steps of many runs up to one progress."""
+    """Adds up the steps of many runs as one progress."""
 
     def __init__(self, progress: Progress | None) -> None:
         self._progress = progress
@@ -229,7 +229,7 @@ def _figures(
 ) -> CircleFigures:
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
     contour = run.contour if run else None
-    # A short arc has a least-squares centre too, but not one that means anything.
+    # The least-squares centre of a short arc is meaningless.
     round_ = contour if run and run.constant_speed_deg >= LEAST_ARC_DEG else None
     circle = profile.circle
     setpoints = circle_setpoints(

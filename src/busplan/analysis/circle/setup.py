@@ -1,4 +1,4 @@
-"""What a profile's circle test simulates: path, axes, timing, delivery and mechanics, from its sections."""
+"""Make the input of a circle simulation from a profile: path, axes, timing, delivery and mechanics."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ def bus(profile: Profile) -> CapacityFigures:
 
 
 def setup(profile: Profile) -> Setup:
-    """What a profile's circle test simulates.
+    """Input of a profile's circle simulation.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def setup(profile: Profile) -> Setup:
 
 
 def loop_timing(profile: Profile) -> LoopTiming:
-    """Where a profile closes its loops, and how often.
+    """Timing of a profile's position loops.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""Two profiles side by side: the keys that differ, and what that does to every figure.
+"""Compare two profiles: the keys that differ, and the change of every figure.
 
-Each figure is that of `capacity`, `latency` or `circle_test`; nothing is computed here but differences.
+The figures are those of `capacity`, `latency` and `circle_test`; only differences are computed here.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures
 
 Judgement = Literal["better", "worse", "same", "neutral"]
-Circle = Callable[[Profile], "CircleFigures"]
+ComputeCircleFigures = Callable[[Profile], "CircleFigures"]
 """Runs the circle test of a profile."""
 
 ROUNDING: Final = 1e-9
-"""Relative difference that float rounding alone can make; a figure that differs by less is the same."""
+"""Relative difference that float rounding can cause; figures that differ by less are the same."""
 
 VERDICT_FITS: Final = Figure(
     "verdict_fits",
@@ -49,11 +49,11 @@ _CIRCLE: Final = tuple(
         "servo_grade",
     )
 )
-"""The circle test, and how the servo values behind it are known."""
+"""Compared figures of the circle test, with the grade of the servo values."""
 
 
 def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
-    """The verdict of the model that decides, and what all models share.
+    """Figures of the plan: the verdict of the model that decides, and what all models share.
 
     A longer period or one more node is a choice, neither good nor bad by itself.
     """
@@ -66,9 +66,9 @@ def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
 
 
 def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
-    """The cycle under one timing model.
+    """Figures of the cycle under one timing model.
 
-    A term by itself is neither good nor bad: what counts is their sum. True ranks above False.
+    A single term is neither good nor bad: only their sum counts.
     """
     own = by_key(figure for bus in buses for figure in bus.compared_figures)
     terms = by_key(figure._replace(better="neither") for bus in buses for figure in bus.term_figures)
@@ -84,11 +84,11 @@ def cycle_figures(*buses: Bus) -> tuple[Figure, ...]:
 _MARGINS: Final = ("phase_margin_deg", "gain_margin_db")
 
 _Figures: TypeAlias = Mapping[str, Any]
-"""Figures by key, as the answer has them."""
+"""Figures of an answer by key."""
 
 
 class KeyDifference(NamedTuple):
-    """A key whose value is not the same in both profiles; None where one has no such key."""
+    """A key whose values differ; None for a profile without the key."""
 
     key: str
     a: KeyValue | None
@@ -96,25 +96,25 @@ class KeyDifference(NamedTuple):
 
 
 class ComparedFigure(NamedTuple):
-    """One figure of both profiles. What could not be computed is None."""
+    """One figure of both profiles. A value that cannot be computed is None."""
 
     part: str
-    """What it belongs to: the plan itself, its cycle under the timing model of that name, or its circle."""
+    """"plan", "circle", or the name of a timing model for its cycle."""
     figure: Figure
     a: Any
     b: Any
     judgement: Judgement
-    """What B is against A."""
+    """B compared with A."""
     difference: float | None
-    """B less A; None where they are no numbers."""
+    """B minus A; None unless both are numbers."""
     relative_difference: float | None
-    """`difference` as a share of A's size, where that means something."""
+    """`difference` as a share of the absolute value of A; None if that is meaningless."""
 
     def is_regression(self, *, tolerance: float) -> bool:
-        """Tell whether B is worse by more than a share of A's size; what is no number has no share."""
+        """Whether B is worse by more than a share of A; without numbers, whether it is worse at all."""
         if self.judgement != "worse" or self.difference is None:
             return self.judgement == "worse"
-        # A share of a ratio in decibels is a number of decibels, whatever the ratio is.
+        # A share of a ratio is a fixed number of decibels.
         share = 20 * log10(1 + tolerance) if self.figure.key.endswith("_db") else tolerance * abs(self.a)
         allowed: float = share * (1 + ROUNDING)
         return abs(self.difference) > allowed
@@ -124,13 +124,13 @@ class CircleSide(NamedTuple):
     """The circle test of one profile."""
 
     figures: "CircleFigures | None"
-    """None where the test cannot be run."""
+    """None if the test cannot be run."""
     problems: tuple[str, ...]
-    """What the circle does not hold, or why it cannot be run."""
+    """Failures of the circle, or why the test cannot be run."""
 
     @property
     def simulated(self) -> bool:
-        """Whether there is a circle to speak of: the test can be run, and the bus delivers its set-points."""
+        """Whether the circle was simulated: the test can be run, and the cycle fits the bus."""
         return self.figures is not None and self.figures.stable is not None
 
 
@@ -142,19 +142,19 @@ class Difference(NamedTuple):
     keys: tuple[KeyDifference, ...]
     figures: tuple[ComparedFigure, ...]
     circles: tuple[CircleSide, CircleSide] | None
-    """Those of A and B; None where no circle was asked for."""
+    """Circle tests of A and B; None if none was requested."""
 
     def judged(self, judgement: Judgement) -> list[ComparedFigure]:
-        """The figures of one judgement, in their order."""
+        """The figures with one judgement, in order."""
         return [figure for figure in self.figures if figure.judgement == judgement]
 
     def regressions(self, *, tolerance: float = 0.0) -> list[ComparedFigure]:
-        """The figures that are worse, whatever their part.
+        """The figures that are worse, of all parts.
 
         Parameters
         ----------
         tolerance
-            By how much a figure may be worse, as a share of A's [1].
+            How much worse a figure may be, as a share of A [1].
         """
         return [figure for figure in self.figures if figure.is_regression(tolerance=tolerance)]
 
@@ -164,7 +164,7 @@ def difference(
     b: Profile,
     *,
     timing_models: Sequence[str] | None = None,
-    circle: Circle | None = None,
+    circle: ComputeCircleFigures | None = None,
 ) -> Difference:
     """Compare two profiles.
 
@@ -173,10 +173,10 @@ def difference(
     a, b
         The profiles; B is judged against A.
     timing_models
-        Which timing models, in this order; without them all of the kind of bus. Two kinds have none in common: what
-        decides in each is compared.
+        Timing models, in this order; by default all of the kind of bus. If the kinds differ, the models that decide
+        are compared.
     circle
-        The circle test, run when either profile asks for a circle; without it none is.
+        Function that runs the circle test; it is called if either profile asks for a circle. None for no circle tests.
 
     Returns
     -------
@@ -208,7 +208,7 @@ def _keys(a: Profile, b: Profile) -> Iterator[KeyDifference]:
             yield KeyDifference(key, one, other)
 
 
-def _circle_side(profile: Profile, circle: Circle) -> CircleSide:
+def _circle_side(profile: Profile, circle: ComputeCircleFigures) -> CircleSide:
     try:
         result = circle(profile)
     except BusplanError as error:
@@ -241,7 +241,7 @@ def _plan(profile: Profile) -> _Figures:
 
 
 def _cycle(profile: Profile, model: str) -> _Figures:
-    """Figures of one cycle by name: those of `capacity`, and others that the bus compares."""
+    """Figures of one cycle by key: those of `capacity`, and others that the bus compares."""
     found = figures(profile, model=model)
     return found.by_key() | dict(found.own)
 
@@ -268,7 +268,7 @@ def _judgement(measure: Figure, a: _Figures, b: _Figures, *, noise: float) -> Ju
     if rank_a is None or rank_b is None:
         return "same" if of_a == of_b else "neutral"
     if isclose(rank_a, rank_b, rel_tol=ROUNDING, abs_tol=noise):
-        # A circle that cannot be run is as good as one that fails, and not the same.
+        # A circle that cannot be run ranks like one that fails, but is not the same.
         return "same" if (of_a is None) == (of_b is None) else "neutral"
     if measure.better == "neither":
         return "neutral"
@@ -276,19 +276,19 @@ def _judgement(measure: Figure, a: _Figures, b: _Figures, *, noise: float) -> Ju
 
 
 def _rank(measure: Figure, values: _Figures) -> float | None:
-    """A figure as a number that orders; None where it has no order."""
+    """A figure as a number that ranks it; None if it has no rank. True ranks above False."""
     value = values.get(measure.key)
     if measure.key == "passed":
         return float(value is True)
     stable = values.get("stable")
     if value is None and measure.key in _MARGINS and stable is not None:
-        # A stable loop without a margin never comes to its limit; an unstable one is beyond it.
+        # A stable loop without a margin cannot become unstable; an unstable loop is beyond its limit.
         return inf if stable else -inf
     return float(value) if isinstance(value, int | float) else None
 
 
 def _share(change: float | None, of: Any, *, noise: float) -> float | None:
-    """A change as a share of a figure's size; None where that is nothing but rounding."""
+    """A change as a share of the absolute value of a figure; None if that value is only rounding."""
     if change is None or abs(of) <= noise:
         return None
     share = change / abs(of)

@@ -1,6 +1,6 @@
-"""How the figures of `capacity` are computed: the functions of the analysis itself, given traced numbers.
+"""Derive the figures of `capacity` by calling the functions of the analysis with traced numbers.
 
-Only what is no operator is put into words here: words, truths, and a search's answer.
+Figures that no operator computes are described in words here: words, truth values, and the result of a search.
 """
 
 from typing import Final
@@ -36,7 +36,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     Returns
     -------
     dict
-        By the keys of the figures that the bus has for `capacity`, but for those of the verdict.
+        By key, all figures of `capacity` except those of the verdict.
     """
     bus, plain = bus_of(profile), figures(profile, model=model)
     network = network_of(traced_profile(profile))
@@ -49,7 +49,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     }
     known = by_key(bus.capacity_figures)
     named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if key in known}
-    # The profile's own number of nodes plays no part in the largest one: this one is no input.
+    # The largest number of nodes does not depend on the profile's own: replace it by a number that is no input.
     searched = network.with_nodes(Traced(plain.max_nodes + 1))
     needed_us = bus.cycle(searched, model=model).required_us
     most = found(
@@ -70,7 +70,7 @@ def _limit_names(bus: Bus) -> str:
 
 
 def _limits(bus: Bus, network: Network) -> tuple[Operand, ...]:
-    """The bus's own limits, and what each is for."""
+    """Values and bounds of the limits of the bus."""
     pairs = ((limit.value(network), limit.most(network)) for limit in bus.limits if not limit.is_safety)
     return tuple(one for pair in pairs for one in pair)
 
@@ -78,7 +78,7 @@ def _limits(bus: Bus, network: Network) -> tuple[Operand, ...]:
 def _words(
     named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Operand, ...]
 ) -> dict[str, Traced]:
-    """Figures that are words or truths."""
+    """Figures that are words or truth values."""
     required, available = named["required_us"], named["available_us"]
     sizes = tuple(named[term.key] for term in terms)
     broken = Traced(
@@ -105,7 +105,7 @@ def _words(
 
 
 def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
-    """A figure of the verdict, which compares the models."""
+    """Derive a figure of the verdict, which compares the models."""
     others = (other for other in model_names(profile) if other != model)
     (verdict,) = verdicts(capacity(profile, timing_models=(model, *others)))
     bus, derived = bus_of(profile), [capacity_figures(profile, model=name) for name in model_names(profile)]
@@ -114,7 +114,7 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     safe = tuple(figures[key] for figures in derived for key in safety)
     if key == "models_agree":
         return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
-    # The document's change and sentences are a reporter's; it puts them in the place of these.
+    # The report fills in the values of changes and sentences.
     if key == "cheapest_change":
         purpose = "carries more nodes" if verdict.all_well else "makes every model fit on a bus that is set safely"
         words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"

@@ -1,7 +1,7 @@
-"""How the figures of `circle-test` come about: those of the bus by its equations, the others by something else.
+"""Derive the figures of `circle-test`.
 
-A path that is counted, a linear loop and a simulation have no equation to show: such a figure says what gives it, and
-rests on all that went in.
+Figures of the bus come from its equations. The path, the linear loop and the simulation have no equation to show: such
+a figure is one step that names its method, and its inputs are all inputs of that method.
 """
 
 from collections.abc import Iterator
@@ -29,12 +29,12 @@ _GIVEN: Final = {
 }
 """Figures that are keys of the profile."""
 _OF_BUS: Final = {"bus_fits": "fits", "required_us": "required_us", "available_us": "available_us"}
-"""Figures that `capacity` has, too, by their key there."""
+"""Figures that `capacity` has, too, with their key there."""
 _PATH: Final = ("duration_s", "setpoints", "steps")
 _LOOP: Final = ("stable", "phase_margin_deg", "gain_margin_db", "crossover_hz")
 _VERDICT: Final = ("passed", "failures")
 _LOOP_KEYS: Final = ("position_gain_per_s", "integral_gain_per_s2", "derivative_gain", "drive_lag_us")
-"""What of the servo the linear loop holds."""
+"""Servo parameters of the linear loop."""
 _SIMULATION: Final = "a simulation of both axes, step by step, on the set-points that the bus delivers"
 _AT_CONSTANT_SPEED: Final = f"{_SIMULATION}; needs {LEAST_ARC_DEG:g} deg of the circle at constant speed"
 _WAYS: Final = {
@@ -44,7 +44,7 @@ _WAYS: Final = {
     **dict.fromkeys(("circular_deviation_mm", "radius_deviation_mm", "centre_offset_mm"), _AT_CONSTANT_SPEED),
     "contributions": "a simulation of the same circle without each error source in turn",
 }
-"""What gives a figure, where it is not one simulation alone."""
+"""Method of a figure, if it is not a single simulation."""
 
 
 def circle_figures(
@@ -57,7 +57,7 @@ def circle_figures(
     profile
         The network, its servo and its circle.
     with_contributions
-        Run again without each error source in turn.
+        If True, rank the error sources, too.
     progress
         As for `circle_test`.
 
@@ -88,7 +88,7 @@ def circle_figures(
 
 
 def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
-    """What the circle test of a profile starts from, each with its grade; nothing is simulated."""
+    """Inputs of a profile's circle test; nothing is simulated."""
     return tuple(one.given for one in _simulation_inputs(profile) if one.given is not None)
 
 
@@ -101,7 +101,7 @@ def _delay(profile: Profile, result: CircleFigures, required: Traced) -> Traced:
 
 
 def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Traced]) -> Traced:
-    """A figure that no equation gives."""
+    """A figure without an equation."""
     value = _plain(result, key)
     if key in _PATH:
         return found(value, _WAYS[key], tuple(_path_inputs(profile, key)))
@@ -115,7 +115,7 @@ def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Tra
 
 
 def _plain(result: CircleFigures, key: str) -> object:
-    """A figure as the document has it."""
+    """A figure as in the JSON document."""
     if key == "failures":
         return [failure.document() for failure in result.failures]
     if key == "contributions":
@@ -132,7 +132,7 @@ def _path_inputs(profile: Profile, key: str) -> Iterator[Traced]:
 
 
 def _loop_inputs(profile: Profile) -> Iterator[Traced]:
-    """What the linear loop of an axis is made of."""
+    """Inputs of the linear loop of an axis."""
     sampled = "cycle.period_us" if profile.servo.loop == "host" else "servo.step_us"
     yield from (traced(profile, key) for key in ("servo.loop", sampled))
     keys = {f"servo.{axis}{key}" for axis in ("", "x.", "y.") for key in _LOOP_KEYS}
@@ -140,7 +140,7 @@ def _loop_inputs(profile: Profile) -> Iterator[Traced]:
 
 
 def _simulation_inputs(profile: Profile) -> Iterator[Traced]:
-    """Everything that is not zero: zero in a resolution, a lag or a disturbance means that there is none."""
+    """Inputs of the simulation, except zero resolutions, lags and disturbances: zero means none."""
     yield traced(profile, "cycle.period_us")
     for name in ("circle", "servo", "delivery", "mechanics"):
         section = getattr(profile, name)
@@ -153,7 +153,7 @@ def _simulation_inputs(profile: Profile) -> Iterator[Traced]:
 
 
 def _idle(profile: Profile) -> Iterator[str]:
-    """Keys that nothing asks: what a node does on a loss that never comes, the seed of no chance, and so on."""
+    """Keys without effect: `on_loss` without losses, `seed` without random numbers, `interpolation` on the host."""
     if profile.servo.loop == "host":
         yield "interpolation"
     loses = profile.delivery.loss_probability > 0
@@ -164,7 +164,7 @@ def _idle(profile: Profile) -> Iterator[str]:
 
 
 def _tolerances(profile: Profile) -> Iterator[Traced]:
-    """What the circle must hold."""
+    """Tolerances of the circle."""
     for name in type(profile.tolerance).model_fields:
         if getattr(profile.tolerance, name) is not None:
             yield traced(profile, f"tolerance.{name}")

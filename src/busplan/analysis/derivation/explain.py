@@ -1,19 +1,19 @@
-"""Where a figure comes from: every step to it, in symbols and in numbers, and everything it starts from.
+"""Derive a figure: every step to it, in symbols and in numbers, and all its inputs.
 
-Nothing is computed a second time by other means: the functions that give the figure are given traced numbers
-(`busplan.analysis.derivation.trace`). What no equation gives, as a simulation or a search, is one step that says so.
+The functions that compute the figure are called with traced numbers (`busplan.analysis.derivation.trace`), so that the
+steps are what was executed. A simulation or a search is one step.
 """
 
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
-from busplan.analysis.derivation.formulas import written
+from busplan.analysis.derivation.formulas import formula_text
 from busplan.analysis.derivation.latency import latency_figures, latency_names
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.analysis.network import bus_of, model_names
-from busplan.analysis.register import Command, figure_named, figures_of
+from busplan.analysis.register import CommandName, figure_named, figures_of
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -21,7 +21,7 @@ from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
-"""From the weakest to the strongest, and what is not for anyone to know."""
+"""From the weakest to the strongest; "given" values are choices, not knowledge."""
 
 
 class Step(NamedTuple):
@@ -30,19 +30,19 @@ class Step(NamedTuple):
     Parameters
     ----------
     key
-        Name of the figure in the results; one of the derivation's own where it is no figure.
+        Key of the figure in the results; a name used only here if it is no figure.
     symbol
-        What stands for it.
+        Symbol in formulas.
     reference
-        Numbers of its equations, or where else it comes from.
+        Numbers of its equations, or another source.
     formula
-        How it is computed, in symbols.
+        The computation in symbols.
     numbers
-        The same with the numbers put in.
+        The computation in numbers.
     value
-        The result: a number, a truth, a word or a list; None where there is none.
+        The result: a number, a truth value, a word or a list; None if there is none.
     unit
-        Its unit; empty for counts, shares and words.
+        Unit of the result; empty for counts, shares and words.
     """
 
     key: str
@@ -55,23 +55,23 @@ class Step(NamedTuple):
 
 
 class Derivation(NamedTuple):
-    """A figure and the way to it."""
+    """A figure and its steps."""
 
-    command: Command
+    command: CommandName
     figure: Figure
     timing_model: str
     transaction: str | None
-    """Of a figure of `latency`."""
+    """Transaction of a figure of `latency`; None for others."""
     period_us: float
     value: object
-    """As the command's JSON has it."""
+    """Value as in the command's JSON."""
     steps: tuple[Step, ...]
-    """What is computed first comes first; the figure itself is last, unless it is an input."""
+    """In the order of computation; the last step is the figure, unless that is an input."""
     inputs: tuple[Input, ...]
 
     @property
     def weakest_grade(self) -> str:
-        """The grade of the least well known of its inputs."""
+        """Grade of the least well known input."""
         return min((one.grade for one in self.inputs), key=_GRADES.index, default=_GRADES[-1])
 
 
@@ -98,25 +98,25 @@ def explain(
     profile
         The network.
     figure
-        Its key, with or without its command, as `figure_named` takes it.
+        Its key, with or without its command; see `figure_named`.
     periods_us
-        Communication periods T_s [us]; without them the profile's own.
+        Communication periods T_s [us]; by default the profile's own.
     timing_models
-        Which timing models; without them the one that decides. A circle test has no other.
+        Timing models; by default the one that decides, which is the only one of a circle test.
     transactions
-        Which transactions, for a figure of `latency`; without them both.
+        Transactions, for a figure of `latency`; by default all.
     progress
         As for `circle_test`.
 
     Returns
     -------
     Explanation
-        One derivation for each period, transaction and model, in this nesting.
+        One derivation for each period, transaction and model, nested in this order.
 
     Raises
     ------
     BusplanError
-        There is no such figure, what is asked for does not go with it, or the command itself refuses.
+        There is no such figure, an option does not apply to it, or the command fails.
     """
     command, one = figure_named(figure, bus=bus_of(profile))
     deciding = profile.bus.timing_model
@@ -125,9 +125,9 @@ def explain(
     if command == "circle-test" and list(models) != [deciding]:
         raise BusplanError(f"{one.key}: a circle test has the timing model that decides and no other, {deciding}")
     if one.key in VERDICT_KEYS and timing_models is not None:
-        raise BusplanError(f"{one.key}: compares the timing models, so it belongs to no one of them")
+        raise BusplanError(f"{one.key}: compares the timing models, so it has no timing model of its own")
     if command != "latency" and transactions is not None:
-        raise BusplanError(f"{one.key}: no figure of latency, so it belongs to no one transaction")
+        raise BusplanError(f"{one.key}: not a figure of latency, so it has no transaction")
     found = []
     for period_us in [profile.cycle.period_us] if periods_us is None else periods_us:
         where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": "period"})
@@ -147,13 +147,13 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
     Parameters
     ----------
     profile
-        The network; what its circle test starts from is among them where it asks for one.
+        The network; inputs of its circle test are included if it asks for one.
 
     Returns
     -------
     tuple
-        Inputs of the cycle under every timing model, and of the circle; without those that are the planner's to choose.
-        An execution time that nobody has graded is first.
+        Inputs of the cycle under every timing model, and of the circle, without "given" ones. An execution time without
+        a grade comes first.
     """
     found: dict[str, Input] = {}
     for model in model_names(profile):
@@ -164,14 +164,14 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
 
         for one in simulated_inputs(profile):
             found.setdefault(one.name, one)
-    # The execution time is for somebody to know, and nobody says how well: that comes first.
+    # An execution time is a fact, not a choice: without a grade it is the least well known input.
     known = (one for one in found.values() if one.grade != "given" or one.name.startswith("node.execution."))
     return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 
 
 def _traced(
     profile: Profile,
-    command: Command,
+    command: CommandName,
     key: str,
     *,
     model: str,
@@ -189,22 +189,22 @@ def _traced(
     return circle_figures(profile, with_contributions=key == "contributions", progress=progress)[key]
 
 
-def _steps(profile: Profile, traced: Traced, command: Command, figure: Figure) -> Iterator[Step]:
+def _steps(profile: Profile, traced: Traced, command: CommandName, figure: Figure) -> Iterator[Step]:
     for one in lines(traced):
         known = figure if one is traced else _known(profile, one.key, command)
         yield Step(
             key=known.key,
             symbol=figure.symbol if one is traced else one.symbol,
             reference=known.reference,
-            formula=written(one, in_numbers=False),
-            numbers=written(one, in_numbers=True),
+            formula=formula_text(one, in_numbers=False),
+            numbers=formula_text(one, in_numbers=True),
             value=one.value,
             unit=known.unit,
         )
 
 
-def _known(profile: Profile, key: str, command: Command) -> Figure:
-    """What the registry says of a line; one that is no figure stands for itself."""
+def _known(profile: Profile, key: str, command: CommandName) -> Figure:
+    """Registered figure of a line; a line without one gets a figure of its own."""
     register = figures_of(bus_of(profile))
     for figures in (register[command], *register.values()):
         if key in figures:

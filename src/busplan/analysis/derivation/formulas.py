@@ -1,4 +1,4 @@
-"""How the lines of a derivation are written: in symbols, and with the numbers put in."""
+"""Write the lines of a derivation in symbols and in numbers."""
 
 from inspect import signature
 from typing import Final
@@ -9,13 +9,13 @@ from busplan.sourced import SYMBOLS, Equation, Sourced
 
 _ATOM: Final = 4
 _MOST_DIGITS: Final = 17
-"""As many as tell every float from every other."""
+"""Digits that distinguish any two floats."""
 _SUPPORTS: Final = 1e-4
-"""Largest share of a result by which its line may miss it, for the digits that the line does not show."""
+"""Largest relative error of a written difference, caused by the digits that it does not show."""
 
 
 def against(left: float, sign: str, right: float) -> str:
-    """Write a comparison with so many digits that it can be seen to hold.
+    """Write a comparison with enough digits to see that it holds.
 
     Examples
     --------
@@ -29,7 +29,7 @@ def against(left: float, sign: str, right: float) -> str:
 
 
 def less(left: float, right: float) -> str:
-    """Write a difference with so many digits that the line gives its result.
+    """Write a difference with enough digits to reproduce its result.
 
     Examples
     --------
@@ -45,21 +45,21 @@ def less(left: float, right: float) -> str:
     return f"{left:.{digits}g} - {right:.{digits}g}"
 
 
-def written(operand: Operand, *, in_numbers: bool) -> str:
-    """Write the expression behind a number, down to what has a name.
+def formula_text(operand: Operand, *, in_numbers: bool) -> str:
+    """Write the expression of a number in terms of named numbers.
 
     Parameters
     ----------
     operand
         A computed number.
     in_numbers
-        Write the values of what has a name, instead of the symbols.
+        If True, write values instead of symbols.
 
     Examples
     --------
     >>> nodes = Traced(2, given=Input("N", "bus.nodes", 2, "", "given", "profile", "nodes"))
     >>> delay = 0.25 * (nodes + 1)
-    >>> written(delay, in_numbers=False), written(delay, in_numbers=True), delay.value
+    >>> formula_text(delay, in_numbers=False), formula_text(delay, in_numbers=True), delay.value
     ('0.25 (N + 1)', '0.25 * (2 + 1)', 0.75)
     """
     operand = _unwrapped(operand)
@@ -75,7 +75,7 @@ def written(operand: Operand, *, in_numbers: bool) -> str:
 
 
 def _unwrapped(operand: Operand) -> Operand:
-    """What was chosen, where it is an expression without a name."""
+    """Replace a choice by the chosen operand, if that is an expression without a name."""
     while isinstance(operand, Traced) and operand.operation == CHOSEN:
         won = operand.parts[0]
         if not isinstance(won, Traced) or won.symbol:
@@ -85,7 +85,7 @@ def _unwrapped(operand: Operand) -> Operand:
 
 
 def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
-    """Text of an operand, and how tightly it holds together."""
+    """Text of an operand, and its operator precedence."""
     if not isinstance(operand, Traced):
         symbol = operand.symbol if isinstance(operand, Sourced) and not in_numbers else ""
         return _atom(symbol or short(value_of(operand)))
@@ -100,13 +100,13 @@ def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[
 
 
 def _joined(operand: Traced, parts: list[tuple[str, int]], *, in_numbers: bool) -> tuple[str, int]:
-    """Text of an operation, from those of its operands."""
+    """Text and precedence of an operation, from those of its operands."""
     operation = OPERATIONS[operand.operation]
     if operation.rank == FUNCTION:
         return f"{operation.sign}({', '.join(text for text, _ in parts)})", FUNCTION
     (left, left_rank), (right, right_rank) = parts
     left = f"({left})" if left_rank < operation.rank else left
-    # What is taken off, divided by or raised to must hold together more tightly than what it is taken off.
+    # The right operand of -, / and ^ needs brackets at the same precedence, too.
     tighter = operation.rank + (operation.sign in "-/^")
     right = f"({right})" if right_rank < tighter else right
     if operation.sign == "*" and not in_numbers and not right[0].isdigit():
@@ -124,7 +124,7 @@ def _atom(text: str) -> tuple[str, int]:
 
 
 def formula_of(equation: Equation) -> str:
-    """Write an equation in symbols, by computing it with traced numbers.
+    """Write an equation in symbols by computing it with traced numbers.
 
     Examples
     --------
@@ -133,7 +133,7 @@ def formula_of(equation: Equation) -> str:
     'hop H + 0.25'
     """
     names = list(signature(equation.function).parameters)
-    # Any number but 0 and 1 will do: those are what a comparison gives.
+    # Any number but 0 and 1, which truth values equal.
     first, *others = (Traced(2.0, given=Input(SYMBOLS[name], name, 2.0, "", "given", "", "")) for name in names)
     found = equation.function(first, **dict(zip(names[1:], others, strict=True)))
-    return found.symbol or written(found, in_numbers=False)
+    return found.symbol or formula_text(found, in_numbers=False)

@@ -1,4 +1,4 @@
-"""What a profile gives a derivation: its keys as inputs, each with its grade and where it stands."""
+"""Keys of a profile as inputs of a derivation, each with its grade and source."""
 
 from types import MappingProxyType
 from typing import Any, Final
@@ -31,12 +31,12 @@ _SYMBOLS: Final = MappingProxyType(
         "servo.drive_lag_us": "tau",
     }
 )
-"""What stands for a key in formulas, where it is no quantity of the equations and of no kind of bus alone."""
+"""Symbol of a key in formulas, unless the equations or a kind of bus define it."""
 _TABLE: Final = "node.execution.time_us"
 
 
 def given(profile: Profile, key: str) -> Input:
-    """Give a key of a profile as the input of a derivation.
+    """Make an input from a key of a profile.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def given(profile: Profile, key: str) -> Input:
     Returns
     -------
     Input
-        Its grade is that of its section where the section has one, that of a sourced figure where it is that figure,
-        and "given" for all else that the profile sets.
+        Its grade is that of its section, if the section has one; that of a sourced figure, if the value is that figure;
+        otherwise "given".
     """
     *sections, name = key.split(".")
     section: Any = profile
@@ -68,20 +68,20 @@ def given(profile: Profile, key: str) -> Input:
     default = bus.key_sources.get(key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
-    # A plain number has no unit to show.
+    # A plain number shows no unit.
     unit = "" if unit == "1" else unit
     symbol = _SYMBOLS.get(key) or bus.key_symbols.get(key) or SYMBOLS.get(name) or name
     return Input(symbol, key, value, unit, grade, source, description)
 
 
 def traced(profile: Profile, key: str) -> Traced:
-    """Give a key of a profile as a traced number."""
+    """Make a traced number from a key of a profile."""
     one = given(profile, key)
     return Traced(one.value, given=one)
 
 
 def traced_profile(profile: Profile) -> Profile:
-    """The profile with traced numbers in the place of all that its cycle may depend on; nothing is checked."""
+    """Return a copy with traced numbers in all keys that the cycle may depend on, unvalidated."""
     found = profile
     for key in cycle_keys(profile.bus.kind):
         value: Any = profile

@@ -1,4 +1,4 @@
-"""How the figures of `latency` are computed: the functions of the bus itself, given traced numbers."""
+"""Derive the figures of `latency` by calling the functions of the bus with traced numbers."""
 
 from busplan.analysis.derivation.inputs import traced_profile
 from busplan.analysis.derivation.origin import Input, short
@@ -9,7 +9,7 @@ from busplan.sourced import Sourced
 
 
 def latency_names(profile: Profile) -> tuple[str, ...]:
-    """What `latency` shows of a profile: its transactions, or its cycle."""
+    """Names of the transactions in `latency`, or of the cycle."""
     bus = bus_of(profile)
     model = bus.timing_models[0].name
     return tuple(one.name for one in bus.cycle(network_of(profile), model=model).latencies())
@@ -30,7 +30,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
     Returns
     -------
     dict
-        By the keys of the figures that the bus has for `latency`.
+        By key, all figures of `latency`.
     """
     bus, network = bus_of(profile), network_of(traced_profile(profile))
     (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.name == kind)
@@ -45,12 +45,12 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
 
 
 def chosen(word: object, key: str, meaning: str) -> Traced:
-    """Give what was asked for as the start of a derivation."""
+    """Make an input from an option of the caller."""
     return Traced(word, given=Input(key, key, str(word), "", "given", "asked for", meaning))
 
 
 def remembered(number: "Operand | None", key: str, symbol: str) -> Traced:
-    """A figure with its name; a constant that nothing computed becomes a line of its own."""
+    """Name a traced figure; a constant becomes a line of its own."""
     if isinstance(number, Traced):
         return number.named(key, symbol)
     if isinstance(number, Sourced):

@@ -1,4 +1,4 @@
-"""What a derivation starts from: keys of the profile and sourced constants, each with its grade."""
+"""Inputs of a derivation: keys of the profile and sourced constants, each with its grade."""
 
 from typing import Final, NamedTuple
 
@@ -6,12 +6,12 @@ from busplan.sourced import Sourced
 
 
 class Input(NamedTuple):
-    """A number that a derivation starts from.
+    """An input of a derivation.
 
     Parameters
     ----------
     symbol
-        What stands for it in formulas.
+        Symbol in formulas.
     name
         Its key in the profile, or its name among the constants.
     value
@@ -19,7 +19,7 @@ class Input(NamedTuple):
     unit
         Unit in words; "1" for a plain number, empty for a word.
     grade
-        How well it is known: a `Grade`; "given" for what the profile sets and nobody measures.
+        How well it is known: a `Grade`, or "given" for a choice of the profile.
     source
         Where it stands.
     meaning
@@ -36,13 +36,13 @@ class Input(NamedTuple):
 
 
 class GivenTable(tuple[float, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
-    """Entries of a table that a profile gives, as one input of a derivation."""
+    """Entries of a table in a profile, as one input of a derivation."""
 
     given: Input
 
 
 def constant(number: Sourced) -> Input:
-    """Give a sourced constant as an input; without a symbol of its own, formulas show its value.
+    """Make an input from a sourced constant; without a symbol, formulas show its value.
 
     Examples
     --------
@@ -60,7 +60,7 @@ DIGITS: Final = 7
 
 
 def short(value: object) -> str:
-    """Write a number with as many digits as a reader puts into a pocket calculator.
+    """Write a number with up to seven significant digits, enough to check it with a pocket calculator.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Traced numbers hold how they were computed, so that a figure can show its own derivation.
+"""Numbers that record how they were computed, so that a figure can show its derivation.
 
-The equations are operators only: given `Traced` numbers they compute what they always compute, and leave an expression
-behind. What a line of a derivation shows is therefore what was executed, and not a second writing of it.
+The equations consist of operators, so they accept `Traced` numbers and build an expression while they compute. A line
+of a derivation therefore shows what was executed.
 """
 
 import operator
@@ -19,7 +19,7 @@ from busplan.sourced import Sourced
 class _Operation(NamedTuple):
     sign: str
     rank: int
-    """How tightly it holds its operands together; a function's brackets do."""
+    """Operator precedence; that of a function is the highest."""
     compute: Callable[..., float]
 
 
@@ -44,26 +44,26 @@ OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
     }
 )
 CHOSEN: Final = "chosen"
-"""The operation that is the first of its parts; the others say why."""
+"""An operation whose value is its first part; the other parts are the conditions."""
 Operand: TypeAlias = "Traced | float"
 """A `Traced` number, a `Sourced` one, or a plain one."""
 
 
 class Traced(SpecialNumber):
-    """A number, or the word that follows from numbers, with the expression it comes from.
+    """A number, or a word that follows from numbers, with its expression.
 
     Parameters
     ----------
     value
         The number itself.
     operation
-        Name of the operation, where it was computed from `parts`.
+        Name of the operation on `parts`, if an operator computed it.
     parts
-        Operands, or whatever else it was computed from.
+        Operands, or other numbers that it depends on.
     formula, numbers
-        The same in words, where no operator computed it.
+        The computation in symbols and in numbers, if no operator computed it.
     given
-        The input that it is.
+        The input, if it is one.
     """
 
     __slots__ = ("formula", "given", "key", "numbers", "operation", "parts", "symbol", "value")
@@ -88,7 +88,7 @@ class Traced(SpecialNumber):
         self.symbol = given.symbol if given else ""
 
     def named(self, key: str, symbol: str) -> "Traced":
-        """Give a computed number its name, once: from then on it is a line of its own."""
+        """Name a number, unless it has a name: it becomes a line of its own."""
         if not self.symbol:
             self.key, self.symbol = key, symbol
         return self
@@ -120,7 +120,7 @@ class Traced(SpecialNumber):
     def __pow__(self, other: Operand) -> "Traced":
         return _computed("pow", self, other)
 
-    # Compared with anything it gives a traced truth; found again by what it is, not by what it equals.
+    # == gives a traced truth value, so that the hash is the identity.
     __hash__ = object.__hash__
 
     def __eq__(self, other: object) -> Any:
@@ -183,38 +183,38 @@ class Traced(SpecialNumber):
         return Traced(found.value, operation=CHOSEN, parts=(found, *sources))
 
     def constant(self, number: Operand) -> Operand:
-        """Give a constant as an input of the derivation."""
+        """Make an input from a constant."""
         return Traced(float(number), given=constant(number)) if isinstance(number, Sourced) else number
 
     def worded(self, words: str) -> "Traced":
-        """Say where the number comes from."""
+        """Describe in words where the number comes from."""
         return Traced(self.value, formula=words, numbers=short(self.value), parts=(self,))
 
 
 def found(value: object, words: str, parts: Iterable[Operand]) -> Traced:
-    """A result that no equation gives, as that of a search or a simulation: it has no steps, but all their inputs.
+    """A result without an equation, as of a search or a simulation: it has no steps, but all inputs of its parts.
 
     Parameters
     ----------
     value
         The result.
     words
-        What gives it.
+        Its method.
     parts
-        What that starts from.
+        Numbers that it depends on.
     """
     leaves = inputs(Traced(value, parts=tuple(parts)))
     return Traced(value, formula=words, parts=tuple(Traced(leaf.value, given=leaf) for leaf in leaves))
 
 
 def value_of(operand: Operand) -> float:
-    """Give the plain number behind any operand."""
+    """Plain number of any operand."""
     found: float = operand.value if isinstance(operand, Traced) else operand
     return float(found) if isinstance(found, Sourced) else found
 
 
 def _computed(name: str, left: Any, right: Any) -> Traced:
-    """The result of an operation; a plain 0 or 1 that changes nothing leaves no trace."""
+    """Compute an operation; adding a plain 0 or multiplying by a plain 1 is not recorded."""
     if isinstance(right, Traced) and name in ("add", "mul") and _is_switch(left, _NEUTRAL[name]):
         return right
     if isinstance(left, Traced) and name in _NEUTRAL and _is_switch(right, _NEUTRAL[name]):
@@ -231,12 +231,12 @@ def _is_switch(operand: Operand, value: int) -> bool:
 
 
 def lines(figure: Traced) -> Iterator[Traced]:
-    """Every named number that a figure is computed from, before what is computed from it; the figure last."""
+    """Every named number behind a figure, in the order of computation; the figure is last."""
     yield from (one for one in _visit(figure, set()) if not one.given and (one.symbol or one is figure))
 
 
 def inputs(figure: Traced) -> Iterator[Input]:
-    """Everything that a figure's derivation starts from: of the profile and of the constants, each once."""
+    """Inputs of a figure: keys of the profile and constants, each once."""
     found: dict[tuple[str, str], Input] = {}
     for one in _visit(figure, set()):
         for leaf in (one.given, *(constant(part) for part in one.parts if isinstance(part, Sourced))):

@@ -1,7 +1,8 @@
 """The best value of one setting, the others as they are: period, slice ratio, payload.
 
-What has a closed form is computed, and its neighbours on the grid of settings are tested. The largest payload and the
-smallest period that passes the circle are scanned: neither a measured execution table nor a contour error is monotone.
+A closed form gives an estimate, and its neighbours on the grid of settings are tested. The largest payload and the
+smallest period that passes the circle are searched linearly: neither an execution table nor a contour error is
+monotone.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,21 +23,21 @@ Circle = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 
 MAX_CIRCLES: Final = 50
-"""So many periods in a row are tested for the smallest one that passes the circle. Chosen: some seconds."""
+"""Consecutive periods tested for the smallest one that passes the circle. Chosen: takes some seconds."""
 
 
 class PeriodSearch(NamedTuple):
-    """Smallest period that was found."""
+    """Result of a search for the smallest period."""
 
     period_us: float | None
-    """None when none was found."""
+    """None if none was found."""
     bounded_by: str
     proven: bool
-    """Whether every smaller one fails; False when the search was cut short."""
+    """Whether every smaller period is known to fail; False if the search was cut short."""
 
 
 class Largest(NamedTuple):
-    """Largest value of a setting, 0 when there is none, and what keeps it from being larger."""
+    """Largest value of a setting, 0 if there is none, and the limit that bounds it."""
 
     value: int
     bounded_by: str
@@ -55,18 +56,18 @@ def smallest_ratio(profile: Profile) -> float:
 def smallest_period(profile: Profile, *, circle: Circle | None = None, max_circles: int = MAX_CIRCLES) -> PeriodSearch:
     """Find the smallest period that the cycle is shown to fit in and that passes the circle.
 
-    For the bus alone there is a closed form, rounded up to whole us. The circle asks for multiples of the servo's step,
-    and each one from there on is tested: the first to pass is the smallest. After `max_circles` of them the strides
-    double, and what passes then is not proven to be the smallest.
+    For the bus alone, a closed form is rounded up to whole us. With a circle, multiples of the servo's step are tested
+    from there on, and the first one to pass is the smallest. After `max_circles` of them the strides double, and a
+    period that passes then is not proven to be the smallest.
 
     Parameters
     ----------
     profile
         The network; its own period plays no part.
     circle
-        The circle test; without it no circle is run.
+        Function that runs the circle test; None for none.
     max_circles
-        How many periods in a row are tested, 1 or more [1].
+        Number of consecutive periods to test, 1 or more [1].
     """
     needed_us, ratio = safe_required_us(profile), profile.cycle.slice_ratio
     step_us = 1.0 if circle is None else profile.servo.step_us
@@ -88,7 +89,7 @@ def smallest_period(profile: Profile, *, circle: Circle | None = None, max_circl
 def largest_payload(profile: Profile) -> Largest:
     """Largest payload of read and write alike that is shown to fit the period, in the steps of the bus [bytes].
 
-    Every size is tried from the largest one that the bus carries and the execution table knows.
+    Every size is tried, from the largest one that the bus carries and the execution table covers.
     """
     network, execution = network_of(profile), profile.node.execution
     payloads = bus_of(profile).payloads(network)
@@ -106,7 +107,7 @@ def largest_payload(profile: Profile) -> Largest:
 
 
 def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:
-    """Smallest whole number above 0 that fits, from its estimate in floats; every larger one must fit too."""
+    """Smallest whole number above 0 that fits, near an estimate; every larger one must fit, too."""
     number = max(1, ceil(estimate))
     while number > 1 and fits(number - 1):
         number -= 1
@@ -116,7 +117,7 @@ def _smallest(estimate: float, *, fits: Callable[[int], bool]) -> int:
 
 
 def _numbers(first: int, *, in_a_row: int) -> Iterator[int]:
-    """Some numbers in a row, then in strides that double."""
+    """Consecutive numbers, then numbers in strides that double."""
     yield from range(first, first + in_a_row)
     number, stride = first + in_a_row - 1, 2
     while True:
@@ -126,5 +127,5 @@ def _numbers(first: int, *, in_a_row: int) -> Iterator[int]:
 
 
 def _times(number: int, step_us: float) -> float:
-    """A multiple of a step as it is written: three times 0.1 is 0.3 [us]."""
+    """A multiple of a step in decimal arithmetic: 3 * 0.1 is 0.3 [us]."""
     return float(number * Decimal(str(step_us)))

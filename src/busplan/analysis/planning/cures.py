@@ -1,8 +1,8 @@
 """The cheapest change after which a profile is shown to fit, or that makes room for more nodes.
 
-Changes are tried from the cheapest: what the bus itself lets a plan turn; the slice ratio, which is computing time of
-the host; the period, which is what the machine is for. Each is put into the profile and computed again: what is
-advised has been seen to work, and is safe for the nodes it is advised for.
+Changes are tried from the cheapest on: settings of the bus; the slice ratio, which costs computing time of the host;
+the period, which costs performance of the machine. Each is put into the profile and computed again, so that advice is
+known to work and to be safe for its number of nodes.
 """
 
 from bisect import bisect_right
@@ -22,22 +22,22 @@ from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
 RATIO_STEPS: Final = 10_000
-"""A slice ratio is advised in steps of 0.0001, a period in steps of 1 us, always rounded to the safe side."""
+"""A slice ratio is advised in steps of 0.0001 and a period in steps of 1 us, both rounded to the safe side."""
 MAX_ADVISED_RATIO: Final = 0.9
-"""No larger slice ratio is advised: the host computes in what communication leaves of the period. Chosen."""
+"""Largest slice ratio advised: the host computes in the rest of the period. Chosen."""
 _SMALLEST_SHARE: Final = 1e-6
-"""Below it there is no cure, as a slice ratio has no smaller value; what is divided by it stays finite."""
+"""Smallest share of the slice to find a cure for: the smallest slice ratio. It keeps quotients finite."""
 
 
 def changeable(profile: Profile, *, structure: bool = True) -> tuple[str, ...]:
-    """What may be changed of a network, in words, the cheapest first.
+    """Names of what may be changed in a network, the cheapest first.
 
     Parameters
     ----------
     profile
         The network.
     structure
-        Whether what needs new parts is among it.
+        If True, include changes that need new hardware.
     """
     bus = bus_of(profile)
     settings = (setting.label for setting in bus.settings(network_of(profile)))
@@ -57,7 +57,7 @@ def listed(words: Sequence[str], last: str) -> str:
 
 
 class Change(NamedTuple):
-    """A change of a profile, and what it brings."""
+    """A change of a profile, and its effect."""
 
     changes: dict[str, Value]
     """New value by dotted key."""
@@ -78,7 +78,7 @@ def change_to_fit(profile: Profile) -> Change | None:
     Returns
     -------
     Change
-        None when no single kind of change does.
+        None if no single kind of change is enough.
     """
     return next(changes_to_fit(profile), None)
 
@@ -94,13 +94,13 @@ def changes_to_fit(profile: Profile) -> Iterator[Change]:
     Yields
     ------
     Change
-        The cheapest first; no change at all when the profile fits and is safe.
+        The cheapest first; an empty change if the profile fits and is safe already.
     """
     cures = bus_of(profile).repairs(network_of(profile))
     nodes = int(cures.get("bus.nodes", profile.bus.nodes))
     try:
         cured = override(profile, dict(cures))
-    except BusplanError:  # a payload that the bus could carry and the execution table does not know
+    except BusplanError:  # the bus could carry the payload, but the execution table does not have it
         return
     for cure in ({}, *_time_cures(cured, nodes)):
         after = _after(profile, {**cures, **cure})
@@ -157,7 +157,7 @@ def change_for_room(profile: Profile, *, nodes: int, utilisation: float = 1.0) -
     Returns
     -------
     Change
-        None when no single kind of change does.
+        None if no single kind of change is enough.
     """
     if utilisation < _SMALLEST_SHARE:
         return None
@@ -199,19 +199,19 @@ def _best_setting(profile: Profile) -> tuple[int, dict[str, Value]]:
                 return setting
         return None
 
-    # Time grows with the nodes: those that fit are the first ones.
+    # Time grows with the nodes, so the numbers that fit come first.
     best = bisect_right(range(1, _ceiling(profile) + 1), x=False, key=lambda nodes: fitting(nodes) is None)
     return best, (fitting(best) or {}) if best else {}
 
 
 def _settings(profile: Profile, nodes: int) -> list[dict[str, Value]]:
-    """Values of the bus's own settings that are safe for that many nodes, the cheapest change first."""
+    """Values of the settings of the bus that are safe for a number of nodes, the cheapest change first."""
     settings = bus_of(profile).settings(network_of(profile).with_nodes(nodes))
     return [{setting.key: value} for setting in settings for value in setting.values]
 
 
 def _ceiling(profile: Profile) -> int:
-    """Most nodes by the limits of the bus, whatever the time."""
+    """Most nodes within the limits of the bus, ignoring time."""
     network, bus = network_of(profile), bus_of(profile)
 
     def is_over(nodes: int) -> bool:
@@ -232,7 +232,7 @@ def _time_cures(profile: Profile, nodes: int, *, share: float = 1.0) -> Iterator
     own_us = needed_us({})
     settings = [one for one in _settings(profile, nodes) if needed_us(one) < own_us]
     yield from settings
-    # A wider slice alone, then with a setting: one key is a smaller change than two.
+    # First a larger slice alone, then with a setting: one changed key is cheaper than two.
     for before in ({}, *settings):
         ratio = ceil(needed_us(before) / profile.cycle.period_us * RATIO_STEPS) / RATIO_STEPS
         if ratio <= MAX_ADVISED_RATIO:

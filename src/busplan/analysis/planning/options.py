@@ -1,4 +1,4 @@
-"""What to set for a number of nodes: the best value of each setting, and the one change to make.
+"""Find what to set for a number of nodes: the best value of each setting, and the recommended change.
 
 Every option is put into the profile and computed again.
 """
@@ -13,7 +13,7 @@ from busplan.analysis.capacity.node_limit import safe_nodes
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.best_values import (
     MAX_CIRCLES,
-    Circle,
+    FindCircleFailures,
     largest_payload,
     smallest_period,
     smallest_ratio,
@@ -32,24 +32,24 @@ class Option(NamedTuple):
 
     title: str
     changes: Changes
-    """What the option sets, by dotted key; what was asked for is not among it."""
+    """Keys that the option changes in the goal, with their new values."""
     profile: Profile
-    """The profile with the changes and with what was asked for."""
+    """The goal with the changes."""
     deciding: CapacityFigures
     """Capacity under the timing model that decides."""
     others: tuple[CapacityFigures, ...]
     """Capacity under the other timing models."""
     bounded_by: str | None = None
-    """What keeps the value from being better; None where there is no value to choose."""
+    """Limit that keeps the value from being better; None if the option chooses no value."""
     circle_failures: tuple[str, ...] | None = None
-    """What the circle does not hold; None when it was not run."""
+    """Failures of the circle; None if it was not run."""
     proven: bool = True
-    """Whether no better value can exist; False when the search for it was cut short."""
+    """Whether no better value exists; False if the search was cut short."""
     recommended: bool = False
 
     @property
     def circle_passed(self) -> bool | None:
-        """Whether the circle holds its tolerances; None when it was not run."""
+        """Whether the circle holds its tolerances; None if it was not run."""
         return None if self.circle_failures is None else not self.circle_failures
 
     @property
@@ -59,33 +59,33 @@ class Option(NamedTuple):
 
 
 class Impossible(NamedTuple):
-    """A setting without a value that would do."""
+    """A setting that has no suitable value."""
 
     title: str
     reason: str
     proven: bool = True
-    """Whether there is none; False when the search was cut short."""
+    """Whether no value exists; False if the search was cut short."""
 
 
 class Plan(NamedTuple):
     """Answer of `plan`."""
 
     profile: Profile
-    """The profile as it was read."""
+    """The original profile."""
     goal: Profile
-    """The profile with what was asked for."""
+    """The profile with the wanted values."""
     wanted: Changes
-    """What was asked for and is not in the profile yet, by dotted key."""
+    """Wanted values that differ from the profile, by dotted key."""
     options: tuple[Option, ...]
     impossible: tuple[Impossible, ...]
 
     @property
     def recommended(self) -> Option | None:
-        """The option to take; None when there is no plan for the goal."""
+        """The recommended option; None if there is no plan for the goal."""
         return next((option for option in self.options if option.recommended), None)
 
     def all_changes(self, option: Option) -> Changes:
-        """What turns the profile as it was read into an option."""
+        """All changes from the original profile to an option."""
         return {**self.wanted, **option.changes}
 
 
@@ -93,7 +93,7 @@ def plan(
     profile: Profile,
     *,
     wanted: Mapping[str, Value] | None = None,
-    circle: Circle | None = None,
+    circle: FindCircleFailures | None = None,
     max_circles: int = MAX_CIRCLES,
 ) -> Plan:
     """Find what to set.
@@ -108,16 +108,16 @@ def plan(
     profile
         The network.
     wanted
-        What is asked for, by dotted key: {"bus.nodes": 6}.
+        Wanted values by dotted key: {"bus.nodes": 6}.
     circle
-        The circle test; without it no circle is run.
+        Function that runs the circle test; None for none.
     max_circles
-        How many periods in a row are tried for the circle before the search takes longer strides [1].
+        Number of consecutive periods to test before the strides double [1].
 
     Returns
     -------
     Plan
-        The options, those that do not exist with the reason, and the one to take.
+        The options, the settings without a suitable value, and the recommendation.
 
     Raises
     ------
@@ -153,12 +153,12 @@ def plan(
 
 
 def nodes_for_axes(profile: Profile, axes: int) -> int:
-    """Nodes that so many axes need, at the profile's axes of each."""
+    """Number of nodes for a number of axes, with the profile's axes per node."""
     return -(-axes // profile.node.axes)
 
 
 def _differing(profile: Profile, changes: Changes) -> Changes:
-    """The changes that a profile does not hold already."""
+    """The changes that differ from the profile."""
     return {key: value for key, value in changes.items() if override(profile, {key: value}) != profile}
 
 
@@ -169,7 +169,7 @@ _CHEAPEST: Final = "cheapest that is shown to fit"
 class _Planner:
     """Makes the options of one goal."""
 
-    def __init__(self, goal: Profile, *, circle: Circle | None, max_circles: int) -> None:
+    def __init__(self, goal: Profile, *, circle: FindCircleFailures | None, max_circles: int) -> None:
         self.goal = goal
         self.model = bus_of(goal).deciding_model
         self.circle = circle
@@ -202,7 +202,7 @@ class _Planner:
 
     @staticmethod
     def best(setting: Setting) -> Changes:
-        """What gives a setting its best value; nothing where it has it."""
+        """The change to the best value of a setting; empty if it has that value."""
         return {} if setting.best is None or not setting.values else {setting.key: setting.best}
 
     def recommended(self, *, keep: set[str]) -> Option | None:
@@ -229,7 +229,7 @@ class _Planner:
         return None
 
     def option(self, title: str, changes: Changes, *, bounded_by: str | None = None, proven: bool = True) -> Option:
-        """Put changes into the goal and compute what they bring."""
+        """Put changes into the goal and compute its figures."""
         changed = override(self.goal, dict(changes))
         deciding = figures(changed, model=self.model)
         others = (model for model in model_names(changed) if model != self.model)
@@ -245,7 +245,7 @@ class _Planner:
         )
 
     def fitting(self, title: str, changes: Changes, *, bounded_by: str, proven: bool = True) -> Option | Impossible:
-        """An option, unless it still does not fit."""
+        """An option, unless it breaks a limit of the bus."""
         broken = broken_limits(override(self.goal, dict(changes)))
         if broken:
             return Impossible(title, f"the {bus_of(self.goal).limits_of}'s limit of {' and '.join(broken)} is broken")

@@ -1,4 +1,4 @@
-"""What a key of the profile goes through in a sweep: from text, or from numbers one by one."""
+"""Values of a key in a sweep: from the text of an option, or from single values."""
 
 import re
 from collections.abc import Collection, Iterable
@@ -15,28 +15,28 @@ _FORMS: Final = (
     "A:B:*FACTOR (125:8000:*2) or A:B:#COUNT (100:4000:#40)"
 )
 _EXACT: Final = 2**53
-"""Whole numbers up to this are exact as floats."""
+"""Whole numbers below this are exact as floats."""
 _MAX_DECIMALS: Final = 22
 """Powers of ten up to this are exact as floats."""
 _MOST_LISTED: Final = 10_000
 
 
 def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values:
-    """Read values as the command line writes them.
+    """Parse the values of a --vary option.
 
     Parameters
     ----------
     text
         Values between commas, a range A:B in steps of 1, A:B:STEP, A:B:*FACTOR or A:B:#COUNT.
     name
-        What to call them in messages.
+        Name of the values in messages.
     words
-        Words that may stand in the place of a number.
+        Words allowed instead of a number.
 
     Raises
     ------
     BusplanError
-        No numbers, a value twice, or a range that leads nowhere.
+        Not a number, a repeated value, or a range that never reaches its end.
 
     Examples
     --------
@@ -50,28 +50,28 @@ def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values
 
 
 def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) -> Listed:
-    """Take values one by one.
+    """Make an axis from single values.
 
     Parameters
     ----------
     values
-        Finite numbers or words. A float that is whole may stand for a count.
+        Finite numbers or words. A whole float becomes an int.
     name
-        What to call them in messages.
+        Name of the values in messages.
     words
-        Words that may be among them.
+        Words allowed among the values.
 
     Raises
     ------
     BusplanError
-        None of them, one that is no such value, or one twice.
+        No values, one that is not allowed, or a repeated one.
     """
     found: dict[int | float | str, None] = {}
     for value in values:
         if not _is_value(value, words):
-            raise BusplanError(f"{name}: {value!r} is no finite number")
+            raise BusplanError(f"{name}: {value!r} is not a finite number")
         if value in found:
-            raise BusplanError(f"{name}: {value} is there twice")
+            raise BusplanError(f"{name}: {value} is given twice")
         found[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
     if not found:
         raise BusplanError(f"{name}: no values; give at least one")
@@ -79,12 +79,12 @@ def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) 
 
 
 def stepped(values: range, *, name: str) -> Steps:
-    """Take a range of whole numbers.
+    """Make an axis from a range of whole numbers.
 
     Raises
     ------
     BusplanError
-        None of them, or numbers that are too large.
+        No values, or numbers that are too large.
     """
     if not values:
         raise BusplanError(f"{name}: no values; give at least one")
@@ -156,10 +156,10 @@ def _even(name: str, first: Decimal, last: Decimal, count: str) -> Values:
 
 def _number(name: str, part: str) -> Decimal:
     if not _NUMBER.fullmatch(part):
-        raise BusplanError(f"{name}: {part!r} is no number; {_FORMS}")
+        raise BusplanError(f"{name}: {part!r} is not a number; {_FORMS}")
     return Decimal(part)
 
 
 def _plain(number: Decimal) -> int | float:
-    """A whole number as one, so that it may stand for a count; any other as the nearest float."""
+    """A whole number as int, any other as the nearest float."""
     return int(number) if number == number.to_integral_value() else float(number)

@@ -1,7 +1,7 @@
-"""Capacity over a grid: the figures of `capacity` for many profiles at once, through the same functions.
+"""Capacity over a grid: the figures of `capacity` for many profiles at once, by the same functions.
 
-Those functions are written for numbers of any sort, so a profile whose keys hold arrays gives arrays. Each key's values
-lie along an axis of their own; what a figure does not depend on costs it nothing. Only words stand here.
+Those functions accept arrays, so a profile whose keys hold arrays gives arrays. The values of each key lie along an
+axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are added here.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
 
 CHUNK_POINTS: Final = 1 << 14
-"""Points computed at once: their arrays stay in the processor's cache."""
+"""Points computed at once: their arrays fit into the processor's cache."""
 
 Word: TypeAlias = str | float | list[str] | None
 """What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
@@ -35,12 +35,12 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 
 
 def figure_names(profile: Profile) -> tuple[str, ...]:
-    """Columns of a sweep behind the varied keys; `timing_model` is the first."""
+    """Columns of a sweep after the varied keys; `timing_model` is the first."""
     return tuple(figure.key for figure in bus_of(profile).capacity_figures)
 
 
 def word_figures(profile: Profile) -> tuple[str, ...]:
-    """Columns in words."""
+    """Columns whose values are words."""
     return tuple(figure.key for figure in bus_of(profile).capacity_figures if figure.sort in ("word", "words"))
 
 
@@ -48,11 +48,11 @@ class Column(NamedTuple):
     """One figure over a chunk."""
 
     values: Array
-    """Numbers, truths, or the places of its words; broadcasts to the chunk's shape. NaN is what does not exist."""
+    """Numbers, truth values, or indexes into `words`; broadcasts to the chunk's shape. NaN for a missing value."""
     words: tuple[Word, ...] | None = None
 
 
-class Block(NamedTuple):
+class SweepBlock(NamedTuple):
     """The figures of a chunk."""
 
     chunk: Chunk
@@ -66,7 +66,7 @@ class Block(NamedTuple):
         return [(self.varied if name in self.varied else figures)[name] for figures in self.models]
 
     def row(self, index: int, names: Sequence[str]) -> dict[str, Cell]:
-        """One row: a point under one timing model, by its place among `rows`."""
+        """One row, by its index in `rows`: a point under one timing model."""
         point, model = divmod(index, len(self.models))
         where = np.unravel_index(point, self.chunk.shape)
         return {name: self._value(self.columns(name)[model], where) for name in names}
@@ -76,7 +76,7 @@ class Block(NamedTuple):
         return found if column.words is None else column.words[int(found)]
 
     def rows(self, name: str) -> Array:
-        """One column as plain values: a point after the other, a timing model after the other within each."""
+        """One column as a flat array: point by point, and for each point timing model by timing model."""
         parts = [np.broadcast_to(one.values, self.chunk.shape).ravel() for one in self.columns(name)]
         return np.stack(parts, axis=1).ravel()
 
@@ -87,7 +87,7 @@ def sweep(
     *,
     timing_models: Sequence[str],
     chunk_points: int = CHUNK_POINTS,
-) -> Iterator[Block]:
+) -> Iterator[SweepBlock]:
     """Compute all figures of `capacity` over a grid.
 
     Parameters
@@ -95,23 +95,23 @@ def sweep(
     profile
         The network.
     grid
-        Values of its keys, of `checked_grid`.
+        Values of its keys, from `checked_grid`.
     timing_models
-        Which timing models, in this order.
+        Timing models, in this order.
     chunk_points
         Largest number of points computed at once.
 
     Yields
     ------
-    Block
-        One chunk after the other: memory stays flat however large the grid is.
+    SweepBlock
+        One chunk at a time: memory does not grow with the grid.
 
     References
     ----------
     Paper, equations (1)-(11).
     """
     for chunk in grid.chunks(chunk_points):
-        yield Block(
+        yield SweepBlock(
             chunk,
             {key: _varied(values) for key, values in chunk.values.items()},
             tuple(_figures(profile, chunk.values, model) for model in timing_models),
@@ -130,7 +130,7 @@ def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[
     """All figures of a chunk under one timing model."""
     for number, (key, own) in enumerate(values.items()):
         if own.dtype == object and own.size > 1:
-            # A rule among numbers: each value by itself, put together along its axis.
+            # Words among numbers: compute each value by itself and join the results along the axis.
             parts = [
                 _figures(profile, {**values, key: np.take(own, [index], axis=number)}, model)
                 for index in range(own.size)
@@ -145,7 +145,7 @@ def _joined(parts: list[Column], *, axis: int) -> Column:
 
 
 def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
-    """A profile whose keys hold arrays, never checked."""
+    """Return a copy whose keys hold arrays, unvalidated."""
     for key, own in values.items():
         profile = with_unchecked(profile, key, own.item() if own.size == 1 else own.astype(float))
     return profile
@@ -208,12 +208,12 @@ def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:
 
 @cache
 def _combinations(keys: tuple[str, ...]) -> tuple[list[str], ...]:
-    """Every set of limits, by the number whose bits say which are in it."""
+    """Every set of limits, by the number whose bits are its members."""
     return tuple([key for bit, key in enumerate(keys) if code >> bit & 1] for code in range(1 << len(keys)))
 
 
 def _typed(number: Number, sort: Sort) -> Array:
-    """Counts as whole numbers and all else as `capacity` has it, whatever it was computed in."""
+    """Array of the type that the sort of a figure has."""
     return np.asarray(number, dtype=_TYPES[sort])
 
 
@@ -223,7 +223,7 @@ def _with_axes(values: Number, axes: int) -> Array:
 
 
 def _largest(terms: list[Number]) -> Number:
-    """Place of the largest of some terms, the first of equals."""
+    """Index of the largest term; the first one among equals."""
     best: Number = terms[0]
     place: Number = np.uint8(0)
     for index, term in enumerate(terms[1:], start=1):

@@ -21,9 +21,9 @@ CIRCLE_COLUMNS: Final = (
     "gain_margin_db",
     "passed",
 )
-"""Columns that circle tests add, by their names in `circle-test`."""
+"""Columns of circle tests, named as in `circle-test`."""
 MOST_CIRCLES_UNASKED: Final = 1000
-"""Circle tests that are run without being asked twice: minutes with numba, an hour without."""
+"""Most circle tests without --force: minutes with numba, an hour without."""
 
 Figures = tuple[float | bool | None, ...]
 
@@ -47,12 +47,12 @@ def run_task(task: CircleTask) -> Figures:
 
 
 def require_circles(profile: Profile, grid: Grid) -> None:
-    """Refuse a grid with a point that has no circle test, before any is run.
+    """Refuse a grid with a point whose circle test cannot be run, before any is run.
 
     Raises
     ------
     BusplanError
-        The first such point, with the reason: its period is no multiple of the step, the drive cannot reach the feed,
+        The first such point and the reason: its period is no multiple of the step, the drive cannot reach the feed,
         or the circle is too short for its ramps.
     """
     for chunk in grid.chunks(1):
@@ -76,7 +76,7 @@ def with_circles(profile: Profile, block: Block, *, run: Callable[[Iterable[Circ
     block
         Its capacity.
     run
-        Runs `run_task` for each task, here or in other processes, and keeps their order.
+        Maps `run_task` over tasks, in this or other processes, in order.
     """
     results = list(run(CircleTask(profile, block.chunk.point(index)) for index in range(block.chunk.points)))
     circles = {
@@ -87,7 +87,7 @@ def with_circles(profile: Profile, block: Block, *, run: Callable[[Iterable[Circ
 
 
 def _array(values: Sequence[float | None]) -> Array:
-    """Truths as they are, and numbers with NaN for what was not simulated or does not exist."""
+    """Array of truth values, or of numbers with NaN for None."""
     if all(isinstance(value, bool) for value in values):
         return np.array(values, dtype=bool)
     return np.array([np.nan if value is None else value for value in values], dtype=float)

@@ -1,4 +1,4 @@
-"""A full grid of profile values, in row-major order, taken piece by piece: no axis is ever held as a whole."""
+"""A full grid of profile values in row-major order, in chunks: no axis is in memory as a whole."""
 
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -15,16 +15,16 @@ from busplan.profile.toml import override
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
-"""Numbers, truths, or objects where there are words among them."""
+"""Numbers, truth values, or objects if there are words among them."""
 
 _CHECKED_EACH: Final = 100
-"""Values of one key that are checked one by one; of more, the extremes: every range of the profile is an interval."""
+"""Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
 MAX_POINTS: Final = 10**12
-"""A larger grid would take weeks: it is a slip of the keyboard."""
+"""A larger grid would take weeks, so it is probably a typing error."""
 
 
 class Listed(NamedTuple):
-    """Values one by one: numbers, and words where the profile knows them."""
+    """Single values: numbers, and words that the profile allows."""
 
     values: tuple[Value, ...]
 
@@ -34,19 +34,19 @@ class Listed(NamedTuple):
         return len(self.values)
 
     def part(self, start: int, stop: int) -> Array:
-        """Values from one index to before another."""
-        # One type for all parts of the axis.
+        """Values from index `start` to before `stop`."""
+        # All parts of the axis have one type.
         common = object if self.has_words else float if any(isinstance(one, float) for one in self.values) else np.int64
         return np.array(self.values[start:stop], dtype=common)
 
     @property
     def has_words(self) -> bool:
-        """Whether a value is no number."""
+        """Whether a value is a word."""
         return any(isinstance(one, str) for one in self.values)
 
 
 class Steps(NamedTuple):
-    """Values an equal step apart: (first + i step) / scale, exact in decimals because all three are whole."""
+    """Evenly spaced values (first + i step) / scale; exact decimals, because all three are whole numbers."""
 
     first: int
     step: int
@@ -55,13 +55,13 @@ class Steps(NamedTuple):
     has_words: bool = False
 
     def part(self, start: int, stop: int) -> Array:
-        """Values from one index to before another."""
+        """Values from index `start` to before `stop`."""
         whole = self.first + self.step * np.arange(start, stop, dtype=np.int64)
         return whole if self.scale == 1 else whole / self.scale
 
 
 class Even(NamedTuple):
-    """So many values evenly from one end to the other, both included."""
+    """A number of evenly spaced values, both ends included."""
 
     first: float
     last: float
@@ -69,7 +69,7 @@ class Even(NamedTuple):
     has_words: bool = False
 
     def part(self, start: int, stop: int) -> Array:
-        """Values from one index to before another."""
+        """Values from index `start` to before `stop`."""
         share = np.arange(start, stop) / (self.size - 1)
         return self.first * (1 - share) + self.last * share
 
@@ -78,14 +78,14 @@ Values = Listed | Steps | Even
 
 
 class Chunk(NamedTuple):
-    """A piece of a grid that follows on from the one before."""
+    """A contiguous part of a grid."""
 
     start: int
     """Index of its first point."""
     shape: tuple[int, ...]
     """Points along each axis of the grid."""
     values: dict[str, Array]
-    """Values of each key, in the shape of its own axis: together they broadcast."""
+    """Values of each key, shaped to broadcast along its own axis."""
 
     @property
     def points(self) -> int:
@@ -114,7 +114,7 @@ class Grid(NamedTuple):
         return prod(axis.size for axis in self.axes.values())
 
     def chunks(self, most: int) -> Iterator[Chunk]:
-        """Take the grid apart.
+        """Split the grid.
 
         Parameters
         ----------
@@ -124,10 +124,10 @@ class Grid(NamedTuple):
         Yields
         ------
         Chunk
-            One after the other in row-major order.
+            In row-major order.
         """
         sizes = [axis.size for axis in self.axes.values()]
-        # The axis that is cut: all behind it go whole into each chunk, all before it with one value.
+        # Find the axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
         cut, behind = len(sizes) - 1, 1
         while cut and behind * sizes[cut] <= most:
             behind *= sizes[cut]
@@ -162,7 +162,7 @@ def checked_grid(
     option: str = "--vary",
     circle_option: str = "--circle",
 ) -> Grid:
-    """Make a grid after asking the profile about its values.
+    """Make a grid after validating its values.
 
     Parameters
     ----------
@@ -171,14 +171,14 @@ def checked_grid(
     axes
         Values by dotted key.
     with_circle
-        Whether a circle test is to be run: without one, keys that only it reads are refused.
+        If False, keys that only the circle test reads are refused.
     option, circle_option
-        What messages call the values, and the way to ask for a circle test.
+        Names in messages of the values, and of the option that requests circle tests.
 
     Raises
     ------
     BusplanError
-        A key that is not known, that is no number, or that nothing here reads; a value the profile's schema refuses.
+        A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses.
     """
     for key in axes:
         _require_known(profile, key, name=f"{option} {key}")
@@ -190,7 +190,7 @@ def checked_grid(
     for key, values in samples.items():
         for value in values[1:]:
             override(profile, {**first, key: value})
-    # What two keys must keep together shows where each is at its end.
+    # Constraints between keys show at the extremes.
     for end in (_least, _greatest):
         override(profile, {key: end(values) for key, values in samples.items()})
     grid = Grid(dict(axes))
@@ -202,7 +202,7 @@ def checked_grid(
 
 
 def _require_known(profile: Profile, key: str, *, name: str) -> None:
-    """Refuse a key that is not there, or that is a section or a list; of the rest the profile itself tells."""
+    """Refuse a key that does not exist, or that is a section or a list."""
     *tables, last = key.split(".")
     table: Any = profile.model_dump()
     for part in tables:
@@ -222,7 +222,7 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
 
 
 def _require_read(profile: Profile, key: str, *, name: str, circle_option: str | None) -> None:
-    """Refuse a key that nothing of what is computed depends on; without an option to ask for, a circle test is."""
+    """Refuse a key that no computed figure depends on; without `circle_option`, circle tests are computed."""
     if key in cycle_keys(profile.bus.kind):
         return
     section = key.partition(".")[0]
@@ -233,16 +233,16 @@ def _require_read(profile: Profile, key: str, *, name: str, circle_option: str |
 
 
 def _samples(axis: Values) -> list[Value]:
-    """Values to check: each, or of many the extremes and a fraction if there is one; whole numbers may be counts."""
+    """Values to check: all, or of many the extremes, the words and one fraction. Whole floats become ints."""
     if isinstance(axis, Listed):
         if axis.size <= _CHECKED_EACH:
             return list(dict.fromkeys(axis.values))
         numbers = [one for one in axis.values if not isinstance(one, str)]
-        # One fraction among whole numbers may be none of the extremes.
+        # A fraction among whole numbers may lie between the extremes.
         fractions = [one for one in numbers if isinstance(one, float)][:1]
         words = set(axis.values) - set(numbers)
         return [*dict.fromkeys((axis.values[0], min(numbers), max(numbers), *fractions, *words))]
-    # Of equal steps from a whole number the first that is a fraction is the second value.
+    # In equal steps from a whole number, the second value is a fraction if any is.
     chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, 1, axis.size - 1)
     values = (axis.part(index, index + 1).item() for index in chosen)
     return [int(value) if isinstance(value, float) and value.is_integer() else value for value in values]

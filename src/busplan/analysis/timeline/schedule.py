@@ -1,7 +1,7 @@
-"""One communication cycle as a schedule: event after event, each beginning where the one before it ends.
+"""One communication cycle as a schedule: each event begins where the one before it ends.
 
-This is the second way to the time that a cycle needs. `capacity` multiplies and adds in closed form; here every event
-of the bus is laid behind the other, and the last end must be the same.
+This is an independent way to the time that a cycle needs: `capacity` has a closed form, here the events of the bus are
+added one by one, and the end of the last one must be the same.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,8 +17,7 @@ from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
-"""Nodes that are still laid out one by one: far beyond those of a bus, so that a plan that breaks this limit can be
-seen; few enough for a document."""
+"""Most nodes laid out one by one: far more than a bus may have, so that a profile beyond its limit can be shown."""
 
 
 EVENTS: Final = Figure("events", "n", "schedule", "events of one kind in the window", "events", sort="count")
@@ -27,25 +26,25 @@ SHARE: Final = Figure("share", "s", "schedule", "share of the window that they t
 
 
 class Event(NamedTuple):
-    """What happens from one moment of the cycle to another."""
+    """One event of the cycle."""
 
     kind: str
-    """Key of its kind, as the bus has it."""
+    """Key of its kind, defined by the bus."""
     node: int | None
-    """Whose transaction it belongs to, from 1; None for what belongs to all."""
+    """Node of its transaction, from 1; None for an event of the whole bus."""
     transaction: str | None
     packet: str | None
-    """Which of the transaction's packets it belongs to, where it belongs to one."""
+    """Packet of the transaction, if it belongs to one."""
     start_us: float
     end_us: float
     term: str
-    """Key of the term that it is a part of; empty for what is left."""
+    """Key of the term that it is a part of; empty for idle time."""
     label: str
-    """What it is, and who is at work."""
+    """What happens, and who does it."""
 
     @property
     def duration_us(self) -> float:
-        """How long it takes, or how much of it is inside the window [us]."""
+        """Duration, clipped to the window [us]."""
         return self.end_us - self.start_us
 
 
@@ -54,9 +53,9 @@ class Schedule(NamedTuple):
 
     profile: Profile
     figures: CapacityFigures
-    """The closed form: what the cycle needs, what it may take, and whether it fits."""
+    """Closed form: time needed, time available, and whether the cycle fits."""
     cycle_events: tuple[Event, ...]
-    """The whole cycle, and what is left of its slice."""
+    """Events of the whole cycle, and the idle rest of its slice."""
     from_us: float
     """Start of the window [us]."""
     to_us: float
@@ -64,23 +63,23 @@ class Schedule(NamedTuple):
 
     @property
     def end_us(self) -> float:
-        """End of the last event, or of the slice where something of it is left [us]."""
+        """End of the cycle or of its slice, whichever is later [us]."""
         return self.cycle_events[-1].end_us
 
     @property
     def used_us(self) -> float:
-        """End of the last event that is not idle: the required time by addition [us]."""
+        """End of the last event that is not idle: the required time as a sum of events [us]."""
         last = self.cycle_events[-1]
         return last.start_us if last.kind == IDLE.key else last.end_us
 
     @property
     def is_whole(self) -> bool:
-        """Whether the window shows all of it."""
+        """Whether the window is the whole cycle."""
         return self.from_us == 0 and self.to_us == self.end_us
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """The events inside the window, cut off at its edges."""
+        """Events inside the window, clipped to it."""
         return tuple(
             event._replace(start_us=max(event.start_us, self.from_us), end_us=min(event.end_us, self.to_us))
             for event in self.cycle_events
@@ -89,19 +88,19 @@ class Schedule(NamedTuple):
 
 
 class Total(NamedTuple):
-    """All events of one kind in a window."""
+    """Sum of the events of one kind in a window."""
 
     kind: str
     events: int
     total_us: float
     share: float
-    """Of the window, 0..1."""
+    """Share of the window, 0..1."""
 
 
 def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     """Lay out one communication cycle, node by node.
 
-    The events of the cycle as its bus has them, then what is left of the slice. What takes no time is no event.
+    The events of the bus, then the idle rest of the slice. There are no events of zero duration.
 
     Parameters
     ----------
@@ -137,7 +136,7 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     closed = figures(profile, model=model)
     events = list(_laid_out(cycle_of(profile, model=model).events()))
     end_us = events[-1].end_us
-    # A slice that is filled but for the rounding of floats has nothing left.
+    # A rest that is only float rounding is no idle time.
     if not fits_in(closed.available_us, available_us=end_us):
         events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
     return Schedule(profile, closed, tuple(events), from_us=0.0, to_us=events[-1].end_us)
@@ -150,21 +149,21 @@ def zoom(
     to_us: float | None = None,
     transaction: tuple[str, int] | None = None,
 ) -> Schedule:
-    """Narrow the window of a schedule; several limits all hold.
+    """Narrow the window of a schedule to the intersection of all given limits.
 
     Parameters
     ----------
     plan
         The schedule.
     from_us, to_us
-        Start and end of the window, counted from the start of the cycle [us]; without them the schedule's own.
+        Start and end of the window, from the start of the cycle [us]; by default the schedule's own.
     transaction
-        One transaction with its gaps, as ("read", 1).
+        One transaction with its gaps: ("read", 1).
 
     Raises
     ------
     BusplanError
-        Nothing is left inside.
+        The window is empty.
     """
     start_us = max(plan.from_us, plan.from_us if from_us is None else from_us)
     end_us = min(plan.to_us, plan.to_us if to_us is None else to_us)
@@ -185,7 +184,7 @@ def zoom(
 
 
 def totals(plan: Schedule) -> tuple[Total, ...]:
-    """Add up the events of a window by kind, in the order in which they first come."""
+    """Sum the events of a window by kind, in order of first appearance."""
     sums: dict[str, list[float]] = {}
     for event in plan.events:
         sums.setdefault(event.kind, []).append(event.duration_us)
@@ -194,9 +193,9 @@ def totals(plan: Schedule) -> tuple[Total, ...]:
 
 
 def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
-    """Put events one behind the other.
+    """Place events one after the other.
 
-    The sum carries what each addition loses (Neumaier), so that an error cannot grow with the number of events.
+    Compensated summation (Neumaier) keeps rounding from growing with the number of events.
     """
     total_us = lost_us = start_us = 0.0
     for one in parts:

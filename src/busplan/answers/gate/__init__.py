@@ -1,8 +1,8 @@
-"""The gate's report in its formats: each is a class and a line in `FORMATS`."""
+"""Formats of the gate's report: each is a class and a line in `FORMATS`."""
 
 from abc import ABC, abstractmethod
 from importlib import import_module
-from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 if TYPE_CHECKING:
     from busplan.rules.report import CheckReport
@@ -11,37 +11,34 @@ if TYPE_CHECKING:
 class GateFormat(ABC):
     """One format of the gate's report."""
 
-    is_for_people: ClassVar[bool] = False
-    """Whether people read it, in the encoding of their terminal; a program reads UTF-8."""
-
     @abstractmethod
     def write(self, report: "CheckReport") -> str:
         """Write a report."""
 
-    def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats are all there is to read
-        """Lines for standard error beside it."""
+    def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats log nothing
+        """Further lines for standard error."""
         return []
 
 
 class Registered(NamedTuple):
-    """Where a format is, so that only the one that is asked for is loaded."""
+    """Location of a format, so that only the requested one is loaded."""
 
     module: str
-    """In this folder."""
+    """Module in this folder."""
     name: str
-    """Of its class."""
-    is_for_builds: bool = False
-    """Whether it is for a build service."""
+    """Name of the class."""
+    reader: Literal["people", "programs", "builds"]
+    """Who reads it. Only what people read is in the encoding of the terminal; all else is UTF-8."""
 
 
 FORMATS: Final[dict[str, Registered]] = {
-    "text": Registered("plain", "Text"),
-    "full": Registered("plain", "Full"),
-    "json": Registered("documents", "Json"),
-    "github": Registered("github", "GitHub", is_for_builds=True),
-    "gitlab": Registered("documents", "GitLab", is_for_builds=True),
-    "junit": Registered("junit", "JUnit", is_for_builds=True),
-    "sarif": Registered("sarif", "Sarif", is_for_builds=True),
+    "text": Registered("plain", "Text", "people"),
+    "full": Registered("plain", "Full", "people"),
+    "json": Registered("documents", "Json", "programs"),
+    "github": Registered("github", "GitHub", "builds"),
+    "gitlab": Registered("documents", "GitLab", "builds"),
+    "junit": Registered("junit", "JUnit", "builds"),
+    "sarif": Registered("sarif", "Sarif", "builds"),
 }
 """Every format by its name, in the order of the help."""
 

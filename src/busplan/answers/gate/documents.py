@@ -1,4 +1,4 @@
-"""Findings as JSON: our own document, and GitLab's code quality report."""
+"""Findings as JSON: the document of `check`, and GitLab's code quality report."""
 
 from pathlib import PurePath
 
@@ -10,7 +10,7 @@ from busplan.rules.report import CheckReport
 
 
 class Json(GateFormat):
-    """Our own document."""
+    """The document of `busplan check`."""
 
     def write(self, report: CheckReport) -> str:
         """Write files, findings and the summary."""
@@ -21,7 +21,7 @@ class GitLab(GateFormat):
     """GitLab's code quality report."""
 
     def write(self, report: CheckReport) -> str:
-        """Write one issue a finding."""
+        """Write one issue for each finding."""
         issues = [
             {
                 "description": f"{one.finding.code} {one.finding.message}",

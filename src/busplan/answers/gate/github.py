@@ -1,4 +1,4 @@
-"""Findings as workflow commands, which GitHub shows beside the line of the file."""
+"""Findings as workflow commands, which GitHub shows next to the line of the file."""
 
 from busplan.answers.gate import GateFormat
 from busplan.answers.gate.plain import Text
@@ -7,14 +7,14 @@ from busplan.rules.report import CheckReport, Located
 
 
 class GitHub(GateFormat):
-    """One workflow command a finding."""
+    """One workflow command for each finding."""
 
     def write(self, report: CheckReport) -> str:
         """Write the commands."""
         return "".join(f"{_command(one)}\n" for one in report.located)
 
     def log(self, report: CheckReport) -> list[str]:
-        """Every finding: GitHub shows ten annotations of a kind a step."""
+        """Every finding: GitHub shows only ten annotations of a severity in a step."""
         return Text().write(report).splitlines()
 
 
@@ -32,5 +32,5 @@ def _command(one: Located) -> str:
 
 def _escaped(text: str, *, property_: bool) -> str:
     text = text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
-    # What GitHub has no escape for commands no terminal either.
+    # GitHub has no escape for other control characters.
     return printable(text.replace(":", "%3A").replace(",", "%2C") if property_ else text)

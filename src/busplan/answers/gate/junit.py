@@ -1,4 +1,4 @@
-"""Findings as JUnit XML: one test case a profile, also when all is well."""
+"""Findings as JUnit XML: one test case for each profile, also without findings."""
 
 import re
 from typing import Final
@@ -14,7 +14,7 @@ _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ff
 
 
 class JUnit(GateFormat):
-    """One test case a profile."""
+    """One test case for each profile."""
 
     def write(self, report: CheckReport) -> str:
         """Write errors as failures, files that could not be checked as errors, warnings as output."""

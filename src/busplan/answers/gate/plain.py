@@ -1,4 +1,4 @@
-"""Findings as lines: for people, for editors, and for a build's log."""
+"""Findings as lines: for people, editors and build logs."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -10,11 +10,11 @@ from busplan.rules.finding import Finding
 from busplan.rules.report import CheckReport
 
 _WIDEST: Final = 160
-"""Of a line that is longer, `full` shows what stands around the finding."""
+"""Longest source line shown whole; of a longer one `full` shows the part around the finding."""
 
 
 def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
-    """Where a finding is, and what it says."""
+    """Place and message of a finding."""
     return f"{path}:{finding.line}:{finding.column}:", f"{finding.code} {finding.message}"
 
 
@@ -24,9 +24,7 @@ def finding_line(path: str, finding: Finding) -> str:
 
 
 class Text(GateFormat):
-    """One line a finding."""
-
-    is_for_people = True
+    """One line for each finding."""
 
     def write(self, report: CheckReport) -> str:
         """Write the lines."""
@@ -36,10 +34,8 @@ class Text(GateFormat):
 class Full(GateFormat):
     """Each finding with its line of the file and a caret below its column."""
 
-    is_for_people = True
-
     def write(self, report: CheckReport) -> str:
-        """Write some lines a finding."""
+        """Write the lines of each finding."""
         return "".join(f"{line}\n" for line in _full(report))
 
 
@@ -57,7 +53,7 @@ def _full(report: CheckReport) -> Iterator[str]:
 
 
 def _shown(source: str, offset: int) -> tuple[str, str]:
-    """Give a line as it is shown, and what of it stands before an offset."""
+    """A source line as shown, and its part before an offset."""
     harmless = "\t".join(printable(part, write=lambda _: " ") for part in source.split("\t"))
     if len(harmless) <= _WIDEST:
         return harmless, harmless[:offset]
@@ -68,7 +64,7 @@ def _shown(source: str, offset: int) -> tuple[str, str]:
 
 
 def _space(character: str) -> str:
-    """As much space as a character takes; a tab stays one, so that its width does not matter."""
+    """Spaces as wide as a character; a tab stays a tab, whatever its width."""
     if character == "\t":
         return character
     if category(character) in ("Mn", "Me"):

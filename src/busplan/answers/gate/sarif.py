@@ -1,4 +1,4 @@
-"""Findings as SARIF 2.1.0, the form that code scanning services read.
+"""Findings as SARIF 2.1.0, the format of code scanning services.
 
 References
 ----------
@@ -13,7 +13,7 @@ from urllib.parse import quote
 from busplan import __version__
 from busplan.answers.gate import GateFormat
 from busplan.buses.rule import Rule
-from busplan.forms.blocks import Document
+from busplan.forms.blocks import JsonDocument
 from busplan.printable import json_text
 from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport, Located
@@ -22,10 +22,10 @@ _SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 class Sarif(GateFormat):
-    """One run, for services that scan code."""
+    """One SARIF run."""
 
     def write(self, report: CheckReport) -> str:
-        """Write all rules, the results, and what could not be checked as notifications."""
+        """Write all rules and results; files that could not be checked are notifications."""
         failures = [file for file in report.files if file.failure is not None]
         run = {
             "tool": {
@@ -50,7 +50,7 @@ class Sarif(GateFormat):
         return json_text(document, indent=2) + "\n"
 
 
-def _rule(rule: Rule) -> Document:
+def _rule(rule: Rule) -> JsonDocument:
     return {
         "id": rule.code,
         "name": "".join(word.capitalize() for word in rule.name.split("-")),
@@ -61,7 +61,7 @@ def _rule(rule: Rule) -> Document:
     }
 
 
-def _result(one: Located) -> Document:
+def _result(one: Located) -> JsonDocument:
     finding = one.finding
     return {
         "ruleId": finding.code,
@@ -81,7 +81,7 @@ def _result(one: Located) -> Document:
 
 
 def _artifact(path: str) -> dict[str, str]:
-    """Place of a file: relative to the working folder where it lies below it, which its name then says."""
+    """URI of a file, relative to the working folder if the file is below it."""
     pure = PurePath(path)
     if pure.is_absolute() or ".." in pure.parts:
         return {"uri": Path(path).resolve().as_uri()}

@@ -1,13 +1,13 @@
-"""The parts of a page that the bus fills: verdict, timing models, timeline, terms, axes over the period."""
+"""Parts of a page on the bus: verdict, timing models, timeline, terms, axes over the period."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.capacity import capacity_table
 from busplan.answers.latency import latency_tables
-from busplan.answers.page.commands import Source
+from busplan.answers.page.commands import Sources
 from busplan.answers.timeline import timeline_chart, totals_table
 from busplan.answers.verdict import places_of, verdict_sentences
 from busplan.buses.figure import (
@@ -29,24 +29,23 @@ from busplan.forms.blocks import (
     Facts,
     Question,
     Sentence,
+    ShownValue,
     Swatch,
     Table,
     TableColumn,
     TableRow,
-    Value,
     Words,
+    attribute_value,
     count_value,
     sentence,
-    value_of,
 )
 from busplan.forms.numbers import nouns
 
-Sources = Mapping[str, Source]
 _OVER_PERIOD: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
 
 
 def bus_question(answer: AllAnswers, sources: Sources) -> Question:
-    """Does the cycle fit, and do the timing models agree?"""
+    """The question whether the cycle fits, with its verdict."""
     verdict, results = answer.verdict, answer.capacity.results
     word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
     if not verdict.models_agree:
@@ -56,11 +55,11 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     places = places_of(results, start=0, change=0)
     facts = (
         *(
-            (f"{MARGIN.label} ({one.timing_model})", value_of(MARGIN, one, at=places[one.timing_model]))
+            (f"{MARGIN.label} ({one.timing_model})", attribute_value(MARGIN, one, at=places[one.timing_model]))
             for one in results
         ),
         *(
-            (figure.label, value_of(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
+            (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
             for figure in (UTILISATION, BINDING_TERM, MAX_AXES)
         ),
     )
@@ -76,7 +75,7 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
 
 
 def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The timing models side by side: the whole cycle, and the latencies."""
+    """Capacity and latencies, the timing models side by side."""
     capacity, latency = sources["capacity"], sources["latency"]
     several = len(bus_of(answer.profile).timing_models) > 1
     return Chapter(
@@ -92,7 +91,7 @@ def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
 
 
 def timeline_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The cycle to scale."""
+    """The timeline, and the total of each kind of event."""
     return Chapter(Sentence(("The cycle to scale",)), tuple(_timeline(answer, sources)), "timeline")
 
 
@@ -102,7 +101,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
         return
     source, network = sources["timeline"], network_of(answer.profile)
     limit = bus_of(answer.profile).limit("nodes")
-    # The table says what more nodes take than a bus may have; drawn, they would be a page of their own.
+    # More nodes than a bus may have would make a huge drawing; the table has their figures.
     if limit is not None and limit.is_broken(network):
         yield Sentence((f"Not drawn: {limit.words(network)}.",))
     else:
@@ -112,7 +111,7 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 
 
 def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """Where the microseconds go."""
+    """The terms of the cycle, as bars and as a table."""
     results, source = answer.capacity.results, sources["capacity"]
     terms = (*bus_of(answer.profile).term_figures, LEFT)
     words = (TableColumn("term", kind="words"), TableColumn("eq", kind="words"))
@@ -128,14 +127,14 @@ def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
     return Chapter(Sentence(("Where the microseconds go",)), (chart, source.gives(table), source.line), "terms")
 
 
-def _of(term: Figure, answer: AllAnswers) -> Iterator[Value]:
+def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
     """A term under each timing model."""
     for number, one in enumerate(answer.capacity.results):
-        yield value_of(term, one, at=f"/results/{number}")
+        yield attribute_value(term, one, at=f"/results/{number}")
 
 
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """Axes against period."""
+    """The most axes over the period, as a chart and as a table."""
     source, steps = sources["axes"], answer.steps
     nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
     caption = sentence(
@@ -161,19 +160,19 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
 
 
 def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
-    """A row a period, the timing models behind one another."""
+    """One row for each period; the timing models one after the other."""
     number = 0
     for results in answer.periods.periods:
         period_us = results[0].period_us
-        cells = [value_of(PERIOD, results[0], at=f"/results/{number}")]
+        cells = [attribute_value(PERIOD, results[0], at=f"/results/{number}")]
         for one in results:
-            cells += (value_of(figure, one, at=f"/results/{number}") for figure in _OVER_PERIOD)
+            cells += (attribute_value(figure, one, at=f"/results/{number}") for figure in _OVER_PERIOD)
             number += 1
-        yield TableRow(tuple(cells), sought=period_us == answer.profile.cycle.period_us)
+        yield TableRow(tuple(cells), highlighted=period_us == answer.profile.cycle.period_us)
 
 
 def _curves(answer: AllAnswers) -> str:
-    """How the curves of the timing models are told apart."""
+    """Legend of the curves, if there are several."""
     if len(answer.steps) == 1:
         return ""
     return f": {answer.steps[0].timing_model} solid with a square, {answer.steps[1].timing_model} dashed with a diamond"

@@ -1,26 +1,25 @@
-"""The parts of a page that the circle test fills: verdict, drawing, figures, ranked sources."""
+"""Parts of a page on the circle test: verdict, drawing, figures, ranked error sources."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_drawing, circle_table, contributions_table
 from busplan.answers.circle_verdict import circle_sentences, servo_sentence
-from busplan.answers.page.commands import Source
+from busplan.answers.page.commands import Sources
 from busplan.buses.figure import by_key
-from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, value_of
+from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, attribute_value
 
 _QUESTION: Final = "Is the circle still round?"
 _KEYS: Final = (
     *("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm"),
     *("phase_margin_deg", "gain_margin_db"),
 )
-Sources = Mapping[str, Source]
 
 
 def circle_question(answer: AllAnswers, sources: Sources) -> Question:
-    """Is the circle still round?"""
+    """The question whether the circle is round, with its verdict."""
     result = answer.circle_figures
     if result is None:
         return Question(
@@ -31,7 +30,7 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
         )
     figures = by_key(CIRCLE_FIGURES)
     known = (key for key in _KEYS if getattr(result, key) is not None)
-    facts = ((figures[key].label, value_of(figures[key], result, at="/results/0")) for key in known)
+    facts = ((figures[key].label, attribute_value(figures[key], result, at="/results/0")) for key in known)
     question = Question(
         _QUESTION,
         Words("PASSED", "passes") if result.passed else Words("FAILED", "fails"),
@@ -66,7 +65,7 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
 
 
 def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
-    """What makes the circle less round, ranked; nothing without a simulation."""
+    """The ranked error sources; None without a simulation."""
     result = answer.circle_figures
     if result is None or result.contributions is None:
         return None

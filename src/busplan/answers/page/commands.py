@@ -1,7 +1,8 @@
-"""The commands that give a page's figures again, as a shell takes them."""
+"""The shell commands that reproduce the figures of a page."""
 
 import os
 import shlex
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
@@ -11,24 +12,28 @@ from busplan.answers.capacity import capacity_document
 from busplan.answers.circle import circle_document
 from busplan.answers.latency import latency_document
 from busplan.answers.timeline import timeline_document
-from busplan.forms.blocks import Command, Document, Made, with_values
-from busplan.printable import commands
+from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
+from busplan.printable import has_controls
 
 
 class Source(NamedTuple):
-    """One command, and the document that it writes: what figures are taken from."""
+    """A command and the JSON document that it writes."""
 
     command: Command
-    document: Document
+    document: JsonDocument
 
-    def gives(self, block: Made) -> Made:
-        """Say of every figure of a block that it stands in this document."""
+    def gives(self, block: BlockOrPart) -> BlockOrPart:
+        """Mark every figure of a block that has a place as one of this document."""
         return with_values(block, lambda value: value._replace(command=self.command.key if value.at else ""))
 
     @property
     def line(self) -> Command:
-        """The command for a reader to type, where it is not explained."""
+        """The command without its purpose and key."""
         return Command(self.command.line)
+
+
+Sources = Mapping[str, Source]
+"""The commands behind a profile's figures, by a short name."""
 
 
 def shell_word(text: str) -> str:
@@ -40,11 +45,11 @@ def shell_word(text: str) -> str:
     ("'line 1.toml'", './-x.toml', '-')
     """
     if text.startswith("-") and text != "-":
-        # No shell quoting keeps a program from taking it for an option.
+        # The program would take it for an option, whatever the quotes.
         text = f"./{text}"
-    if not commands(text):
+    if not has_controls(text):
         return shlex.quote(text)
-    # Bytes that no page can show; bash, zsh and POSIX of 2024 read them in this form.
+    # Control characters need $'...', which bash, zsh and POSIX 2024 support.
     return f"$'{''.join(map(_escaped, os.fsencode(text)))}'"
 
 
@@ -54,7 +59,7 @@ def _escaped(byte: int) -> str:
 
 
 def period_option(period_us: float) -> tuple[str, str]:
-    """The option that gives exactly this period.
+    """The --period option for exactly this period.
 
     Examples
     --------
@@ -65,24 +70,24 @@ def period_option(period_us: float) -> tuple[str, str]:
 
 
 def sources(answer: AllAnswers, *, argument: str, key: str, other_period: bool) -> dict[str, Source]:
-    """List the commands behind one profile's figures, each with the document that it writes.
+    """The commands behind one profile's figures, by a short name.
 
     Parameters
     ----------
     answer
-        Everything that is said of the profile.
+        All answers of the profile.
     argument
         The PROFILE argument.
     key
-        Beginning of the ids.
+        Prefix of the keys.
     other_period
-        Whether its period is not that of its file.
+        Whether its period differs from that of its file.
     """
     own = period_option(answer.profile.cycle.period_us) if other_period else ()
     each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
     found: dict[str, Source] = {}
 
-    def add(name: str, purpose: str, document: Document, *options: str) -> None:
+    def add(name: str, purpose: str, document: JsonDocument, *options: str) -> None:
         words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
         found[name] = Source(Command(" ".join(words), purpose, f"{key}-{name}"), document)
 

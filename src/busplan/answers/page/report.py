@@ -1,6 +1,6 @@
-"""Answer of `busplan report`: all that is said of one or several profiles on one page."""
+"""Answer of `busplan report`: all answers for one or several profiles on one page."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
@@ -10,7 +10,7 @@ from busplan.answers.assumptions import assumptions_table
 from busplan.answers.documents import document
 from busplan.answers.page.bus import axes_part, bus_question, models_part, terms_part, timeline_part
 from busplan.answers.page.circle import circle_part, circle_question, sources_part
-from busplan.answers.page.commands import Source, shell_word, sources
+from busplan.answers.page.commands import Sources, shell_word, sources
 from busplan.buses.figure import (
     AVAILABLE,
     AXES,
@@ -29,17 +29,17 @@ from busplan.forms.blocks import (
     Cell,
     Chapter,
     Code,
-    Document,
     Facts,
+    JsonDocument,
     Report,
     SectionLink,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
+    attribute_value,
     figure_value,
-    value_of,
 )
 from busplan.forms.numbers import MISSING, plural
 
@@ -54,16 +54,16 @@ class ReportedProfile(NamedTuple):
     """The PROFILE argument."""
     answer: AllAnswers
     other_period: bool
-    """Whether its period is not that of its file."""
+    """Whether its period differs from that of its file."""
 
 
 class _Subject(NamedTuple):
-    """A profile with the commands behind its figures."""
+    """A profile and the commands behind its figures."""
 
     key: str
     origin: str
     answer: AllAnswers
-    sources: Mapping[str, Source]
+    sources: Sources
 
     @property
     def name(self) -> str:
@@ -71,14 +71,14 @@ class _Subject(NamedTuple):
 
 
 def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None) -> Report:
-    """Put the page together: a chapter for each profile and, for several, a comparison in front.
+    """Make the page: a chapter for each profile, after a comparison if there are several.
 
     Parameters
     ----------
     profiles
         One or more.
     title
-        Heading of the page; without it the profile's name, or how many there are.
+        Title of the page; by default the profile's name, or the number of profiles.
     """
     subjects = [
         _Subject(
@@ -98,8 +98,8 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
     )
 
 
-def _document(subjects: Sequence[_Subject]) -> Document:
-    """Document of `busplan report --format json`: for each profile, those of the commands behind its figures."""
+def _document(subjects: Sequence[_Subject]) -> JsonDocument:
+    """Document of `busplan report --format json`: for each profile, the documents of its commands."""
     return document(
         "report",
         profiles=[
@@ -119,7 +119,7 @@ def _blocks(subjects: Sequence[_Subject]) -> Iterator[Block]:
 
 
 def _chapter(subject: _Subject) -> Iterator[Block]:
-    """All of one profile."""
+    """All blocks of one profile."""
     answer, found = subject.answer, subject.sources
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
@@ -141,13 +141,13 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
 
 
 def _facts(subject: _Subject) -> Facts:
-    """How the bus is set, and where the profile is from."""
+    """Settings of the bus, and the PROFILE argument."""
     bus, figures = bus_of(subject.answer.profile), subject.answer.capacity.results[0]
     setup = (one for one in bus.setup_figures if one.key in bus.facts)
 
-    def item(name: str, figure: Figure) -> tuple[str, Value]:
+    def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""
-        return name, Value(getattr(figures, figure.key), figure.key, unit, at=f"/results/0/{figure.key}")
+        return name, ShownValue(getattr(figures, figure.key), figure.key, unit, at=f"/results/0/{figure.key}")
 
     items = (
         *(item("nodes", NODES), item("axes", AXES)),
@@ -155,16 +155,16 @@ def _facts(subject: _Subject) -> Facts:
         *(item("period", PERIOD), item("slice", AVAILABLE)),
         (
             "deciding model",
-            Value(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key, at="/verdicts/0/timing_model"),
+            ShownValue(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key, at="/verdicts/0/timing_model"),
         ),
     )
     return Facts((*subject.sources["capacity"].gives(items), ("profile", Code(subject.origin))))
 
 
-def _commands(found: Mapping[str, Source]) -> Chapter:
+def _commands(found: Sources) -> Chapter:
     columns = (TableColumn("what", kind="words"), TableColumn("command", kind="words"))
     rows = tuple(TableRow((source.command.purpose, source.command)) for source in found.values())
-    line = "Every figure above stands in the JSON document of one of these commands, to its last digit."
+    line = "The JSON document of one of these commands has each figure above, with all its digits."
     table = Table(columns, rows, Sentence(("Commands",)), stacks=True)
     return Chapter(Sentence(("How to get every figure again",)), (Sentence((line,)), table), "commands")
 
@@ -194,16 +194,16 @@ def _compared(subject: _Subject, models: Sequence[str]) -> tuple[Cell, ...]:
     own, figures = f"/results/{numbers[verdict.deciding.timing_model]}", verdict.deciding
 
     margins = (
-        value_of(MARGIN, results[numbers[one]], at=f"/results/{numbers[one]}") if one in numbers else MISSING
+        attribute_value(MARGIN, results[numbers[one]], at=f"/results/{numbers[one]}") if one in numbers else MISSING
         for one in models
     )
     agree = figure_value(FITS, verdict.models_agree, at="/verdicts/0/models_agree")._replace(key="models_agree")
     bus = (
-        value_of(FITS, figures, at="/verdicts/0"),
+        attribute_value(FITS, figures, at="/verdicts/0"),
         agree,
-        *(value_of(figure, figures, at=own) for figure in (PERIOD, NODES, AXES, UTILISATION)),
+        *(attribute_value(figure, figures, at=own) for figure in (PERIOD, NODES, AXES, UTILISATION)),
         *margins,
-        value_of(MAX_AXES, figures, at=own),
+        attribute_value(MAX_AXES, figures, at=own),
     )
     link = SectionLink(subject.name, subject.key, subject.origin)
     return link, *found["capacity"].gives(bus), *_compared_circle(subject)
@@ -214,4 +214,6 @@ def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
     if result is None:
         return MISSING, MISSING, MISSING, "not run"
     figures = (*_MEASURES, "passed")
-    return subject.sources["circle"].gives(tuple(value_of(_CIRCLE[key], result, at="/results/0") for key in figures))
+    return subject.sources["circle"].gives(
+        tuple(attribute_value(_CIRCLE[key], result, at="/results/0") for key in figures)
+    )

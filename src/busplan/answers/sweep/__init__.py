@@ -1,1 +1,1 @@
-"""`busplan sweep`: every row as text, and the best of them for people."""
+"""Answer of `busplan sweep`: every row as text, or the top rows for people."""

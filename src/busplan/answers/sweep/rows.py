@@ -1,6 +1,6 @@
-"""Rows of a sweep as CSV, JSON lines and one JSON document, a block at a time.
+"""Rows of a sweep as CSV, JSON lines and one JSON document, block by block.
 
-A value is written once for all the rows that share it: that, and one join a row, is what makes millions of rows quick.
+For speed, a value is written once for all rows that share it, and each row is a single join.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -9,16 +9,16 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from busplan.analysis.sweep.blocks import Block, Column
+from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.answers.documents import document
-from busplan.forms.blocks import Document
+from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
 
 Style = Literal["csv", "jsonl"]
 TEXT_POINTS: Final = 4096
-"""Points of a block that is written as text: its cells are in memory together."""
+"""Points of a block written as text: all its cells are in memory at once."""
 
 
 def csv_header(columns: Sequence[str]) -> str:
@@ -27,30 +27,30 @@ def csv_header(columns: Sequence[str]) -> str:
 
 
 def jsonl_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
-    """First line of a sweep's JSON lines: what the rows are, and how many make it whole."""
+    """First line of a sweep's JSON lines: what the rows are, and how many a complete sweep has."""
     facts = {**_facts(profile, grid, timing_models), "rows": grid.points * len(timing_models)}
     return json_text(facts) + "\n"
 
 
 def json_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
-    """Beginning of a sweep's JSON document, up to its first row."""
+    """Start of a sweep's JSON document, up to its first row."""
     facts = json_text(_facts(profile, grid, timing_models))
     return facts.removesuffix("}") + ', "rows": [\n'
 
 
-def json_rows(block: Block, columns: Sequence[str]) -> str:
-    """Write a block's rows for the JSON document, a line each: the lines of JSON lines, with commas between."""
+def json_rows(block: SweepBlock, columns: Sequence[str]) -> str:
+    """Write a block's rows for the JSON document, one per line, separated by commas."""
     rows = block_text(block, columns, style="jsonl").removesuffix("\n").replace("\n", ",\n")
     return rows if block.chunk.start == 0 else ",\n" + rows
 
 
 def json_footer(*, complete: bool) -> str:
-    """End of a sweep's JSON document: it is valid JSON even where the sweep was stopped, and says so."""
+    """End of a sweep's JSON document, also of a stopped sweep: valid JSON that says whether it is complete."""
     return f'\n], "complete": {json_text(complete)}}}\n'
 
 
-def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> Document:
-    """What every JSON form of a sweep begins with."""
+def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> JsonDocument:
+    """Common beginning of the JSON forms of a sweep."""
     return document(
         "sweep",
         profile=profile,
@@ -60,17 +60,17 @@ def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> Document:
     )
 
 
-def block_text(block: Block, columns: Sequence[str], *, style: Style) -> str:
+def block_text(block: SweepBlock, columns: Sequence[str], *, style: Style) -> str:
     """Write a block's rows, each with its line end.
 
     Parameters
     ----------
     block
-        Part of a sweep, of not much more than `TEXT_POINTS`.
+        Part of a sweep, of about `TEXT_POINTS` or fewer.
     columns
         Which columns, in this order.
     style
-        "csv" or "jsonl"; values are written as `capacity --format csv` and `json` write them.
+        "csv" or "jsonl"; values are written as in `capacity --format csv` and `json`.
     """
     models = [_rows(block, model, columns, style) for model in range(len(block.models))]
     rows = [""] * (len(models) * block.chunk.points)
@@ -79,7 +79,7 @@ def block_text(block: Block, columns: Sequence[str], *, style: Style) -> str:
     return "".join(rows)
 
 
-def _rows(block: Block, model: int, columns: Sequence[str], style: Style) -> Iterable[str]:
+def _rows(block: SweepBlock, model: int, columns: Sequence[str], style: Style) -> Iterable[str]:
     """Rows of one timing model."""
     separator, opening, closing = (", ", "{", "}\n") if style == "jsonl" else (",", "", "\n")
     cells: list[Array] = []
@@ -87,7 +87,7 @@ def _rows(block: Block, model: int, columns: Sequence[str], style: Style) -> Ite
         own = _texts(block.columns(name)[model], style)
         if style == "jsonl":
             own = f"{json_text(name)}: " + own
-        # Neighbours that vary alike, and less than the rows do, are one cell.
+        # Neighbouring cells of the same shape, smaller than the block, are joined once.
         if cells and cells[-1].shape == own.shape and own.size < block.chunk.points:
             cells[-1] = cells[-1] + separator + own
         else:

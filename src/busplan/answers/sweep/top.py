@@ -1,4 +1,4 @@
-"""Answer of `busplan sweep` for people: how many points fit, and the rows at the top."""
+"""Answer of `busplan sweep` for people: how many points fit, and the top rows."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isnan
@@ -7,20 +7,20 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
-from busplan.analysis.sweep.blocks import Block
+from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Array
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.forms.blocks import (
     Code,
-    Document,
+    JsonDocument,
     Record,
     Report,
     Sentence,
+    ShownValue,
     Table,
     TableColumn,
     TableRow,
-    Value,
     count_value,
     figure_value,
     joined,
@@ -38,13 +38,13 @@ DEFAULT_COLUMNS: Final = (
     "limited_by",
     "fits",
 )
-"""Figures of a table where none were asked for."""
+"""Default figures of a table."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
-"""And those of circle tests."""
+"""Default figures of circle tests."""
 
 
 class Tally:
-    """Counts a sweep's points, and those that fit, block by block.
+    """Counts the points of a sweep and those that fit, block by block.
 
     Parameters
     ----------
@@ -64,10 +64,10 @@ class Tally:
 
     @property
     def rows(self) -> int:
-        """Rows so far: a point has one under each timing model."""
+        """Rows so far: one for each point and timing model."""
         return self.points * len(self._models)
 
-    def add(self, block: Block) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Count one more block."""
         points = block.chunk.points
         self.points += points
@@ -75,7 +75,7 @@ class Tally:
             self._fits[number] += _share(figures["fits"].values, points)
         safety = self.bus.safety_figure
         if safety is not None:
-            # The same under every model: how the bus is set is the profile's.
+            # Settings of the bus are the same under every model.
             self._unsafe += points - _share(block.models[0][safety.key].values, points)
         if "passed" in block.models[0]:
             passed = [_share(figures["passed"].values, points) for figures in block.models]
@@ -83,12 +83,12 @@ class Tally:
             self._passed = [old + new for old, new in zip(before, passed, strict=True)]
 
     def sentences(self, name: str, *, expected: int) -> Iterator[Sentence]:
-        """Summary of all that was counted.
+        """Summary of the counts.
 
         Parameters
         ----------
         name
-            The profile's.
+            Name of the profile.
         expected
             Points of the whole grid.
         """
@@ -118,30 +118,30 @@ class Tally:
 
 
 def _share(flags: Array, points: int) -> int:
-    """How many points of a block a flag holds for, from its values before they broadcast."""
+    """Number of points of a block for which a flag is True, from its values before broadcasting."""
     count = int(flags.sum())
     return count * (points // int(flags.size))
 
 
 class TopRow(NamedTuple):
-    """One of the rows at the top."""
+    """One of the top rows."""
 
     rank: float
-    """What it is sorted by, the smallest first."""
+    """Sort key, the smallest first."""
     number: int
-    """Its place among all rows."""
+    """Index among all rows."""
     record: Record
 
 
 class TopRows:
-    """The first rows of a sweep, or those with the largest or smallest of one figure, in bounded memory.
+    """The first rows of a sweep, or those with the largest or smallest value of one figure, in bounded memory.
 
     Parameters
     ----------
     columns
         Columns to keep.
     sort_by
-        Column to sort by; without it rows stay in the order of the grid.
+        Column to sort by; None for the order of the grid.
     ascending
         Smallest first.
     top
@@ -154,7 +154,7 @@ class TopRows:
         self._sort_by, self._top = sort_by, top
         self._sign = 1.0 if ascending else -1.0
 
-    def add(self, block: Block) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Take one more block."""
         if self._sort_by is None:
             rows = block.chunk.points * len(block.models)
@@ -163,39 +163,41 @@ class TopRows:
             return
         ranks = self._sign * block.rows(self._sort_by).astype(float)
         worst = self.kept[-1].rank if len(self.kept) >= self._top else np.inf
-        # What does not exist (NaN) has no rank; of equals, the first in the grid stays.
+        # NaN never ranks; among equals, the first in the grid stays.
         better = np.flatnonzero(ranks < worst)
         best = better[np.argsort(ranks[better], kind="stable")[: self._top]]
         self.kept += [self._row(block, int(index), rank=float(ranks[index])) for index in best]
         self.kept = sorted(self.kept, key=lambda row: row.rank)[: self._top]
 
-    def _row(self, block: Block, index: int, *, rank: float) -> TopRow:
+    def _row(self, block: SweepBlock, index: int, *, rank: float) -> TopRow:
         number = block.chunk.start * len(block.models) + index
         return TopRow(rank, number, block.row(index, self.columns))
 
     @property
     def order(self) -> str:
-        """How they are sorted, in words."""
+        """The sort order in words."""
         if self._sort_by is None:
             return ""
         return f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first"
 
 
-def sweep_report(top: TopRows, tally: Tally, *, name: str, expected: int, document: Callable[[], Document]) -> Report:
-    """Answer the question of `sweep`, with a few of its rows.
+def sweep_report(
+    top: TopRows, tally: Tally, *, name: str, expected: int, document: Callable[[], JsonDocument]
+) -> Report:
+    """Report of `sweep` with its top rows.
 
     Parameters
     ----------
     top
         The rows to show.
     tally
-        All points, counted.
+        Counts of all points.
     name
-        The profile's.
+        Name of the profile.
     expected
         Points of the whole grid.
     document
-        Gives all rows.
+        Function that returns the document with all rows.
     """
     return Report(
         Sentence(("Sweep of ", Code(name))),
@@ -214,7 +216,7 @@ def _shown(top: TopRows, tally: Tally) -> Sentence:
 
 
 def top_table(top: TopRows, bus: Bus) -> Table:
-    """The rows at the top, under the names that --columns and --sort take."""
+    """The top rows; headings are the names that --columns and --sort take."""
     figures = by_key((*CIRCLE_FIGURES, *bus.capacity_figures))
     return Table(
         tuple(_column(name, figures.get(name)) for name in top.columns),
@@ -225,20 +227,20 @@ def top_table(top: TopRows, bus: Bus) -> Table:
 def _column(name: str, figure: Figure | None) -> TableColumn:
     if figure is None:
         return TableColumn(name)
-    # All other units are said by the names.
+    # The name ends in any other unit.
     unit = "%" if figure.column == "%" else ""
     return TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures")
 
 
-def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[Value]:
+def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:
     for name, own in row.record.items():
         at = f"/rows/{row.number}/{name}"
         value = None if isinstance(own, float) and isnan(own) else own
         figure = figures.get(name)
         if figure is None:
-            yield Value(value, name, at=at)
+            yield ShownValue(value, name, at=at)
         else:
             shown = figure_value(figure, value, at=at)
-            # In the unit that the column's name says; a length in mm has the digits of one in um.
+            # In the unit of the column's name; a length in mm has three more decimals than one in um.
             finer = 3 if figure.unit == "mm" and figure.column == "um" else 0
             yield shown._replace(unit=figure.unit or shown.unit, decimals=shown.decimals and shown.decimals + finer)

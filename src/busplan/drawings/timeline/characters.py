@@ -1,4 +1,4 @@
-"""A timeline for the terminal: to scale, in characters that every terminal has."""
+"""A timeline to scale, in ASCII characters."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
@@ -24,21 +24,21 @@ from busplan.forms.lines import BLANK, Line
 from busplan.forms.scale import ticks
 
 NARROWEST: Final = 60
-"""Columns below which a drawing would show nothing."""
+"""Least columns of a drawing."""
 _TICK_COLUMNS: Final = 9
 _OVER: Final = "!"
 _WINDOW: Final = "^"
 
 
 def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
-    """Draw the whole slice in one strip, and the lanes of the window.
+    """Draw the whole slice as a strip, and the window in lanes.
 
     Parameters
     ----------
     plan
         The schedule, narrowed to its window.
     width
-        Columns of the terminal.
+        Width of the drawing, in columns.
     """
     width = max(width, NARROWEST)
     window = drawn_window(plan)
@@ -47,7 +47,7 @@ def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
 
 
 def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
-    """The whole slice in one row, transaction by transaction, and what lies beyond it."""
+    """The whole slice in one row, transaction by transaction, and the time beyond it."""
     parts = stretches(plan.cycle_events)
     styles = {one.kind: kind_of(plan.profile, one.kind) for one in parts}
     rows = {"cycle": [(styles[one.kind].mark, one.event) for one in parts]}
@@ -68,7 +68,7 @@ def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
 
 
 def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
-    """A row for each node, every column showing what takes most of it."""
+    """A row for each node; a column shows the kind that takes most of its time."""
     lanes = node_lanes(window)
     gutter = max(len(lane.label) for lane in lanes)
     bar = _Bar(window.from_us, window.to_us, width - gutter - 3)
@@ -89,7 +89,7 @@ def _marked(window: Schedule, lane: Lane) -> list[tuple[str, Event]]:
 
 
 def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
-    """A row for each event, with how long it takes."""
+    """A row for each event, with its duration."""
     lanes, owner = event_lanes(window), only_owner(window)
     figures = [time_text(event.duration_us) for event in window.events]
     gutter, digits = max(len(lane.label) for lane in lanes), max(map(len, figures))
@@ -102,14 +102,14 @@ def _event_rows(window: Schedule, *, width: int) -> Iterator[Line]:
 
 
 class _Bar:
-    """A row of columns to scale.
+    """A time scale in columns.
 
     Parameters
     ----------
     from_us, to_us
-        What it spans [us].
+        Start and end [us].
     columns
-        How many columns.
+        Number of columns.
     """
 
     def __init__(self, from_us: float, to_us: float, columns: int) -> None:
@@ -125,10 +125,10 @@ class _Bar:
         return min(self._columns - 1, max(0, int((time_us - self._from_us) / self._column_us)))
 
     def cells(self, parts: Iterable[tuple[str, Event]]) -> str:
-        """Fill each column with the mark of what takes most of it; nothing that is there is left out of its column."""
+        """Fill each column with the mark that takes most of its time, or a space."""
         shares: list[dict[str, float]] = [{} for _ in range(self._columns)]
         for mark, event in parts:
-            # What only touches a column by the rounding of floats is not in it.
+            # Ignore overlaps that are only float rounding.
             least_us = min(self._column_us, event.duration_us) * 1e-6
             for column in range(self._column(event.start_us), self._column(event.end_us) + 1):
                 start_us = self._from_us + column * self._column_us
@@ -138,7 +138,7 @@ class _Bar:
         return "".join(max(share, key=lambda mark: share[mark]) if share else " " for share in shares)
 
     def scale(self, indent: int) -> Line:
-        """Round times under their columns."""
+        """Labels of round times below their columns."""
         text = " " * self._columns
         for tick in ticks(self._from_us, self._to_us, most=max(2, self._columns // _TICK_COLUMNS)):
             at = self._column(tick.at_us)
@@ -149,7 +149,7 @@ class _Bar:
 
 
 def _wrapped(head: str, words: Sequence[str], *, width: int) -> Iterator[Line]:
-    """Words behind one another, in lines that fit the width."""
+    """Wrap a list of words to the width."""
     line = head
     for number, word in enumerate(words):
         piece = word if number == len(words) - 1 else f"{word}, "

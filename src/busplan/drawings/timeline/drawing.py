@@ -1,4 +1,4 @@
-"""The timeline of a cycle in every way that it is drawn inside an answer."""
+"""The timeline of a cycle inside an answer."""
 
 from busplan.analysis.timeline.schedule import Schedule
 from busplan.drawings.timeline.characters import timeline_lines
@@ -17,7 +17,7 @@ class TimelineDrawing(Drawing):
     plan
         The schedule, narrowed to its window.
     title
-        What it tells, in a sentence.
+        Title: its message in a sentence.
     """
 
     stylesheet = stylesheet()
@@ -26,11 +26,11 @@ class TimelineDrawing(Drawing):
         self._plan, self._title = plan, title
 
     def svg(self) -> str:
-        """Draw it without the style sheet and the words that a page has once."""
+        """Draw it without the style sheet and text, which the page has."""
         return timeline_svg(self._plan, title=self._title, inline=True)
 
     def characters(self, width: int) -> list[Line]:
-        """Draw the whole slice in one strip, and the lanes of the window."""
+        """Draw the whole slice as a strip, and the window in lanes."""
         return timeline_lines(self._plan, width=width)
 
     def mermaid(self) -> str:

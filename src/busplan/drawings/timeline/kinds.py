@@ -1,4 +1,4 @@
-"""How the events of a timeline are called."""
+"""Names of the events of a timeline."""
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Event
@@ -7,11 +7,11 @@ from busplan.sections.profile import Profile
 
 
 def kind_of(profile: Profile, key: str) -> EventKind:
-    """How an event, or a stretch of events, is called and drawn on the profile's kind of bus."""
+    """Name and style of an event, or of a stretch of events, on the profile's kind of bus."""
     return bus_of(profile).event_kind(key)
 
 
 def event_title(event: Event) -> str:
-    """Name one event with the transaction it belongs to."""
+    """Name of an event with its transaction."""
     owner = f"{event.transaction} of node {event.node}: " if event.node is not None else ""
     return f"{owner}{event.label}"

@@ -10,23 +10,23 @@ from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import Stretch, overruns, stretches
 
 MOST_EVENTS: Final = 40
-"""Mermaid gives each task a row: up to this many events are shown each, more of them transaction by transaction."""
+"""Up to this many events are a task each; more are merged by transaction, because every task takes a row."""
 _NS_PER_US: Final = 1000
 _FINE_US: Final = 20.0
-"""Window below which whole us are too coarse for the axis."""
+"""In a shorter window, the axis needs fractions of a us."""
 _PLAIN: Final = re.compile(r"[^A-Za-z0-9 .,()+/-]")
 _TAGS: Final[Mapping[Ink, str]] = {"work": "active, ", "gap": "done, ", "long-gap": "done, ", "idle": "done, "}
 
 
 def timeline_mermaid(plan: Schedule, *, title: str) -> str:
-    """Write a gantt chart; one second of Mermaid's clock stands for one us, so that its axis counts us.
+    """Write a gantt chart; one second of Mermaid's clock is one us, so that the axis counts us.
 
     Parameters
     ----------
     plan
         The schedule, narrowed to its window.
     title
-        What it tells, in a sentence.
+        Title: its message in a sentence.
     """
     fine = plan.to_us - plan.from_us < _FINE_US
     head = [
@@ -39,7 +39,7 @@ def timeline_mermaid(plan: Schedule, *, title: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """Write text so that nothing of it is Mermaid's syntax: all but plain characters as entity codes.
+    """Escape text for Mermaid: all but plain characters become entity codes.
 
     Examples
     --------

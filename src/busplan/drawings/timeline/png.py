@@ -1,4 +1,4 @@
-"""A timeline as PNG. Needs the extra `plot` (matplotlib); load it only where that is there."""
+"""A timeline as PNG. Importing this module needs the extra `plot` (matplotlib)."""
 
 from io import BytesIO
 from textwrap import wrap
@@ -33,29 +33,29 @@ _OVER: Final = "#b3261e"
 _TITLE_CHARACTERS: Final = 110
 _LANE_INCHES: Final = 0.28
 _MOST_LANE_INCHES: Final = 60.0
-"""Height of the lanes at most: thousands of them become thin, the sheet does not grow without end."""
+"""Largest height of all lanes: very many become thin."""
 
 
 def timeline_png(plan: Schedule, *, title: str) -> bytes:
-    """Draw the slice in one strip, the window in lanes, and the legend with what each kind takes.
+    """Draw the slice as a strip, the window in lanes, and a legend with the total of each kind.
 
     Parameters
     ----------
     plan
         The schedule, narrowed to its window.
     title
-        What it tells, in a sentence.
+        Title: its message in a sentence.
 
     Returns
     -------
     bytes
-        The file's content; the same for the same schedule.
+        Content of the file. The same schedule always gives the same bytes.
     """
     window = drawn_window(plan)
     lanes = _lanes(window)
     lane_inches = min(_LANE_INCHES * len(lanes) + 0.6, _MOST_LANE_INCHES)
     buffer = BytesIO()
-    # Names in a profile are text: a dollar sign starts no formula.
+    # A dollar sign in a name starts no formula.
     with rc_context({"text.parse_math": False}):
         figure = Figure(figsize=(11.0, lane_inches + 2.9), layout="constrained")
         strip, area = figure.subplots(2, 1, height_ratios=(0.7, lane_inches))
@@ -65,7 +65,7 @@ def timeline_png(plan: Schedule, *, title: str) -> bytes:
         _draw(area, lanes, window)
         figure.legend(handles=_legend(plan), loc="outside lower center", ncols=3, fontsize=8, frameon=False)
         with catch_warnings():
-            # A name in a script that the font does not have shows boxes; that is no reason to warn for each letter.
+            # Letters that the font lacks become boxes; do not warn about each.
             simplefilter("ignore", UserWarning)
             figure.savefig(buffer, format="png", dpi=120)
     return buffer.getvalue()
@@ -84,13 +84,13 @@ def _colour(plan: Schedule, kind: str) -> str:
 
 
 def _bar(axes: Any, event: Event, *, lane: float, colour: str, height: float = 0.8) -> None:
-    # Not moved to whole pixels: bars of a few pixels keep their share.
+    # Without snapping to pixels, bars of a few pixels keep their width.
     span = (event.start_us, event.duration_us)
     axes.broken_barh([span], (lane - height / 2, height), facecolors=colour, linewidth=0, snap=False)
 
 
 def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
-    """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
+    """Draw the whole slice as one bar, transaction by transaction, with the window of the lanes."""
     parts = stretches(plan.cycle_events)
     for one in parts:
         _bar(axes, one.event, lane=0.0, colour=_colour(plan, one.kind))
@@ -124,7 +124,7 @@ def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
 
 
 def _over(axes: Any, plan: Schedule) -> None:
-    """Show where the slice ends, and what lies beyond."""
+    """Mark the end of the slice and the time beyond it."""
     part = beyond(plan)
     axes.axvspan(part.start_us, part.end_us, color=_OVER, alpha=0.16, linewidth=0, zorder=0)
     axes.axvline(part.start_us, color=_OVER, linewidth=1.5)

@@ -1,4 +1,4 @@
-"""A timeline as one SVG, for a page or alone: bars stretch with the width, words keep their size, light and dark."""
+"""A timeline as SVG, in a page or as a file: bars scale with the width, text keeps its size; light and dark."""
 
 from collections.abc import Iterable, Sequence
 from textwrap import wrap
@@ -25,34 +25,34 @@ from busplan.drawings.timeline.lanes import (
 from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import written
+from busplan.forms.numbers import figure_text
 from busplan.forms.svg import LINE, Scale, drawing, inside, markup, text_at
 
 _LINE_CHARACTERS: Final = 44
-"""Characters of a line of words: what a phone shows at this size."""
+"""Characters in a line of text: fits on a phone."""
 _BAR: Final = 18
 _GAP: Final = 14
 _PHONE: Final = 335
-"""Width that a phone shows, margins left away."""
+"""Width of a phone without margins, in px."""
 _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _MOST_BARS: Final = 400
-"""Bars in the lanes of a page: beyond them a transaction is one, for a page is read and not measured."""
+"""Most bars in the lanes of a page; with more events, a bar is a transaction."""
 
 
 def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
-    """Draw the slice in one strip, the window in lanes, and the legend with what each kind takes.
+    """Draw the slice as a strip, the window in lanes, and a legend with the total of each kind.
 
-    It has no width of its own: it fills what it is put into, from 320 px on.
+    It fills the width of its container, from 320 px on.
 
     Parameters
     ----------
     plan
         The schedule, narrowed to its window.
     title
-        What it tells, in a sentence.
+        Title: its message in a sentence.
     inline
-        For a page that has the style sheet once, and verdict, subject and legend in its own words: without these.
+        If True, leave out style sheet, verdict, subject and legend: the page has them.
     """
     root = drawing(title, css="busplan-timeline")
     SubElement(root, "desc").text = sentence_text(subject(plan))
@@ -74,19 +74,19 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
 
 
 def is_coarse(window: Schedule) -> bool:
-    """Whether a page draws a bar for a transaction, and not for each of its events."""
+    """Whether a page draws a bar for each transaction instead of each event."""
     return len(window.events) > _MOST_BARS
 
 
 def _above(body: Element, plan: Schedule, window: Schedule, *, title: str) -> int:
-    """The verdict and what is shown, in words; the height below them."""
+    """Draw the verdict and the subject as text, and return the y below them."""
     height = _words(body, title, y=8, css="head" if plan.figures.fits else "head bad")
     return _words(body, sentence_text(charged(window)), y=height, css="small")
 
 
 def _words(parent: Element, text: str, *, y: int, css: str) -> int:
-    """Words in lines that a phone shows; the height below them."""
-    # Letters of some scripts are twice as wide.
+    """Draw wrapped text, and return the y below it."""
+    # Letters of other scripts may be twice as wide.
     for line in wrap(text, _LINE_CHARACTERS if text.isascii() else _LINE_CHARACTERS // 2):
         y += LINE
         text_at(parent, line, x="0", y=y - 5, css=css)
@@ -94,7 +94,7 @@ def _words(parent: Element, text: str, *, y: int, css: str) -> int:
 
 
 def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
-    """The whole slice in one bar, transaction by transaction, with the window that is drawn below."""
+    """Draw the whole slice as one bar, transaction by transaction, with the window of the lanes."""
     parts = stretches(plan.cycle_events)
     y = _strip_legend(body, plan, parts, y=_words(body, strip_title(plan), y=y, css="head")) + 4
     scale = Scale(0.0, plan.end_us)
@@ -110,7 +110,7 @@ def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
 
 
 def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], *, y: int) -> int:
-    """The colours of the strip, as many in a line as a phone shows; the height below them."""
+    """Draw the colours of the strip, wrapped for a phone, and return the y below them."""
     x = 0
     for key in dict.fromkeys(one.kind for one in parts):
         kind = kind_of(plan.profile, key)
@@ -124,13 +124,13 @@ def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], *, y:
 
 
 def _over(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int) -> None:
-    """Shade what lies beyond the slice, behind the bars."""
+    """Shade the time beyond the slice, behind the bars."""
     part = beyond(plan)
     scale.rect(parent, part, y=y, height=height, css="over", title=_tip("beyond the slice", part))
 
 
 def _edge(parent: Element, plan: Schedule, scale: Scale, *, y: int, height: int) -> None:
-    """Draw the line where the slice ends, before the bars."""
+    """Draw the end of the slice as a line, in front of the bars."""
     x = f"{scale.percent(plan.figures.available_us):.5g}%"
     SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(y), "y2": str(y + height), "class": "edge"})
 
@@ -140,14 +140,14 @@ def _tip(label: str, event: Event) -> str:
 
 
 class _Bars(NamedTuple):
-    """Where bars are drawn."""
+    """Draws bars."""
 
     parent: Element
     plan: Schedule
     scale: Scale
 
     def draw(self, events: Sequence[Event], *, y: int, height: int, coarse: bool = False) -> None:
-        """Draw events, or the transactions that they make."""
+        """Draw events, or their transactions if `coarse`."""
         if not coarse:
             for event in events:
                 self._bar(event.kind, event_title(event), event, y=y, height=height)
@@ -163,7 +163,7 @@ class _Bars(NamedTuple):
 
 
 def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
-    """A lane for the bus and one for each node."""
+    """Draw a lane for the bus and one for each node, and return the y below them."""
     lanes = node_lanes(window)
     y = _words(body, f"{time_text(window.from_us)} to {time_text(window.to_us)} us, by node", y=y, css="head") + 4
     scale = Scale(window.from_us, window.to_us)
@@ -186,7 +186,7 @@ def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int
 
 
 def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
-    """A lane for each event, its name above it."""
+    """Draw a lane for each event, its name above it, and return the y below them."""
     owner = only_owner(window)
     title = f"{time_text(window.from_us)} to {time_text(window.to_us)} us{'' if owner is None else f', {owner}'}"
     y = _words(body, title, y=y, css="head")
@@ -209,7 +209,7 @@ def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
 
 
 def _legend(body: Element, plan: Schedule, *, y: int) -> int:
-    """What each colour means, and what of the window it takes."""
+    """Draw the meaning of each colour and its total, and return the y below them."""
     text_at(body, "kind", x="20", y=y + 15, css="head")
     text_at(body, "us", x="240", y=y + 15, css="head", anchor="end")
     text_at(body, "share, %", x="310", y=y + 15, css="head", anchor="end")
@@ -219,5 +219,5 @@ def _legend(body: Element, plan: Schedule, *, y: int) -> int:
         SubElement(body, "rect", {"class": kind.ink, "y": str(y + 4), "width": "12", "height": "12"})
         text_at(body, kind.label, x="20", y=y + 15)
         text_at(body, time_text(one.total_us), x="240", y=y + 15, anchor="end")
-        text_at(body, written(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
+        text_at(body, figure_text(figure_value(SHARE, one.share)), x="310", y=y + 15, anchor="end")
     return y + LINE

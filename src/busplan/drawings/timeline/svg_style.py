@@ -1,4 +1,4 @@
-"""The style sheet of a timeline's SVG: literal colours, so that viewers without variables show them too."""
+"""Style sheet of a timeline's SVG, with literal colours for viewers without CSS variables."""
 
 from typing import Final
 
@@ -31,6 +31,6 @@ _DARK_STYLE: Final = """
 
 
 def stylesheet() -> str:
-    """Colours on white, and those on black for who prefers them; nothing reaches beyond the drawing's own class."""
+    """CSS for light and dark backgrounds, scoped to the class of the drawing."""
     light, dark = fills(".busplan-timeline")
     return f"{_STYLE}{light}{DARK}{{{_DARK_STYLE}{dark}}}\n"
