@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
 from busplan.analysis.capacity.cycle import cycle_of
@@ -130,17 +131,19 @@ def test_an_execution_is_as_uncertain_as_its_grade(make: Maker, grade: str | Non
 )
 def test_the_uncertainty_is_that_of_a_monte_carlo_of_the_inputs(make: Maker, changes: dict[str, Any]) -> None:
     profile = make(**changes)
-    assert of(profile).uncertainty_us == pytest.approx(2 * _drawn_deviation_us(profile), rel=0.02)
+    assert of(profile).uncertainty_us == pytest.approx(2 * np.std(_drawn_us(profile)), rel=0.02)
 
 
-def test_where_the_cycle_has_a_kink_the_uncertainty_is_no_less_than_that_of_a_monte_carlo(make: Maker) -> None:
-    # T_exec about 2 T_reset - T_sub: on one side of it a faster node is charged alike.
-    profile = make(node__execution__base_us=31.55, node__execution__per_byte_us=0.0)
-    assert 1.0 <= (of(profile).uncertainty_us or 0) / (2 * _drawn_deviation_us(profile)) < 1.2
+@pytest.mark.parametrize("execution_us", [10.6, 21.1, 28.0, 31.55, 34.0])
+def test_where_the_cycle_has_a_kink_it_still_covers_95_percent_on_one_side(make: Maker, execution_us: float) -> None:
+    # T_exec near T_sub, T_reset and 2 T_reset - T_sub: a central difference would cover 84 % at the last one.
+    profile = make(node__execution__base_us=execution_us, node__execution__per_byte_us=0.0)
+    one = of(profile)
+    assert np.mean(_drawn_us(profile) <= one.required_us + (one.uncertainty_us or 0)) >= 0.95
 
 
-def _drawn_deviation_us(profile: Profile) -> float:
-    """Standard deviation of the cycle, each input drawn anew and the same in every transaction."""
+def _drawn_us(profile: Profile) -> NDArray[np.float64]:
+    """Cycles, each input drawn anew and the same in every transaction."""
     draws, random = 400_000, np.random.default_rng(1394)
     network = network_of(profile)
     (group,) = network.groups
@@ -172,7 +175,7 @@ def _drawn_deviation_us(profile: Profile) -> float:
     required_us = (
         other.required_us + halves * residual().uncertainty_us * normal(draws) + halves * gap_term_us * uniform
     )
-    return float(np.std(required_us))
+    return np.asarray(required_us)
 
 
 @SOME

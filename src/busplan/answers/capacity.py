@@ -6,7 +6,7 @@ from itertools import accumulate
 
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
-from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.network import bus_of, leading_model, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
 from busplan.answers.verdict import places_of, verdict_sentences, warnings
@@ -72,14 +72,23 @@ def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, star
         count_value(first.axes, "axes", at=f"/results/{start}/axes"),
         ", ".join(bus.setup_words(network_of(profile))),
     )
+    leading = leading_model(profile)
     owners = [
         Owner(TableColumn(one.timing_model), one, f"/results/{start + number}") for number, one in enumerate(figures)
     ]
+    owners.sort(key=lambda one: one.column.heading != leading)
     return figure_table(_rows(bus), owners, caption=caption)
 
 
 def _rows(bus: Bus) -> list[tuple[Figure, int]]:
-    """Figures with their levels: the cycle, its terms (level 1), the slice, figures of the kind of bus, and limits."""
+    """The verdict's figures, the cycle and its terms, the slice, what the kind of bus adds, and what would fit.
+
+    Terms are of level 1.
+    """
+    sure = (
+        *(figure.VERDICT, figure.SAFE_AXES, figure.SAFE_NODES, figure.SAFE_LIMITED_BY),
+        *(figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS, figure.SAFE_MIN_PERIOD),
+    )
     above = (figure.AVAILABLE, figure.REQUIRED)
     below = (
         *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
@@ -87,7 +96,11 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
         *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES),
         *(figure.LIMITED_BY, figure.FITS),
     )
-    return [*((one, 0) for one in above), *((one, 1) for one in bus.term_figures), *((one, 0) for one in below)]
+    return [
+        *((one, 0) for one in (*sure, *above)),
+        *((one, 1) for one in bus.term_figures),
+        *((one, 0) for one in below),
+    ]
 
 
 def capacity_records(result: Capacity) -> list[Record]:
@@ -106,23 +119,57 @@ def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocu
 
 
 def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
-    change = verdict.change
+    change, figures, bus = verdict.change, verdict.deciding, bus_of(result.profile)
+    network = network_of(result.profile)
+    left_out = bus.cycle(network, model=bus.deciding_model).left_out()
+    unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
     return {
         "period_us": verdict.period_us,
-        "timing_model": verdict.deciding.timing_model,
-        "fits": verdict.deciding.fits,
+        "timing_model": figures.timing_model,
+        "verdict": figures.verdict,
+        "fits": figures.fits,
         "models_agree": verdict.models_agree,
-        **safety_record(verdict.deciding, result.profile),
+        **safety_record(figures, result.profile),
+        "available_us": figures.available_us,
+        "required_us": figures.required_us,
+        "margin_us": figures.margin_us,
+        **certainty_record(figures),
+        "uncertainty_parts": uncertainty_parts(figures),
+        "reserve": result.profile.limits.reserve,
+        "not_in_it": [one.key for one in left_out],
+        "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
         "cheapest_change": change
         and {
             "changes": change.changes,
             "nodes": change.nodes,
             "fits": change.figures.fits,
             "margin_us": change.figures.margin_us,
+            "verdict": change.figures.verdict,
+            "margin_corrected_us": change.figures.margin_corrected_us,
+            "uncertainty_us": change.figures.uncertainty_us,
         },
-        "warnings": warnings(result.profile, nodes=verdict.deciding.nodes, most=verdict.deciding.max_nodes),
+        "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
         "text": " ".join(map(sentence_text, verdict_sentences(verdict, result.profile))),
     }
+
+
+def certainty_record(figures: CapacityFigures) -> Record:
+    """Figures of how sure the verdict is, without its word."""
+    return {one.key: getattr(figures, one.key) for one in figure.CERTAINTY if one is not figure.VERDICT}
+
+
+def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
+    """What the uncertainty is made of, the largest first."""
+    whole = sum(float(one.us) ** 2 for one in figures.doubts)
+    return [
+        {
+            "input": one.key,
+            "label": one.label,
+            "standard_uncertainty_us": float(one.us),
+            "share": float(one.us) ** 2 / whole if whole else 0.0,
+        }
+        for one in sorted(figures.doubts, key=lambda one: -float(one.us))
+    ]
 
 
 def safety_record(figures: CapacityFigures, profile: Profile) -> Record:

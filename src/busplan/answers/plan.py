@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator
 from functools import partial
-from typing import Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.documents import document, with_profile
 from busplan.answers.key_values import NewValues, settings_sentence
-from busplan.answers.plan_options import option_margins, options_table
+from busplan.answers.plan_options import option_margin, options_table
 from busplan.answers.verdict import warning_sentences
 from busplan.buses.figure import AXES, NODES, UTILISATION
 from busplan.forms.blocks import (
@@ -83,30 +82,20 @@ def _settings(profile: Profile, changes: NewValues, *, at: str = "") -> Sentence
     return settings_sentence(changes, meanings=meanings, at=at)
 
 
-_OF_MODELS: Final = (
-    ("", ""),
-    (" both timing models", " in the tighter one"),
-    (" every timing model", " in the tightest one"),
-)
-"""What fits, and which model has the least margin: for one timing model, for two and for more."""
-
-
 def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
     option, circle = plan.recommended, " and passes the circle" if with_circle else ""
     subject = _goal(plan)
-    models, tighter = _OF_MODELS[min(len(bus_of(plan.goal).timing_models), len(_OF_MODELS)) - 1]
     if option is None:
         kind = bus_of(plan.goal)
         safe = "" if kind.safety_figure is None else f" with a safe {kind.safety}"
         none = (
             f": NO PLAN. Of {listed(changeable(plan.goal), 'and')}, no change of what is left open "
-            f"fits{models}{safe}{circle}{_why_none(plan)}."
+            f"is shown to fit{safe}{circle}{_why_none(plan)}."
         )
         return Sentence((*subject, none), "fails")
     number = plan.options.index(option)
-    margins = option_margins(option, at=f"/options/{number}")
-    least = min(margins, key=lambda one: float(one.value))
-    result = (f"fits{models} with ", least._replace(state="neutral"), f" to spare{tighter}{circle}.")
+    margin, doubt = option_margin(option, at=f"/options/{number}")
+    result = ("fits with a margin of ", margin, " +/- ", doubt, f"{circle}.")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     changes = _settings(plan.goal, option.changes, at="/recommended_changes")
@@ -159,10 +148,14 @@ def _record(plan: Plan, option: Option) -> Record:
         "changes": plan.all_changes(option),
         "recommended": option.recommended,
         "timing_model": one.timing_model,
+        "verdict": one.verdict,
         "fits": one.fits,
         "fits_other_model": all(other.fits for other in others) if others else None,
         "margin_us": one.margin_us,
         "margin_other_model_us": min((other.margin_us for other in others), default=None),
+        "bias_us": one.bias_us,
+        "margin_corrected_us": one.margin_corrected_us,
+        "uncertainty_us": one.uncertainty_us,
         "binding_term": one.binding_term,
         "bounded_by": option.bounded_by,
         "proven": option.proven,
@@ -173,6 +166,9 @@ def _record(plan: Plan, option: Option) -> Record:
         "max_nodes": one.max_nodes,
         "max_axes": one.max_axes,
         "limited_by": one.limited_by,
+        "safe_nodes": one.safe_nodes,
+        "safe_axes": one.safe_axes,
+        "safe_limited_by": one.safe_limited_by,
         "period_us": one.period_us,
         "slice_ratio": profile.cycle.slice_ratio,
         **{key: getattr(one, key) for key in bus_of(profile).planned_figures},

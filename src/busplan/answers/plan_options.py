@@ -2,11 +2,12 @@
 
 from typing import Final
 
+from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.key_values import NewValues, key_value, settings_sentence
 from busplan.buses import bus
-from busplan.buses.figure import BINDING_TERM, MARGIN, MAX_AXES, MAX_NODES
+from busplan.buses.figure import BINDING_TERM, MARGIN_CORRECTED, SAFE_AXES, SAFE_NODES, UNCERTAINTY
 from busplan.forms.blocks import (
     Cell,
     ShownValue,
@@ -25,13 +26,12 @@ from busplan.sections.profile import Profile
 
 def options_table(plan: Plan) -> Table:
     """Settings and results of each option; the recommended one has a mark."""
-    first = plan.options[0]
     columns = (
         TableColumn("option", kind="words"),
         TableColumn("", kind="words"),
         *(TableColumn(heading, kind="words") for heading in ("set", "largest term", "held by", "circle")),
-        *(TableColumn(one.timing_model, "us", group="margin") for one in (first.deciding, *first.others)),
-        *(TableColumn(heading, group="most") for heading in ("nodes", "axes")),
+        *(TableColumn(heading, "us") for heading in ("margin", "+/-")),
+        *(TableColumn(heading, group="safe") for heading in ("nodes", "axes")),
     )
     return Table(columns, tuple(_row(option, at=f"/options/{number}") for number, option in enumerate(plan.options)))
 
@@ -46,30 +46,24 @@ def _row(option: Option, *, at: str) -> TableRow:
         figure_value(BINDING_TERM, option.deciding.binding_term, at=f"{at}/{BINDING_TERM.key}"),
         ShownValue(option.bounded_by, "bounded_by", at=f"{at}/bounded_by"),
         circle,
-        *option_margins(option, at=at),
-        *(attribute_value(one, option.deciding, at=at) for one in (MAX_NODES, MAX_AXES)),
+        *option_margin(option, at=at),
+        *(attribute_value(one, option.deciding, at=at) for one in (SAFE_NODES, SAFE_AXES)),
     )
     return TableRow(cells, highlighted=option.recommended)
 
 
-def option_margins(option: Option, *, at: str) -> list[ShownValue]:
-    """Margins under the timing model that decides, and under each other model.
+def option_margin(option: Option, *, at: str) -> tuple[ShownValue, ShownValue]:
+    """Margin less the bias, and its uncertainty.
 
     Parameters
     ----------
     option
         The option.
     at
-        JSON pointer to the option; the document has only the smallest margin of the other models.
+        JSON pointer to the option.
     """
-    least_us = min((one.margin_us for one in option.others), default=None)
-    found = []
-    for one in (option.deciding, *option.others):
-        key = MARGIN.key if one is option.deciding else "margin_other_model_us"
-        known = one is option.deciding or one.margin_us == least_us
-        value = figure_value(MARGIN, one.margin_us, at=f"{at}/{key}" if known else "")
-        found.append(value._replace(key=key, state="neutral" if one.fits else "fails"))
-    return found
+    margin, doubt = (attribute_value(one, option.deciding, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    return margin._replace(state="neutral" if option.deciding.verdict == FITS else "fails"), doubt
 
 
 _SHORT: Final = {

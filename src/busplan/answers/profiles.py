@@ -38,7 +38,7 @@ def _record(profile: Profile) -> Record:
 
 def _section(record: Record, at: str) -> Chapter:
     title = sentence(
-        f"{{}}: {{}} {nouns(record['nodes'], 'node')} at {{}}, {record['timing_model']} model decides",
+        f"{{}}: {{}} {nouns(record['nodes'], 'node')} at {{}}, {record['timing_model']} model leads",
         Code(record["name"]),
         count_value(record["nodes"], "nodes", at=f"{at}/nodes"),
         period_value(record["period_us"], at=f"{at}/period_us"),

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
+from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, Total, totals
 from busplan.answers.capacity import safety_record
@@ -57,14 +58,19 @@ def _blocks(plan: Schedule) -> Iterator[Block]:
 
 
 def headline(plan: Schedule) -> Sentence:
-    """Say whether the cycle fits under its timing model."""
+    """Say what the cycle leaves of its slice under its timing model, and the verdict if this model decides."""
     figures = plan.figures
-    parts = (
+    parts: tuple[Part, ...] = (
         *(Code(plan.profile.name), " at ", period_value(figures.period_us), ": "),
         *story(figures, plan.profile),
-        f" ({figures.timing_model} model).",
+        f" by the {figures.timing_model} model",
     )
-    return _placed(Sentence(parts, state_of(figures.fits and figures.safe)), plan)
+    if figures.verdict is None:
+        return _placed(Sentence((*parts, ", which decides nothing."), state_of(figures.fits and figures.safe)), plan)
+    verdict = figure_value(VERDICT, figures.verdict)
+    return _placed(
+        Sentence((*parts, "; verdict: ", verdict, "."), state_of(figures.verdict == FITS and figures.safe)), plan
+    )
 
 
 def timeline_chart(plan: Schedule) -> Chart:
@@ -135,6 +141,7 @@ def _facts(plan: Schedule) -> JsonDocument:
         margin_us=figures.margin_us,
         exceeded=list(figures.exceeded),
         fits=figures.fits,
+        verdict=figures.verdict,
         **safety_record(figures, plan.profile),
         warnings=_warnings(plan),
         from_us=plan.from_us,

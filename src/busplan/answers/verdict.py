@@ -2,19 +2,32 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.answers.key_values import settings_sentence
-from busplan.buses.figure import AVAILABLE, MARGIN, MAX_AXES, MAX_NODES, REQUIRED, UTILISATION
-from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence
+from busplan.buses.figure import (
+    AVAILABLE,
+    BIAS,
+    MARGIN,
+    MARGIN_CORRECTED,
+    REQUIRED,
+    SAFE_AXES,
+    SAFE_NODES,
+    UNCERTAINTY,
+    UTILISATION,
+    VERDICT,
+    Figure,
+)
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence, state_of
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
 
 Places = Mapping[str, str]
-"""JSON pointer to the figures of each timing model."""
+"""JSON pointers: to the figures of each timing model, and to the `verdict` and its `change`."""
 NO_PLACES: Places = {}
 
 
@@ -31,20 +44,20 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
         JSON pointers to its figures.
     """
     figures = verdict.deciding
-    at = places.get(figures.timing_model, "")
-    yield _headline(verdict, profile, places)
-    if not verdict.models_agree:
-        yield sentence(f"The {figures.timing_model} model decides.")
+    at = places.get("verdict", "")
+    yield _headline(verdict, profile, at=at)
+    yield from not_in_it(profile)
+    yield from _other_models(verdict, profile, places)
     largest = max(figures.terms, key=lambda term: term.us)
     yield sentence(
         f"Largest term: {figures.binding_term}, {{}} of {{}}.",
-        ShownValue(largest.us, largest.key, "us", 3, at=_place(at, largest.key)),
+        ShownValue(largest.us, largest.key, "us", 3, at=_place(places.get(figures.timing_model, ""), largest.key)),
         figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
     )
-    yield _carries(verdict, places)
+    yield _carries(figures, at=at)
     yield _advice(verdict, profile, places)
     yield from execution_sentence(profile)
-    yield from warning_sentences(profile, nodes=figures.nodes, most=figures.max_nodes)
+    yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
@@ -79,27 +92,88 @@ def _place(at: str, key: str) -> str:
     return f"{at}/{key}" if at else ""
 
 
-def _headline(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
-    figures = verdict.deciding
-    at = _place(places.get(figures.timing_model, ""), "period_us")
-    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=at))
-    same = all(other.exceeded == figures.exceeded for other in verdict.others)
-    parts: list[Part] = []
-    if verdict.models_agree and same:
-        others = "".join(f"; {other.timing_model} agrees" for other in verdict.others)
-        own = story(figures, profile, at=places.get(figures.timing_model, ""))
-        parts = [": ", *own, f" ({figures.timing_model} model{others})."]
-    else:
-        parts = [": " if verdict.models_agree else ": THE MODELS DISAGREE. "]
-        for number, one in enumerate(verdict.all_figures):
-            own = story(one, profile, at=places.get(one.timing_model, ""))
-            parts += [f"{'; ' if number else ''}{one.timing_model}: ", *own]
-        parts.append(".")
-    return Sentence((*subject, *parts), "passes" if verdict.all_well else "fails")
+def _headline(verdict: Verdict, profile: Profile, *, at: str) -> Sentence:
+    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), ": ")
+    parts = (*subject, *verdict_story(verdict.deciding, profile, at=at).parts)
+    return Sentence(parts, state_of(verdict.all_well))
+
+
+def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> Sentence:
+    """Say the verdict with its margin, bias, uncertainty and largest doubt.
+
+    Parameters
+    ----------
+    figures
+        Figures under the timing model that decides.
+    profile
+        The network.
+    at
+        JSON pointer to them.
+    """
+    limits = _broken_limits(figures, profile)
+    safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
+    why = "".join(f", {words}" for words in limits)
+    found = [sentence(f"{{}}{safe}{why}.", _figure(VERDICT, figures, at=at)), _margin(figures, at=at)]
+    doubt = max(figures.doubts, key=lambda one: one.us, default=None)
+    if doubt is not None and doubt.us:
+        share = doubt.us**2 / sum(one.us**2 for one in figures.doubts)
+        place = f"{at}/uncertainty_parts/0/share" if at else ""
+        found.append(
+            sentence(f"Largest doubt: {doubt.label}, {{}} of U squared.", ShownValue(share, "share", "%", 0, at=place))
+        )
+    if profile.limits.reserve:
+        reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0, at=_place(at, "reserve"))
+        found.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
+    return joined(*found)
+
+
+def _margin(figures: CapacityFigures, *, at: str) -> Sentence:
+    """The margin of {}, as far as it is known."""
+    of = _figure(AVAILABLE, figures, at=at)
+    margin = _figure(MARGIN_CORRECTED, figures, at=at)
+    if figures.bias_us is None:
+        words = "Margin {} of {}; how far the bus is from this timing model is not known, so no bias is in it."
+        return sentence(words, margin, of)
+    values = (margin, _figure(UNCERTAINTY, figures, at=at), of, _figure(BIAS, figures, at=at))
+    return sentence("Margin {} +/- {} of {}, less a bias of {}.", *values)
+
+
+def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:
+    return figure_value(figure, getattr(figures, figure.key), at=_place(at, figure.key))
+
+
+def _broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
+    """Say by how much each limit of the bus is broken."""
+    broken = (bus_of(profile).limit(key) for key in figures.exceeded if key != TIME)
+    return [limit.words(network_of(profile)) for limit in broken if limit is not None]
+
+
+def not_in_it(profile: Profile) -> Iterator[Sentence]:
+    """Say what the verdict leaves out, with the key that would say it; nothing if it leaves nothing out."""
+    bus = bus_of(profile)
+    left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
+    if left:
+        yield Sentence((f"Not in it: {', '.join(f'{one.label} ({one.key})' for one in left)}.",))
+
+
+def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:
+    """Say where another timing model contradicts the verdict, and which cannot express the profile."""
+    figures, bus = verdict.deciding, bus_of(profile)
+    for other in verdict.others:
+        if other.fits != (figures.verdict == FITS) and not _broken_limits(figures, profile):
+            at = places.get(other.timing_model, "")
+            needed = figure_value(REQUIRED, other.required_us, at=_place(at, REQUIRED.key))
+            available = figure_value(AVAILABLE, other.available_us, at=_place(at, AVAILABLE.key))
+            text = f"The {other.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
+            yield sentence(text, needed, available, state="warns")
+    for model in bus.timing_models:
+        keys = bus.cannot_express(network_of(profile), model=model.name)
+        if keys:
+            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
 
 
 def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[Part, ...]:
-    """Say whether a cycle fits, and by how much or why not.
+    """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
 
     Parameters
     ----------
@@ -110,46 +184,31 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
     at
         JSON pointer to them.
     """
-    available = figure_value(AVAILABLE, figures.available_us, at=_place(at, AVAILABLE.key))
+    available = _figure(AVAILABLE, figures, at=at)
     if figures.fits:
-        safe = "" if figures.safe else f", but only with an unsafe {bus_of(profile).safety}"
-        return sentence(
-            f"fits, {{}} to spare, {{}} of {{}} used{safe}",
-            figure_value(MARGIN, figures.margin_us, at=_place(at, MARGIN.key)),
-            figure_value(UTILISATION, figures.utilisation, at=_place(at, UTILISATION.key))._replace(decimals=1),
-            available,
-        ).parts
-    needed = figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key))
+        used = _figure(UTILISATION, figures, at=at)._replace(decimals=1)
+        return sentence("{} to spare, {} of {} used", _figure(MARGIN, figures, at=at), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
-    broken = (bus_of(profile).limit(key) for key in figures.exceeded)
-    reasons = (
-        sentence("{} short, {} needed of {}", short, needed, available)
-        if limit is None
-        else Sentence((limit.words(network_of(profile)),))
-        for limit in broken
-    )
-    return "does not fit, ", *joined(*reasons, by=", and ").parts
+    reasons = [Sentence((words,)) for words in _broken_limits(figures, profile)]
+    if TIME in figures.exceeded:
+        reasons.append(sentence("{} short, {} needed of {}", short, _figure(REQUIRED, figures, at=at), available))
+    return joined(*reasons, by=", and ").parts
 
 
-def _carries(verdict: Verdict, places: Places) -> Sentence:
-    answers = dict.fromkeys((one.max_nodes, one.max_axes, one.limited_by) for one in verdict.all_figures)
-    same = len(answers) == 1
-    stories = (
-        joined(
-            _nodes(one.max_nodes, one.max_axes, at=places.get(one.timing_model, "")),
-            sentence(f"{'' if same else f' by the {one.timing_model} model'}, limited by {one.limited_by}"),
-            by="",
+def _carries(figures: CapacityFigures, *, at: str) -> Sentence:
+    return Sentence(
+        (
+            *("Shown to fit: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0, at=at).parts),
+            f", limited by {figures.safe_limited_by}.",
         )
-        for one in ((verdict.deciding,) if same else verdict.all_figures)
     )
-    return Sentence(("The bus carries ", *joined(*stories, by="; ").parts, "."))
 
 
 def _nodes(nodes: int, axes: int, *, at: str = "") -> Sentence:
     return sentence(
         f"{{}} {nouns(nodes, 'node')} ({{}} {nouns(axes, 'axis')})",
-        count_value(nodes, MAX_NODES.key, at=_place(at, MAX_NODES.key)),
-        count_value(axes, MAX_AXES.key, at=_place(at, MAX_AXES.key)),
+        count_value(nodes, SAFE_NODES.key, at=_place(at, SAFE_NODES.key)),
+        count_value(axes, SAFE_AXES.key, at=_place(at, SAFE_AXES.key)),
     )
 
 
@@ -162,33 +221,37 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
         change.changes, meanings=bus_of(profile).change_meanings, at=_place(at, "changes"), quotes=False
     ).parts
     if verdict.all_well:
-        more = change.nodes - figures.max_nodes
+        more = change.nodes - (figures.safe_nodes or 0)
         return Sentence(
             (
-                *("Cheapest way to ", count_value(more), f" more {nouns(more, 'node')} "),
-                *(f"({figures.timing_model} model): ", *settings, ", which carries "),
+                *(
+                    "Cheapest way to ",
+                    count_value(more),
+                    f" more {nouns(more, 'node')}: ",
+                    *settings,
+                    ", which carries ",
+                ),
                 *_nodes(change.nodes, change.nodes * profile.node.axes).parts,
                 ".",
             )
         )
-    models = " and ".join(one.timing_model for one in verdict.all_figures)
-    purpose = "make it safe" if all(one.fits for one in verdict.all_figures) else "make it fit"
-    spare = figure_value(MARGIN, change.figures.margin_us, at=_place(at, MARGIN.key))
-    return Sentence((f"Cheapest way to {purpose} ({models}): ", *settings, ", which leaves ", spare, " to spare."))
+    purpose = "make it safe" if figures.verdict == FITS else "make it fit"
+    margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    return Sentence(
+        (f"Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ", margin, " +/- ", doubt, ".")
+    )
 
 
 def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     """Say that no change is advised, and why."""
     bus, figures = bus_of(profile), verdict.deciding
     if not verdict.all_well:
-        if all(one.fits for one in verdict.all_figures):
+        if figures.verdict == FITS:
             return sentence(bus.no_safe_setting, state="fails")
         return sentence(f"No change of {listed(changeable(profile), 'or')} alone makes it fit.", state="fails")
-    if figures.limited_by == TIME:
+    limit = bus.limit(figures.safe_limited_by or TIME)
+    if limit is None or limit.is_safety:
         return sentence(f"No change of {listed(changeable(profile, structure=False), 'or')} alone carries more nodes.")
-    limit = bus.limit(figures.limited_by)
-    if limit is None:
-        return sentence(f"No setting carries more nodes: that is the {bus.limits_of}'s limit.")
     most = count_value(limit.most(network_of(profile)))
     return sentence(f"No setting carries more nodes: {{}} {limit.key} are the {bus.limits_of}'s limit.", most)
 
@@ -206,4 +269,4 @@ def places_of(results: Sequence[CapacityFigures], *, start: int, change: int) ->
         Index of the period in the verdicts.
     """
     own = {one.timing_model: f"/results/{start + number}" for number, one in enumerate(results)}
-    return {**own, "change": f"/verdicts/{change}/cheapest_change"}
+    return {**own, "verdict": f"/verdicts/{change}", "change": f"/verdicts/{change}/cheapest_change"}

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, TypeVar
 
-from busplan.analysis.network import model_names
+from busplan.analysis.network import bus_of, known_model, model_names
 from busplan.analysis.planning.cures import listed
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
@@ -109,15 +109,15 @@ def checked_models(timing_models: Iterable[str] | None, profile: Profile) -> tup
     BusplanError
         An unknown or a repeated name.
     """
-    known = model_names(profile)
     if timing_models is None:
-        return known
+        return model_names(profile)
     found = items(timing_models, name="timing_models")
-    if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(known):
+    names = [one.name for one in bus_of(profile).timing_models]
+    if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(names):
         raise BusplanError(
-            f"timing_models {found!r}: expected {listed([*map(repr, known)], 'or')}, each once, in a list"
+            f"timing_models {found!r}: expected {listed([*map(repr, names)], 'or')}, each once, in a list"
         )
-    return tuple(found)
+    return tuple(known_model(profile, one, name="timing_models") for one in found)
 
 
 def finite(value: object, *, name: str) -> float:

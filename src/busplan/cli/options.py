@@ -219,14 +219,11 @@ def timing_model(timing: str, profile: "Profile") -> str:
     Raises
     ------
     BusplanError
-        The profile's kind of bus has no such model.
+        The profile's kind of bus has no such model, or the model cannot express the profile.
     """
-    known = known_models(profile)
-    if timing not in known:
-        raise BusplanError(
-            f"--timing {timing}: no timing model of bus.kind {profile.bus.kind}; there are {', '.join(known)}"
-        )
-    return timing
+    from busplan.analysis.network import known_model
+
+    return known_model(profile, timing, name="--timing")
 
 
 def known_models(profile: "Profile") -> tuple[str, ...]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl"})
 _DEFAULT_TOP: Final = 20
-_DEFAULT_FIGURE: Final = "max_axes"
+_DEFAULT_FIGURE: Final = "safe_axes"
 
 
 def sweep_command(
@@ -57,7 +57,7 @@ def sweep_command(
         typer.Option(
             "--columns",
             metavar="NAMES",
-            help="Figures to write, between commas, as margin_us,max_axes: the names in "
+            help="Figures to write, between commas, as margin_us,safe_axes: the names in "
             "`busplan capacity --format json`.  [default: all of them; of the top rows the main ones]",
         ),
     ] = None,
@@ -86,7 +86,7 @@ def sweep_command(
         typer.Option(
             "--figure",
             metavar="COLUMN",
-            help="What --plot draws, by its name in --columns.  [default: max_axes]",
+            help="What --plot draws, by its name in --columns.  [default: safe_axes]",
             show_default=False,
         ),
     ] = None,

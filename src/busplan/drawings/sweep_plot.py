@@ -82,6 +82,8 @@ class FigureData:
         # Mark single points only if there are few.
         marker = "." if len(places) <= 100 else ""  # noqa: PLR2004
         for number, model in enumerate(self._models):
+            if np.isnan(self._values[:, number]).all():
+                continue  # a figure that the model does not have
             axes.plot(places, self._values[:, number], label=model, marker=marker, linestyle=("-", "--")[number % 2])
         if labels is not None:
             axes.set_xticks(places, labels)

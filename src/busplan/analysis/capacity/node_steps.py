@@ -3,15 +3,20 @@
 from bisect import bisect_right
 from typing import NamedTuple
 
+from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import FIT_ROUNDING, cycle_of
-from busplan.analysis.capacity.node_limit import largest_nodes
+from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
+from busplan.analysis.network import bus_of
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
 
 
 class NodeSteps(NamedTuple):
-    """The steps of the largest number of nodes over the period, under one timing model."""
+    """The steps of the largest number of nodes over the period, under one timing model.
+
+    Under the model that decides they are those that are shown to fit; under another those of the closed form.
+    """
 
     timing_model: str
     axes_per_node: int
@@ -19,6 +24,8 @@ class NodeSteps(NamedTuple):
     """Smallest period that 1, 2, ... nodes fit in; none where no period helps."""
     limited_by: str
     """What keeps it from going on."""
+    is_safe: bool
+    """Whether the nodes are shown to fit."""
 
     def max_axes(self, period_us: float) -> int:
         """Most axes that a period carries [1]."""
@@ -26,7 +33,7 @@ class NodeSteps(NamedTuple):
 
 
 def node_steps(profile: Profile, *, model: str) -> NodeSteps:
-    """Find the period from which on each number of nodes fits.
+    """Find the period from which on each number of nodes fits, or is shown to fit under the model that decides.
 
     Parameters
     ----------
@@ -42,7 +49,10 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     >>> steps.max_axes(1000.0)
     16
     """
-    most, limit = largest_nodes(override(profile, {"cycle.period_us": MAX_TIME_US}), model=model)
-    ratio = profile.cycle.slice_ratio
-    from_us = (cycle_of(profile, model=model, nodes=nodes).required_us / ratio for nodes in range(1, most + 1))
-    return NodeSteps(model, profile.node.axes, tuple(from_us), limit)
+    longest, is_safe = override(profile, {"cycle.period_us": MAX_TIME_US}), model == bus_of(profile).deciding_model
+    most, limit = safe_nodes(longest) if is_safe else largest_nodes(longest, model=model)
+    cycles = (cycle_of(profile, model=model, nodes=nodes) for nodes in range(1, most + 1))
+    needed_us = (certainty(one).safe_required_us if is_safe else one.required_us for one in cycles)
+    return NodeSteps(
+        model, profile.node.axes, tuple(us / profile.cycle.slice_ratio for us in needed_us), limit, is_safe
+    )

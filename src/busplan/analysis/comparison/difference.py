@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, TypeGuard
 
+from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of, model_names
@@ -27,12 +28,12 @@ ComputeCircleFigures = Callable[[Profile], "CircleFigures"]
 ROUNDING: Final = 1e-9
 """Relative difference that float rounding can cause; figures that differ by less are the same."""
 
-VERDICT_FITS: Final = Figure(
-    "verdict_fits",
-    "fits",
-    known.FITS.reference,
-    "whether it fits under the timing model that decides",
-    "fits, as that decides",
+SHOWN_TO_FIT: Final = Figure(
+    "shown_to_fit",
+    "shown",
+    known.VERDICT.reference,
+    "whether the cycle is shown to fit",
+    "shown to fit",
     sort="truth",
     better="more",
 )
@@ -59,9 +60,11 @@ def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
     """
     setup = by_key(figure for bus in buses for figure in bus.setup_figures)
     return (
-        *(known.TIMING_MODEL, VERDICT_FITS, known.PERIOD, known.NODES, known.AXES),
+        *(known.TIMING_MODEL, known.VERDICT, SHOWN_TO_FIT, known.PERIOD, known.NODES, known.AXES),
         *setup.values(),
         *(known.AVAILABLE, known.TIME_SLICE),
+        *(known.MARGIN_CORRECTED, known.UNCERTAINTY, known.BIAS, known.SAFE_NODES, known.SAFE_AXES),
+        *(known.SAFE_LIMITED_BY, known.SAFE_MIN_PERIOD),
     )
 
 
@@ -237,7 +240,7 @@ def _figures(
 def _plan(profile: Profile) -> _Figures:
     """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
     deciding = figures(profile, model=bus_of(profile).deciding_model)
-    return deciding.by_key() | {VERDICT_FITS.key: deciding.fits}
+    return deciding.by_key() | {SHOWN_TO_FIT.key: deciding.verdict == FITS}
 
 
 def _cycle(profile: Profile, model: str) -> _Figures:

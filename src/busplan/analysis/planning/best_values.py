@@ -19,7 +19,7 @@ from busplan.sections.base import MAX_TIME_US
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
 
-Circle = Callable[[Profile], tuple[str, ...]]
+FindCircleFailures = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 
 MAX_CIRCLES: Final = 50
@@ -53,7 +53,9 @@ def smallest_ratio(profile: Profile) -> float:
     return steps / RATIO_STEPS
 
 
-def smallest_period(profile: Profile, *, circle: Circle | None = None, max_circles: int = MAX_CIRCLES) -> PeriodSearch:
+def smallest_period(
+    profile: Profile, *, circle: FindCircleFailures | None = None, max_circles: int = MAX_CIRCLES
+) -> PeriodSearch:
     """Find the smallest period that the cycle is shown to fit in and that passes the circle.
 
     For the bus alone, a closed form is rounded up to whole us. With a circle, multiples of the servo's step are tested

@@ -163,7 +163,7 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     most = most_nodes(network, limits)
     numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)
-    own = _certainty(cycle, most) if model == bus.deciding_model else dict.fromkeys(_UNDECIDED, _NOTHING)
+    own = _certainty(cycle, most) if model == bus.deciding_model else _UNDECIDED
     words = {
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
         "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
@@ -178,9 +178,10 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
 
 
-_UNDECIDED: Final = tuple(figure.key for figure in CERTAINTY)
-_NOTHING: Final = Column(np.zeros((), np.uint8), (None,))
-"""A figure that does not exist under a timing model."""
+_NO_WORD: Final = Column(np.zeros((), np.uint8), (None,))
+_NO_NUMBER: Final = Column(np.full((), np.nan))
+_UNDECIDED: Final = {figure.key: _NO_WORD if figure.sort == "word" else _NO_NUMBER for figure in CERTAINTY}
+"""Figures that a timing model does not have."""
 
 
 def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
-from busplan.analysis.sweep.blocks import Block, Column, figure_names
+from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -66,7 +66,9 @@ def require_circles(profile: Profile, grid: Grid) -> None:
             raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None
 
 
-def with_circles(profile: Profile, block: Block, *, run: Callable[[Iterable[CircleTask]], Iterable[Figures]]) -> Block:
+def with_circles(
+    profile: Profile, block: SweepBlock, *, run: Callable[[Iterable[CircleTask]], Iterable[Figures]]
+) -> SweepBlock:
     """Add the columns of circle tests to a block: one test a point, the same beside every timing model.
 
     Parameters

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.all_answers import AllAnswers
+from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.capacity import capacity_table
 from busplan.answers.latency import latency_tables
@@ -13,10 +14,14 @@ from busplan.answers.verdict import places_of, verdict_sentences
 from busplan.buses.figure import (
     BINDING_TERM,
     LIMITED_BY,
-    MARGIN,
+    MARGIN_CORRECTED,
     MAX_AXES,
     MAX_NODES,
     PERIOD,
+    SAFE_AXES,
+    SAFE_LIMITED_BY,
+    SAFE_NODES,
+    UNCERTAINTY,
     UTILISATION,
     Figure,
 )
@@ -41,27 +46,22 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import nouns
 
-_OVER_PERIOD: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
+_OVER_PERIOD: Final = (SAFE_NODES, SAFE_AXES, SAFE_LIMITED_BY)
+"""Under the timing model that decides."""
+_CLOSED: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
+"""Under another timing model."""
 
 
 def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     """The question whether the cycle fits, with its verdict."""
     verdict, results = answer.verdict, answer.capacity.results
-    word = "FITS" if verdict.deciding.fits else "DOES NOT FIT"
-    if not verdict.models_agree:
-        word = "MODELS DISAGREE"
-    elif verdict.deciding.fits and not verdict.deciding.safe:
+    word = str(verdict.deciding.verdict).upper()
+    if verdict.deciding.verdict == FITS and not verdict.deciding.safe:
         word = f"UNSAFE {bus_of(answer.profile).safety.upper()}"
     places = places_of(results, start=0, change=0)
-    facts = (
-        *(
-            (f"{MARGIN.label} ({one.timing_model})", attribute_value(MARGIN, one, at=places[one.timing_model]))
-            for one in results
-        ),
-        *(
-            (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
-            for figure in (UTILISATION, BINDING_TERM, MAX_AXES)
-        ),
+    facts = tuple(
+        (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
+        for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
     )
     question = Question(
         "Does the cycle fit its period?",
@@ -138,7 +138,7 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
     source, steps = sources["axes"], answer.steps
     nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
     caption = sentence(
-        f"Most axes that a period carries{_curves(answer)}; the point is this profile's own {{}} "
+        f"Axes that a period carries{_curves(answer)}; the point is this profile's own {{}} "
         f"{nouns(axes, 'axis')}, on {{}} {nouns(nodes, 'node')}.",
         count_value(axes, "axes"),
         count_value(nodes, "nodes"),
@@ -149,11 +149,11 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
             *(
                 TableColumn(figure.label, kind="words" if figure.sort == "word" else "figures", group=one.timing_model)
                 for one in steps
-                for figure in _OVER_PERIOD
+                for figure in _shown_of(one.is_safe)
             ),
         ),
         tuple(_over_period(answer)),
-        Sentence(("Most nodes and axes at the profile's own period and about it",)),
+        Sentence(("Nodes and axes at the profile's own period and about it",)),
     )
     chart = Chart(AxesDrawing(answer.profile, steps), caption)
     return Chapter(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
@@ -166,13 +166,19 @@ def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
         period_us = results[0].period_us
         cells = [attribute_value(PERIOD, results[0], at=f"/results/{number}")]
         for one in results:
-            cells += (attribute_value(figure, one, at=f"/results/{number}") for figure in _OVER_PERIOD)
+            shown = _shown_of(one.verdict is not None)
+            cells += (attribute_value(figure, one, at=f"/results/{number}") for figure in shown)
             number += 1
         yield TableRow(tuple(cells), highlighted=period_us == answer.profile.cycle.period_us)
 
 
+def _shown_of(is_safe: bool) -> tuple[Figure, ...]:
+    """What is shown over the period: what is shown to fit, or the closed form of a model that decides nothing."""
+    return _OVER_PERIOD if is_safe else _CLOSED
+
+
 def _curves(answer: AllAnswers) -> str:
-    """Legend of the curves, if there are several."""
-    if len(answer.steps) == 1:
-        return ""
-    return f": {answer.steps[0].timing_model} solid with a square, {answer.steps[1].timing_model} dashed with a diamond"
+    """Legend of the curves."""
+    names = [f"{one.timing_model}, {'shown to fit' if one.is_safe else 'the closed form'}" for one in answer.steps]
+    marks = ("solid with a square", "dashed with a diamond")
+    return ": " + "; ".join(f"{name}: {mark}" for name, mark in zip(names, marks, strict=False))

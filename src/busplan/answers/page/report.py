@@ -14,13 +14,14 @@ from busplan.answers.page.commands import Sources, shell_word, sources
 from busplan.buses.figure import (
     AVAILABLE,
     AXES,
-    FITS,
-    MARGIN,
-    MAX_AXES,
+    MARGIN_CORRECTED,
     NODES,
     PERIOD,
+    SAFE_AXES,
     TIMING_MODEL,
+    UNCERTAINTY,
     UTILISATION,
+    VERDICT,
     Figure,
     by_key,
 )
@@ -39,7 +40,6 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     attribute_value,
-    figure_value,
 )
 from busplan.forms.numbers import MISSING, plural
 
@@ -170,41 +170,30 @@ def _commands(found: Sources) -> Chapter:
 
 
 def _comparison(subjects: Sequence[_Subject]) -> Table:
-    models = tuple(dict.fromkeys(one.timing_model for each in subjects for one in each.answer.capacity.results))
     columns = (
         TableColumn("profile", kind="words"),
-        TableColumn("fits", kind="words"),
-        TableColumn("models agree", kind="words"),
+        TableColumn("verdict", kind="words"),
         TableColumn("period", "us"),
         TableColumn("nodes"),
         TableColumn("axes"),
         TableColumn("used", "%"),
-        *(TableColumn(model, group="margin, us") for model in models),
-        TableColumn("most axes"),
+        TableColumn("margin", "us"),
+        TableColumn("+/-", "us"),
+        TableColumn("safe axes"),
         *(TableColumn(_CIRCLE[key].symbol, group="contour error, um") for key in _MEASURES),
         TableColumn("circle passed", kind="words"),
     )
-    rows = tuple(TableRow(_compared(one, models)) for one in subjects)
+    rows = tuple(TableRow(_compared(one)) for one in subjects)
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
 
 
-def _compared(subject: _Subject, models: Sequence[str]) -> tuple[Cell, ...]:
+def _compared(subject: _Subject) -> tuple[Cell, ...]:
     verdict, results, found = subject.answer.verdict, subject.answer.capacity.results, subject.sources
     numbers = {one.timing_model: number for number, one in enumerate(results)}
     own, figures = f"/results/{numbers[verdict.deciding.timing_model]}", verdict.deciding
 
-    margins = (
-        attribute_value(MARGIN, results[numbers[one]], at=f"/results/{numbers[one]}") if one in numbers else MISSING
-        for one in models
-    )
-    agree = figure_value(FITS, verdict.models_agree, at="/verdicts/0/models_agree")._replace(key="models_agree")
-    bus = (
-        attribute_value(FITS, figures, at="/verdicts/0"),
-        agree,
-        *(attribute_value(figure, figures, at=own) for figure in (PERIOD, NODES, AXES, UTILISATION)),
-        *margins,
-        attribute_value(MAX_AXES, figures, at=own),
-    )
+    shown = (VERDICT, PERIOD, NODES, AXES, UTILISATION, MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES)
+    bus = tuple(attribute_value(figure, figures, at=own) for figure in shown)
     link = SectionLink(subject.name, subject.key, subject.origin)
     return link, *found["capacity"].gives(bus), *_compared_circle(subject)
 

@@ -32,11 +32,12 @@ DEFAULT_COLUMNS: Final = (
     "required_us",
     "available_us",
     "margin_us",
-    "utilisation",
-    "max_nodes",
+    "margin_corrected_us",
+    "uncertainty_us",
     "max_axes",
-    "limited_by",
-    "fits",
+    "safe_axes",
+    "safe_limited_by",
+    "verdict",
 )
 """Default figures of a table."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
@@ -71,8 +72,10 @@ class Tally:
         """Count one more block."""
         points = block.chunk.points
         self.points += points
-        for number, figures in enumerate(block.models):
-            self._fits[number] += _share(figures["fits"].values, points)
+        for number, (model, figures) in enumerate(zip(self._models, block.models, strict=True)):
+            decides = model == self.bus.deciding_model
+            flags = np.equal(figures["verdict"].values, VERDICTS.index(FITS)) if decides else figures["fits"].values
+            self._fits[number] += _share(flags, points)
         safety = self.bus.safety_figure
         if safety is not None:
             # Settings of the bus are the same under every model.
@@ -96,7 +99,7 @@ class Tally:
         found = whole if self.points == expected else count_value(self.points, grouped=True)
         cut = Sentence(()) if self.points == expected else sentence(" of {} (interrupted)", whole)
         head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(name), found)
-        yield joined(head, cut, Sentence(("; ",)), self._by_model(self._fits), Sentence((" fit.",)), by="")
+        yield joined(head, cut, Sentence(("; ",)), self._fitting(), Sentence((".",)), by="")
         if self._passed is not None:
             yield joined(
                 Sentence(("The circle holds every tolerance at ",)),
@@ -108,6 +111,18 @@ class Tally:
         if self._unsafe and safety is not None:
             words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
             yield sentence(words, count_value(self._unsafe, grouped=True), state="warns")
+
+    def _fitting(self) -> Sentence:
+        parts = (
+            sentence(
+                f"{{}} shown to fit ({model} model)"
+                if model == self.bus.deciding_model
+                else f"{{}} fit by the closed form of the {model} model",
+                count_value(count, grouped=True),
+            )
+            for count, model in zip(self._fits, self._models, strict=True)
+        )
+        return joined(*parts, by=", ")
 
     def _by_model(self, counts: Sequence[int]) -> Sentence:
         parts = (

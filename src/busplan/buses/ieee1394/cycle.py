@@ -56,7 +56,7 @@ class Ieee1394Cycle(BusCycle):
         """Every transaction of the cycle, group by group."""
         network, model, link = self.network, self.model, self.link
         return tuple(
-            exchange(network, group, kind, model=model, link=link, suffix=f",{kind}")  # type: ignore[arg-type]
+            exchange(network, group, kind, model=model, link=link, suffix=f",{kind}")
             for kind in TRANSACTION_KINDS
             for group in network.groups
         )
@@ -196,10 +196,7 @@ class Ieee1394Cycle(BusCycle):
         """One read and one write of the farthest node."""
         setup = {"hops": self.link.hops, "gap_count": self.link.gap_count}
         (group,) = self.network.groups
-        found = (
-            exchange(self.network, group, kind, model=self.model, link=self.link)  # type: ignore[arg-type]
-            for kind in TRANSACTION_KINDS
-        )
+        found = (exchange(self.network, group, kind, model=self.model, link=self.link) for kind in TRANSACTION_KINDS)
         return tuple(BusLatency(one.kind, one.payload_bytes, {**setup, **one.phases._asdict()}) for one in found)
 
     def events(self) -> Iterator[BusEvent]:

@@ -70,12 +70,22 @@ def of_cycle(
     phy_us = PHY_DELAY_HALF_WIDTH_US / _RECTANGULAR if link.phy_delay_us is None else 0.0
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
-        """Half of the difference that a change up and down makes: the central difference."""
+        """What one standard uncertainty changes, as the larger of two steps of two: up and down.
+
+        The cycle never falls with either time and has kinks, at which a central difference covers too little.
+        """
         own = one.responder
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
-        up_us = busy_us(answer, gaps=gaps, execution_us=bound_us + execution_us, host_us=own.host_us + host_us)
-        down_us = busy_us(answer, gaps=gaps, execution_us=bound_us - execution_us, host_us=own.host_us - host_us)
-        return (up_us - down_us) / 2
+
+        def busy_at(steps: int) -> Number:
+            return busy_us(
+                answer,
+                gaps=gaps,
+                execution_us=bound_us + steps * execution_us,
+                host_us=own.host_us + steps * host_us,
+            )
+
+        return larger(busy_at(2) - busy_at(0), busy_at(0) - busy_at(-2)) / 2
 
     return (
         Doubt("residual", "residual of Table I", halves * _spread_us(network)),
