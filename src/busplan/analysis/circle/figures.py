@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, Figure, by
+from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, Figure, by, by_key
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)
@@ -121,3 +121,5 @@ CIRCLE_FIGURES: Final = (
     Figure("failures", "failures", "profile", "what the circle does not hold"),
     Figure("contributions", "contributions", "simulation", "what each error source takes of the largest error"),
 )
+CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
+"""The same by key."""

@@ -8,7 +8,7 @@ from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, TypeGuard
 
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.network import bus_of, model_names
 from busplan.buses import figure as known
 from busplan.buses.bus import Bus
@@ -37,7 +37,7 @@ VERDICT_FITS: Final = Figure(
     better="more",
 )
 _CIRCLE: Final = tuple(
-    by_key(CIRCLE_FIGURES)[key]
+    CIRCLE_BY_KEY[key]
     for key in (
         "passed",
         "stable",
