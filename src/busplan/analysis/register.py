@@ -5,7 +5,7 @@ from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Final, Literal
 
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.buses.bus import Bus
 from busplan.buses.figure import VERDICT_FIGURES, Figure, by_key
 from busplan.errors import BusplanError
@@ -27,7 +27,7 @@ def figures_of(bus: Bus) -> dict[CommandName, dict[str, Figure]]:
     return {
         "capacity": by_key((*bus.capacity_figures, *VERDICT_FIGURES)),
         "latency": by_key(bus.latency_figures),
-        "circle-test": by_key(CIRCLE_FIGURES),
+        "circle-test": dict(CIRCLE_BY_KEY),
     }
 
 

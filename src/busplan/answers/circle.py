@@ -5,12 +5,11 @@ from functools import partial
 from typing import Final
 
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
 from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence, setup_values, source_words
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
-from busplan.buses.figure import by_key
 from busplan.drawings.circle import CircleDrawing
 from busplan.forms.blocks import (
     Bar,
@@ -32,7 +31,6 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import period
 from busplan.sections.profile import Profile
 
-_FIGURES: Final = by_key(CIRCLE_FIGURES)
 _SHOWN: Final = (
     *("mean_contour_error_mm", "max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"),
     *("circular_deviation_mm", "radius_deviation_mm", "phase_margin_deg", "gain_margin_db", "crossover_hz"),
@@ -122,7 +120,7 @@ def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
         Owner(TableColumn(period(result.period_us)), result, f"/results/{start + number}")
         for number, result in enumerate(results)
     ]
-    rows = ((_FIGURES[key], 0) for key in _SHOWN)
+    rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN)
     return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
 
 
@@ -144,7 +142,8 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
         place = f"{at}/contributions/{number}"
         takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
         left = (
-            attribute_value(_FIGURES[key], one, at=place) for key in ("max_contour_error_mm", "circular_deviation_mm")
+            attribute_value(CIRCLE_BY_KEY[key], one, at=place)
+            for key in ("max_contour_error_mm", "circular_deviation_mm")
         )
         rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (

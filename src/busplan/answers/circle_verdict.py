@@ -1,16 +1,12 @@
 """The verdict of a circle test in sentences."""
 
 from collections.abc import Iterator
-from typing import Final
 
 from busplan.analysis.circle.failures import Stated
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
-from busplan.buses.figure import by_key
 from busplan.forms.blocks import Code, Part, Sentence, ShownValue, figure_value, joined, sentence
 from busplan.forms.numbers import period_value
-
-_FIGURES: Final = by_key(CIRCLE_FIGURES)
 
 
 def circle_sentences(
@@ -38,14 +34,14 @@ def circle_sentences(
     measure, attack = failed_measure(result), to_attack(result)
     if measure is None:
         return
-    label = _FIGURES[measure].label
+    label = CIRCLE_BY_KEY[measure].label
     if attack is not None:
         source, removed_mm = attack
         place = (result.contributions or ()).index(source)
         left = f"{at}/contributions/{place}/{measure}" if with_contributions else ""
         yield sentence(
             f"Attack {source_words(source.source)} first: without it the {label} is {{}}, {{}} less.",
-            figure_value(_FIGURES[measure], getattr(source, measure), at=left),
+            figure_value(CIRCLE_BY_KEY[measure], getattr(source, measure), at=left),
             ShownValue(removed_mm, "removed_mm", "um", 3),
         )
     elif result.contributions is not None:
@@ -62,7 +58,7 @@ def setup_values(result: CircleFigures, *, at: str) -> tuple[ShownValue, ShownVa
     at
         JSON pointer to its figures.
     """
-    feed = figure_value(_FIGURES["feed_mm_per_min"], result.feed_mm_per_min, at=f"{at}/feed_mm_per_min")
+    feed = figure_value(CIRCLE_BY_KEY["feed_mm_per_min"], result.feed_mm_per_min, at=f"{at}/feed_mm_per_min")
     return period_value(result.period_us, at=f"{at}/period_us"), feed
 
 

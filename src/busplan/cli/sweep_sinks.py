@@ -1,4 +1,4 @@
-"""Where the blocks of a sweep go: the rows at the top, rows as text, or one JSON document."""
+"""Destinations for the blocks of a sweep: the top rows, rows as text, or one JSON document."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 
 class Sink(Protocol):
-    """Where blocks go."""
+    """Destination for blocks."""
 
     def add(self, block: "SweepBlock") -> None:
-        """Take one more block."""
+        """Add a block."""
 
     def finish(self, *, complete: bool) -> None:
-        """End the document; without all blocks it is a partial one."""
+        """End the document; it is marked as partial unless complete."""
 
 
 def sink_for(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Sink:
-    """Where the document goes."""
+    """Make the destination of a sweep."""
     write = emit_document if file is None else partial(_write, file)
     match job.form:
         case "csv" | "jsonl":
@@ -43,7 +43,7 @@ def _write(file: BinaryIO, text: str) -> None:
 
 
 class _TopSink:
-    """Keeps the rows at the top, for an answer at the end."""
+    """Keeps the top rows for an answer at the end."""
 
     def __init__(self, job: "SweepJob", form: Form, file: BinaryIO | None, tally: "Tally") -> None:
         from busplan.answers.sweep.top import TopRows
@@ -52,7 +52,7 @@ class _TopSink:
         self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
         self.add = self._rows.add
 
-    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - the tally knows
+    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - `tally` has the number of points
         """Write the answer."""
         from busplan.answers.sweep.top import sweep_report
 
@@ -69,7 +69,7 @@ def _not_kept() -> NoReturn:
 
 
 class _LinesSink:
-    """Writes every row as it comes, and each ends itself."""
+    """Writes every row as a line."""
 
     def __init__(self, job: "SweepJob", form: "Style", write: Callable[[str], None]) -> None:
         from busplan.answers.sweep.rows import csv_header, jsonl_header
@@ -78,17 +78,17 @@ class _LinesSink:
         write(csv_header(job.columns) if form == "csv" else jsonl_header(job.profile.name, job.grid, job.timing_models))
 
     def add(self, block: "SweepBlock") -> None:
-        """Write one more block."""
+        """Write a block."""
         from busplan.answers.sweep.rows import block_text
 
         self._write(block_text(block, self._columns, style=self._form))
 
     def finish(self, *, complete: bool) -> None:
-        """Nothing is left to write."""
+        """Do nothing: lines need no end."""
 
 
 class _JsonSink:
-    """Writes one document, row by row."""
+    """Writes one JSON document, block by block."""
 
     def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
         from busplan.answers.sweep.rows import json_header
@@ -97,13 +97,13 @@ class _JsonSink:
         write(json_header(job.profile.name, job.grid, job.timing_models))
 
     def add(self, block: "SweepBlock") -> None:
-        """Write one more block."""
+        """Write a block."""
         from busplan.answers.sweep.rows import json_rows
 
         self._write(json_rows(block, self._columns))
 
     def finish(self, *, complete: bool) -> None:
-        """Close the document; one that is not whole says so, and is still JSON."""
+        """Close the document; a partial one is valid JSON that says so."""
         from busplan.answers.sweep.rows import json_footer
 
         self._write(json_footer(complete=complete))

@@ -114,7 +114,7 @@ class Document:
         """
         long_key = self._long_key()
         if long_key:
-            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts; no profile has one")
+            raise self.syntax_error(long_key.start(1), f"a key of more than {_MAX_KEY_PARTS} parts is no profile's")
         try:
             return tomllib.loads(self.text)
         except RecursionError:

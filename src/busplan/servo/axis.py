@@ -1,4 +1,4 @@
-"""One axis from its set-points to its position, by a fixed-step simulation of loop and drive."""
+"""Simulate one axis, from set-points to position, with a fixed step."""
 
 from typing import TYPE_CHECKING, cast
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 MAX_STEPS = 50_000_000
-"""Two axes of that many positions take 800 MB."""
+"""Positions of two axes take 800 MB."""
 
 _US_PER_S = 1e6
 _LARGEST_COUNT = 2.0**51
-"""Where `busplan.servo.kernel.ROUND` ends to be exact."""
+"""Largest number that `busplan.servo.kernel.ROUND` rounds exactly."""
 
 _SIGNATURE = (
     "int64(float64[::1], UniTuple(float64, 13), float64[::1], int64[::1], float64[::1], float64[::1], float64[::1], "
     "int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])"
 )
 _CHUNK_STEPS = {False: 30_000, True: 250_000}
-"""Steps between two reports of progress: some 40 ms of plain Python, some 6 ms compiled."""
+"""Steps between two progress reports: about 40 ms in plain Python, about 6 ms compiled."""
 
 
 def simulate_axis(
@@ -47,19 +47,19 @@ def simulate_axis(
     Parameters
     ----------
     setpoints_mm
-        One set-point a cycle, the start at rest included, shape (cycles + 1,) [mm].
+        One set-point for each cycle, after the start at rest, shape (cycles + 1,) [mm].
     axis
         Controller, drive and encoder.
     timing
-        Where the loop is closed, and how often.
+        Timing of the loop.
     arrivals
-        When and whether the packets arrive (`busplan.servo.delivery.arrivals`); all of them on time by default.
-        A loop on the host loses a velocity command instead of a set-point, and the last one stands whatever
-        `on_loss` says: to hold a velocity is to extrapolate a position.
+        When and whether the packets arrive (`busplan.servo.delivery.arrivals`); by default all on time. A loop on the
+        host loses a velocity command instead of a set-point and keeps the last one, whatever `on_loss`: holding a
+        velocity extrapolates the position.
     progress
-        Called with the number of steps done and to be done, now and then.
+        Called from time to time with the steps done and the total.
     engine
-        "auto" (numba when it is installed), "numba" or "python"; the result is the same.
+        "auto" (numba if it is installed), "numba" or "python"; the result is the same.
 
     Returns
     -------
@@ -76,16 +76,15 @@ def simulate_axis(
     -----
     With the error e = target - encoder(position), sampled each control period h (the step on a node, the period on
     a host), the command is ``u = kp e + ki h sum(e) + kd (e - e before) / h + feed-forward``, clipped to the range
-    of the DAC (and then not integrated any further into the limit) and rounded to its levels.
-    The feed-forward takes the velocity and acceleration of the target from the set-points.
+    of the DAC (with anti-windup) and rounded to its levels. The feed-forward uses the velocity and acceleration of the
+    set-points.
 
-    A node moves its target on the line between the last two set-points and reaches the newest one period late;
-    holding, it takes each set-point over one period late. A loop on the host samples at each synchronous packet;
-    its command takes effect `delay_us` later, but not later than the next such packet.
+    A node with linear interpolation moves its target on the line between the last two set-points and reaches the newest
+    one after a period; with hold, it uses each set-point a period late. A loop on the host samples at each synchronous
+    packet; its command takes effect `delay_us` later, at the latest with the next such packet.
 
     The drive follows command plus offset as a first-order lag. Coulomb friction, ``-reversal tanh(v / smoothing)``
-    with the drive velocity v, disturbs the velocity, and the drive takes the disturbance back with the time
-    constant of its recovery.
+    with the drive velocity v, disturbs the velocity; the disturbance decays with the time constant of its recovery.
 
     References
     ----------
@@ -95,7 +94,7 @@ def simulate_axis(
 
     Examples
     --------
-    An ideal drive with velocity feed-forward stands on its target, one period late:
+    An ideal drive with velocity feed-forward follows the set-points one period late:
 
     >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0, velocity_feedforward=1.0)
     >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
@@ -110,7 +109,7 @@ def simulate_axis(
     state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
     for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
         out = position_mm[done:]
-        # Plain Python handles its own floats twice as fast as numpy's.
+        # Plain Python is twice as fast with Python floats as with numpy floats.
         done += run(state, constants, out, *rows) if run else _run_plain(state, constants, rows, out)
         if progress is not None:
             progress(done, len(position_mm))
@@ -120,7 +119,7 @@ def simulate_axis(
 def axis_targets(
     setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals | None = None, every: int = 1
 ) -> Floats:
-    """Give the target that `simulate_axis` follows, at the end of every step or of every n-th.
+    """Return the targets that `simulate_axis` follows, at the end of every n-th step.
 
     Parameters
     ----------
@@ -132,7 +131,7 @@ def axis_targets(
     Returns
     -------
     ndarray
-        The targets that belong to ``simulate_axis(...)[every - 1 :: every]`` [mm].
+        Targets of ``simulate_axis(...)[every - 1 :: every]`` [mm].
 
     Examples
     --------
@@ -160,7 +159,7 @@ def _run_plain(state: Floats, constants: Constants, rows: KernelRows, out: Float
 
 
 def _at_rest(position_mm: float, axis: Axis) -> Floats:
-    """State of the kernel for an axis that stands on its target."""
+    """State of the kernel for an axis at rest on its target."""
     resolution = axis.encoder_resolution_mm
     error = position_mm - (position_mm * (1 / resolution) + ROUND - ROUND) * resolution if resolution else 0.0
     return np.array([position_mm, 0.0, 0.0, 0.0, 0.0, 0.0, error])
@@ -189,7 +188,7 @@ def _constants(axis: Axis, timing: LoopTiming) -> Constants:
 
 
 def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> int:
-    """Count the steps of a move; refuse more than memory and arithmetic bear.
+    """Count the steps of a move; refuse too many for memory and arithmetic.
 
     Parameters
     ----------

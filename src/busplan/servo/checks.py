@@ -1,4 +1,4 @@
-"""What a parameter must be, and what is said when it is not."""
+"""Declare parameters with their ranges, and check values."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -8,11 +8,11 @@ from typing import Any, NamedTuple, TypeVar, get_args
 from busplan.errors import BusplanError
 
 LARGEST = 1e9
-"""Beyond this a gain, a length or a time is a slip of the keyboard; products of them stay far from overflow."""
+"""A larger gain, length or time is a typing error; products of allowed values do not overflow."""
 SHORTEST_STEP_US = 1e-3
 
 _MULTIPLE_TOLERANCE = 1e-9
-"""Periods such as 1000 / 3 us are no exact floats; a relative 1e-9 is a microsecond in a quarter of an hour."""
+"""Periods such as 1000 / 3 us are not exact floats; a relative 1e-9 is a microsecond in a quarter of an hour."""
 _KNOWN = "known"
 _Value = TypeVar("_Value")
 
@@ -21,20 +21,20 @@ class Refused(NamedTuple):
     """One value that cannot be simulated."""
 
     name: str
-    """Of the parameter, as the user knows it."""
+    """Name of the parameter for the user."""
     value: object
-    """As the message shows it."""
+    """Value as the message shows it."""
     right: str
     """What would be right."""
 
     @property
     def message(self) -> str:
-        """All of it in one sentence."""
+        """Message with name, value and what would be right."""
         return f"{self.name} = {self.value}: {self.right}"
 
 
 class ParameterError(BusplanError):
-    """Parameters that cannot be simulated, each by its name.
+    """Parameters that cannot be simulated.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ class ParameterError(BusplanError):
         self.refused = refused
 
     def __reduce__(self) -> tuple[Callable[..., "ParameterError"], tuple[Refused, ...]]:
-        """Travel between processes as what it was made of: an exception by itself travels as its message."""
+        """Pickle with all arguments; by default, an exception is pickled with its message only."""
         return ParameterError, self.refused
 
 
 def refuse(*refused: Refused) -> None:
-    """Raise all that is wrong together; nothing wrong, no exception.
+    """Raise one error for all refused values; without any, do nothing.
 
     Parameters
     ----------
@@ -77,20 +77,20 @@ def refuse(*refused: Refused) -> None:
 
 
 class Known(NamedTuple):
-    """What is known of a parameter besides its name, its type and its default."""
+    """Metadata of a parameter."""
 
     description: str
-    """With the unit in brackets at its end."""
+    """Description that ends in the unit in brackets."""
     example: object
     least: float | None
-    """Smallest value; None for a word, whose type lists what is allowed."""
+    """Smallest value; None for a word, whose type lists the allowed ones."""
     most: float | None
     never: tuple[int, str] | None
-    """A value between them that is not allowed, and what would be right."""
+    """A value between `least` and `most` that is not allowed, and what would be right."""
 
 
 class Parameter(NamedTuple):
-    """One value that can be set."""
+    """One parameter of a dataclass."""
 
     name: str
     type: object
@@ -107,13 +107,13 @@ def parameter(
     most: float | None = None,
     never: tuple[int, str] | None = None,
 ) -> _Value:
-    """Declare a parameter: a field of a dataclass with its default and what else is known of it."""
+    """Declare a parameter: a field of a dataclass with its default and metadata."""
     known = Known(description, example, least, most, never)
     return field(default=default, metadata={_KNOWN: known})
 
 
 def parameters(of: Any) -> Iterator[Parameter]:
-    """Give every parameter of a dataclass, in the order of its fields.
+    """Yield every parameter of a dataclass, in the order of its fields.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def out_of_range(values: Any) -> Iterator[Refused]:
     Yields
     ------
     Refused
-        What is wrong with which value, and what would be right.
+        Each value that is not allowed.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def not_positive(**values: float) -> Iterator[Refused]:
     Parameters
     ----------
     **values
-        Name and value, the name as the user knows it.
+        Values by the user's name of the parameter.
 
     Examples
     --------
@@ -202,7 +202,7 @@ def not_one_of(*allowed: str, **values: str) -> Iterator[Refused]:
 
 
 def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
-    """Yield the step whose period is no whole number of it.
+    """Yield the step if the period is not a multiple of it.
 
     Parameters
     ----------

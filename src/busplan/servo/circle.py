@@ -1,4 +1,4 @@
-"""The circle test: path, bus, both axes, mechanics and measures, joined."""
+"""Simulate and measure a circle test."""
 
 import math
 from collections.abc import Iterator
@@ -25,14 +25,14 @@ _IDEAL_DELIVERY = Delivery()
 _IDEAL_MECHANICS = Mechanics()
 FULL_TURN_DEG = 360.0
 _FOLLOWING_DEG = 36.0
-"""What a following error may lack of the full turn when the set-points end: a tenth of it."""
+"""Largest deviation from a full turn that counts as a following error: a tenth of it."""
 _SETTLING_SHARE = 0.2
-"""The measures at constant speed leave out at most this share of it for the loop to settle: 270 degrees stay."""
+"""Largest share of the constant speed that the measures leave out for settling: at least 270 degrees remain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trace:
-    """What happened over time, all of shape (n,)."""
+    """Time series of a simulation, each of shape (n,)."""
 
     time_us: Floats
     command_x_mm: Floats
@@ -49,19 +49,19 @@ class CircleRun:
     Parameters
     ----------
     path, x, y, timing
-        What was simulated.
+        Input of the simulation.
     arrivals_x, arrivals_y
         When and whether the packets arrived.
     x_mm, y_mm
         Position of the table at the end of every step, shape (steps,) [mm].
     contour
-        The measures; finite even when the loop is unstable.
+        Measures; finite even if the loop is unstable.
     covered_deg
-        How far the table went round the centre in the whole move, positive in the direction of the path [deg].
+        Angle of the whole move about the centre, positive in the direction of the path [deg].
     constant_speed
-        The steps that the measures at constant speed are taken from.
+        Steps of the measures at constant speed.
     constant_speed_deg
-        How far it went in those [deg].
+        Angle of these steps about the centre [deg].
     margins_x, margins_y
         Stability of both position loops.
     """
@@ -88,17 +88,17 @@ class CircleRun:
 
     @property
     def follows(self) -> bool:
-        """Whether the table went round with the path: once, and never more than the radius away."""
+        """Whether the table made one turn with errors up to the radius."""
         return not self.diverged and abs(self.covered_deg - FULL_TURN_DEG) <= _FOLLOWING_DEG
 
     @property
     def diverged(self) -> bool:
-        """Whether a loop is unstable, or the table left the circle by more than its radius."""
+        """Whether a loop is unstable, or a contour error exceeds the radius."""
         stable = self.margins_x.stable and self.margins_y.stable
         return not stable or self.contour.max_contour_error_mm > self.path.radius_mm
 
     def trace(self, *, every: int = 1) -> Trace:
-        """Give time, targets, positions and contour error at every n-th step.
+        """Return time, targets, positions and contour error at every n-th step.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class CircleRun:
         Returns
         -------
         Trace
-            The targets are those the loops followed: interpolated, late and lost as they were.
+            Its targets are those that the loops followed, with interpolation, delays and losses.
         """
         if every < 1:
             refuse(Refused("every", every, "must be 1 or more"))
@@ -145,15 +145,15 @@ def simulate_circle(
     x, y
         The axes.
     timing
-        Where the loops are closed and how often; its period is the path's.
+        Timing of the loops; its period must be that of the path.
     delivery
-        How set-points arrive; perfectly by default.
+        Delivery of the set-points; perfect by default.
     mechanics
-        What lies between encoders and table; nothing by default.
+        Errors between encoders and table; none by default.
     progress
-        Called with the number of steps done and to be done, over both axes, now and then.
+        Called from time to time with the steps done and the total of both axes.
     engine
-        "auto" (numba when it is installed), "numba" or "python"; the result is the same.
+        "auto" (numba if it is installed), "numba" or "python"; the result is the same.
 
     Returns
     -------
@@ -168,8 +168,8 @@ def simulate_circle(
 
     Notes
     -----
-    The measures at constant speed begin when the set-points have reached the feed, one period has passed and the loops
-    have settled to a thousandth, but they leave out no more than a fifth; they end when the set-points slow down.
+    The measures at constant speed begin one period after the set-points have reached the feed, when the loops have
+    settled to a thousandth, at the latest after a fifth of the constant speed. They end when the set-points slow down.
 
     References
     ----------
@@ -201,7 +201,7 @@ def simulate_circle(
     move_to_table(x_mm, y_mm=y_mm, mechanics=mechanics, engine=engine)
     margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
     constant_speed = _constant_speed(path, timing=timing, margins=(margins_x, margins_y))
-    # Either way round, the path's own direction counts as positive.
+    # The direction of the path counts as positive.
     forward = 1.0 if path.direction == "ccw" else -1.0
     return CircleRun(
         path=path,
@@ -224,7 +224,7 @@ def simulate_circle(
 def check_circle(
     path: CirclePath, *, x: Axis, y: Axis, timing: LoopTiming, delivery: Delivery = _IDEAL_DELIVERY
 ) -> None:
-    """Refuse what `simulate_circle` cannot simulate, without simulating anything.
+    """Check the arguments of `simulate_circle` without simulating.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def check_circle(
     Raises
     ------
     BusplanError
-        As `simulate_circle`, but for "numba".
+        As `simulate_circle`, except for "numba".
 
     Examples
     --------
@@ -256,7 +256,7 @@ def check_circle(
 
 
 def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refused]:
-    """A drive that cannot keep up with the feed in both directions."""
+    """Refuse a drive that cannot reach the feed in both directions."""
     highest_mm_s, offset_mm_s = axis.highest_command_mm_s, abs(axis.drive_offset_mm_s)
     levels = f" and dac_bits = {axis.dac_bits}" if axis.dac_bits else ""
     if offset_mm_s >= highest_mm_s:
@@ -276,11 +276,11 @@ def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refuse
 
 
 def _constant_speed(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> slice:
-    """Steps at constant speed, without those in which the loops settle; at least one."""
+    """Steps at constant speed without settling; at least one."""
     start, stop = path.constant_from_us + path.period_us, path.constant_until_us
     settling = max(0.0 if margin.settling_us is None else margin.settling_us for margin in margins)
     start += min(settling, _SETTLING_SHARE * max(stop - start, 0.0))
-    # Entry n of the positions is the state at the end of step n + 1.
+    # Position n is that at the end of step n + 1.
     first = math.ceil(start / timing.step_us) - 1
     last = max(math.floor(stop / timing.step_us), first + 1)
     return slice(first, last)

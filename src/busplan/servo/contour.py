@@ -1,4 +1,4 @@
-"""How far from the circle: contour error of the whole move, and what ISO 230-4 reads from a circular test."""
+"""Contour error of a move, and the measures of circular tests in ISO 230-4."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _BLOCK = 1 << 15
-"""Points looked at together: little memory beside the positions, and it stays in the cache."""
+"""Points computed at once: little memory, and it fits into the cache."""
 _ITERATIONS = 20
 _CONVERGED_MM = 1e-10
 _DEG_PER_TURN = 360.0
@@ -17,7 +17,7 @@ _DEG_PER_TURN = 360.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contour:
-    """What a circular test shows.
+    """Measures of a circular test.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Contour:
 
 
 def contour_error(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> Floats:
-    """Give the contour error of each point.
+    """Contour error of each point.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
     radius_mm
         Nominal radius [mm].
     constant_speed
-        The points at constant speed, with a start and a stop; at least one.
+        Points at constant speed, at least one; a slice with start and stop.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
 
     Examples
     --------
-    A circle that is 2 um too large and sits 1 um off:
+    A circle with a radius 2 um too large and a centre 1 um off:
 
     >>> angle = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
     >>> x, y = 100.002 * np.cos(angle) + 0.001, 100.002 * np.sin(angle)
@@ -124,14 +124,14 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
 
 
 def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> float:
-    """Tell how far the table went round the centre: the angle from first to last point, whole turns included.
+    """Angle from the first to the last point about the centre, including whole turns.
 
     Parameters
     ----------
     x_mm, y_mm
         Positions of the table about the centre of the nominal circle, in order of time, shape (n,) each [mm].
     part
-        The points to look at, with a start and a stop; all of them by default.
+        Points to use, a slice with start and stop; by default all.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> flo
 
     Notes
     -----
-    Contour errors are blind to it: a table that stands still at any point of the circle has none.
+    Contour errors do not show it: a table that stands still on the circle has none.
 
     Examples
     --------
@@ -150,7 +150,7 @@ def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> flo
     """
     total = 0.0
     for block in blocks(slice(0, len(x_mm)) if part is None else part):
-        # One point more at the front: where the block before ended.
+        # Start with the last point of the block before.
         joined = slice(max(block.start - 1, 0 if part is None else part.start), block.stop)
         turned = np.diff(np.arctan2(y_mm[joined], x_mm[joined])) / (2 * np.pi)
         total += float((turned - np.rint(turned)).sum())
@@ -158,7 +158,7 @@ def covered_deg(x_mm: Floats, *, y_mm: Floats, part: slice | None = None) -> flo
 
 
 def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tuple[tuple[float, float], float]:
-    """Fit a circle so that the sum of squared radial distances from it is smallest.
+    """Fit a circle by least squares of the radial distances.
 
     Parameters
     ----------
@@ -174,9 +174,9 @@ def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tup
 
     Notes
     -----
-    Gauss-Newton steps for the centre and the deviation of the radius. Only small differences from the nominal
-    circle enter the equations, so a nanometre on a metre is found; fits of x^2 + y^2 lose it. The smallest-norm
-    solution is taken where the points leave something open (an axis that stands still).
+    Gauss-Newton steps for the centre and the deviation of the radius. The equations contain only small differences from
+    the nominal circle, so they resolve a nanometre on a metre; fits of x^2 + y^2 do not. If the solution is not unique
+    (an axis that stands still), the one of smallest norm is taken.
 
     References
     ----------
@@ -223,17 +223,17 @@ def _range_about(
 
 
 def blocks(part: slice) -> Iterator[slice]:
-    """Cut a part of the positions into pieces that take little memory.
+    """Split a part of the positions into blocks, to save memory.
 
     Parameters
     ----------
     part
-        The points, with a start and a stop.
+        The points, a slice with start and stop.
 
     Yields
     ------
     slice
-        The pieces, in order.
+        The blocks, in order.
 
     Examples
     --------

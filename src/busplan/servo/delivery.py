@@ -1,8 +1,8 @@
-"""How set-points arrive: the jitter of the synchronous packet, the skew between nodes, lost packets.
+"""Arrival of set-points: jitter of the synchronous packet, skew between nodes, lost packets.
 
-The synchronous packet (SP) is one broadcast: when it is late it is late for every node, so its jitter is common
-to all axes. A set-point travels in a packet of its own to its own node, so losses are drawn for each node on
-its own. Each random quantity has its own stream: taking the losses away does not change the jitter.
+The synchronous packet (SP) is a broadcast, so its jitter is common to all axes. Each node receives its set-points in
+packets of its own, so losses are drawn for each node separately. Each random quantity has its own stream: removing the
+losses does not change the jitter.
 """
 
 from dataclasses import dataclass
@@ -24,16 +24,16 @@ _LOSS_STREAM = {"x": 1, "y": 2}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Arrivals:
-    """When and whether the packets of each cycle reach one node; the first and last entry stand for the rest there.
+    """When and whether the packets of each cycle reach one node; the first and last entry are the axis at rest.
 
     Parameters
     ----------
     offsets_us
-        How much later than planned the SP of each cycle takes effect, shape (cycles + 1,) [us].
+        Delay of the SP of each cycle, shape (cycles + 1,) [us].
     lost
-        True where the packet with the set-point (of a loop on the host: with the command) is lost, same shape.
+        True if the packet with the set-point (for a loop on the host: the command) is lost, same shape.
     on_loss
-        What the node does then.
+        Behaviour of the node after a loss.
     """
 
     offsets_us: Floats
@@ -42,7 +42,7 @@ class Arrivals:
 
     @classmethod
     def punctual(cls, cycles: int) -> Self:
-        """Everything arrives, and on time.
+        """Arrivals without delay and loss.
 
         Examples
         --------
@@ -69,7 +69,7 @@ def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: floa
     Returns
     -------
     Arrivals
-        The same for the same seed.
+        The same seed gives the same arrivals.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def arrivals(delivery: Delivery, *, name: AxisName, cycles: int, period_us: floa
 
 
 def check_delivery(delivery: Delivery, *, period_us: float) -> None:
-    """Refuse a delivery that would mix up the packets of two cycles.
+    """Refuse a delivery that would change the order of packets.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def check_delivery(delivery: Delivery, *, period_us: float) -> None:
 
 
 def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:
-    """How much later than planned each SP takes effect on a node.
+    """Delay of each SP at a node.
 
     Parameters
     ----------
@@ -130,18 +130,18 @@ def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, perio
     Returns
     -------
     ndarray
-        Lateness of SP k, shape (cycles + 1,) [us]; uniform within plus or minus the jitter, about the skew. The
-        first and the last are 0: there the axes stand, and the move begins and ends with them.
+        Delay of SP k, shape (cycles + 1,) [us]; uniform within plus or minus the jitter, about the skew. The first and
+        the last are 0, because the axes are at rest.
 
     Raises
     ------
     BusplanError
-        Jitter and skew together exceed half the period: the SPs would lose their order.
+        Jitter and skew together exceed half the period, which could change the order of the SPs.
 
     Notes
     -----
-    Only the spread of the arrival counts. That a real delay has a lower bound and no upper one moves its mean,
-    and a mean delay common to all axes changes no contour.
+    Only the spread of the delay matters. A real delay is skewed, but that changes its mean, and a mean delay common to
+    all axes does not change the contour.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, perio
 
 
 def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
-    """Tell in which cycles the packet to one node is lost.
+    """Draw the cycles in which the packet to one node is lost.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
     Returns
     -------
     ndarray
-        True where the packet of cycle k is lost, shape (cycles + 1,); never at k = 0, where the axes stand.
+        True if the packet of cycle k is lost, shape (cycles + 1,); never for k = 0, at rest.
 
     Examples
     --------
@@ -185,16 +185,16 @@ def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
 
 
 def received_mm(setpoints_mm: Floats, *, lost: Flags, on_loss: OnLoss) -> Floats:
-    """Set-points as the node has them.
+    """Set-points that the node uses.
 
     Parameters
     ----------
     setpoints_mm
         Set-points as sent, shape (cycles + 1,) [mm].
     lost
-        True where one did not arrive, same shape.
+        True if a set-point is lost, same shape.
     on_loss
-        "hold": the last one stands. "extrapolate": the line through the last two goes on.
+        "hold": keep the last one. "extrapolate": continue the line through the last two.
 
     Returns
     -------
@@ -210,7 +210,7 @@ def received_mm(setpoints_mm: Floats, *, lost: Flags, on_loss: OnLoss) -> Floats
     [0.0, 1.0, 1.0, 1.0]
     """
     received = setpoints_mm.copy()
-    # In order, for a loss may follow a loss.
+    # In order: a loss may follow another.
     for cycle in np.flatnonzero(lost).tolist():
         last = received[cycle - 1]
         before = received[max(cycle - 2, 0)] if on_loss == "extrapolate" else last

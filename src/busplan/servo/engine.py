@@ -1,4 +1,4 @@
-"""Compiled by numba where that helps, plain Python where it does not."""
+"""Compile functions with numba, if it is available."""
 
 from collections.abc import Callable
 from functools import cache
@@ -11,12 +11,12 @@ Engine = Literal["auto", "python", "numba"]
 
 
 def is_compiled(engine: Engine) -> bool:
-    """Whether that engine would run compiled code here.
+    """Whether an engine runs compiled code.
 
     Parameters
     ----------
     engine
-        "auto" takes numba when it is installed.
+        "auto" uses numba if it is installed.
 
     Returns
     -------
@@ -26,7 +26,7 @@ def is_compiled(engine: Engine) -> bool:
     Raises
     ------
     BusplanError
-        numba is asked for and not installed.
+        "numba" is requested and not installed.
 
     Examples
     --------
@@ -41,32 +41,32 @@ def is_compiled(engine: Engine) -> bool:
 
 @cache
 def compiled(function: Callable[..., Any], signature: str) -> Callable[..., Any] | None:
-    """Compile a function with numba, once a machine: the machine code is cached on disk.
+    """Compile a function with numba; the machine code is cached on disk.
 
     Parameters
     ----------
     function
         A module-level function that numba can compile.
     signature
-        Its numba signature: compiling for it at once keeps all that can go wrong in this one place.
+        Its numba signature, so that all errors of compilation occur here.
 
     Returns
     -------
     callable or None
-        The compiled function; None without a numba that works, and where no cache can be read or written:
-        compiling anew at each start takes as long as plain Python takes for a whole circle.
+        The compiled function; None if numba does not work, or no cache can be read or written: compiling at each start
+        would take as long as a circle in plain Python.
 
     Examples
     --------
-    >>> double = compiled(lambda x: 2 * x, "float64(float64)")  # no file to keep a cache for
+    >>> double = compiled(lambda x: 2 * x, "float64(float64)")  # no file, so no cache
     >>> double is None
     True
     """
     try:
         import numba  # noqa: PLC0415 - an optional extra that takes a fifth of a second to load
-    except Exception:  # noqa: BLE001 - a broken installation fails in many ways, and nothing depends on it
+    except Exception:  # noqa: BLE001 - a broken installation fails in many ways, and numba is optional
         return None
     try:
         return numba.njit(signature, cache=True)(function)
-    except Exception:  # noqa: BLE001 - a damaged cache raises whatever unpickling garbage raises
+    except Exception:  # noqa: BLE001 - unpickling a damaged cache may raise anything
         return None

@@ -1,11 +1,10 @@
-"""The fixed-step kernel: one function, plain Python and numba alike.
+"""The fixed-step kernel: one function for plain Python and numba.
 
-It runs over the rows of a move (see `busplan.servo.rows`). A row is a run of sub-steps of equal length;
-its action says what happens in each: sample and control, let the command take effect, store the position.
+It runs over the rows of a move (see `busplan.servo.rows`). A row is a number of sub-steps of equal length; its action
+says what happens in each: sample and control, let the command take effect, store the position.
 
-Only what numba compiles is used, and `x + ROUND - ROUND` for `round(x)`, a call that plain Python would feel: adding
-1.5 * 2^52 leaves no bit for the fraction, so the float unit itself rounds (half to even, exact below 2^51). The order
-of every operation is fixed, so both engines give the same floats.
+For speed, `x + ROUND - ROUND` replaces `round(x)`: adding 1.5 * 2^52 leaves no bits for the fraction, so the float unit
+rounds (half to even, exact below 2^51). The order of all operations is fixed, so both engines give the same floats.
 """
 
 from collections.abc import Iterable, MutableSequence
@@ -18,7 +17,7 @@ STORE = 4
 ROUND = 6755399441055744.0
 """1.5 * 2^52."""
 ALL_BUT_ONE = 20.0
-"""From here on tanh is 1 to the last bit."""
+"""For larger arguments, tanh is exactly 1."""
 
 INTEGRAL = 5
 LAST_ERROR = 6
@@ -28,7 +27,7 @@ Constants = tuple[
 ]  # fmt: skip
 """kp [1/s], ki [1/s^2], kd / control period [1/s], control period [s], counts [1/mm], count [mm], lowest and
 highest command [mm/s], levels [s/mm], level [mm/s], drive offset [mm/s], friction [mm/s], 1 / smoothing [s/mm].
-ki, kd, counts, levels and friction of 0 leave their element out."""
+An element whose ki, kd, counts, levels or friction is 0 is left out."""
 
 
 def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the arithmetic
@@ -52,13 +51,13 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     ----------
     state
         Position [mm], drive velocity [mm/s], friction disturbance [mm/s], friction sign [1], command in effect [mm/s],
-        integral of the error [mm s], last error [mm]; taken up and left up to date.
+        integral of the error [mm s], last error [mm]; updated in place.
     constants
         See `Constants`.
     out
-        Takes the position [mm] at the end of every stored sub-step.
+        Receives the position at the end of every stored sub-step [mm].
     substeps, target, increment, forward, action, length, drive_keep, drive_shift, friction_keep, friction_shift
-        The columns of `busplan.servo.rows.KernelRows`.
+        Columns of `busplan.servo.rows.KernelRows`.
 
     Returns
     -------
@@ -67,7 +66,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     """
     kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
     position, velocity, disturbance, sign, command, _, _ = state
-    # Every chunk of rows begins with a control, so no command is on its way between two of them.
+    # Every chunk begins with a control, so no command is pending between chunks.
     pending = command
     stored = 0
     for n, start, move, feed, act, dt, keep, shift, fade, fade_shift in zip(  # noqa: B905 - numba knows no strict
@@ -92,14 +91,14 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
                 if counts > 0.0:
                     error = aim - (position * counts + ROUND - ROUND) * resolution
                 pending = kp * error + feed
-                # What few loops have stays in the state: a store keeps compiled code from computing it for all.
+                # Rarely used values stay in `state`, so that compiled code does not compute them for all loops.
                 if ki > 0.0:
                     state[INTEGRAL] += error * period
                     pending += ki * state[INTEGRAL]
                 if kd > 0.0:
                     pending += kd * (error - state[LAST_ERROR])
                     state[LAST_ERROR] = error
-                # No wind-up: a command that clips does not integrate any further into the limit.
+                # Anti-windup: a clipped command does not integrate further into the limit.
                 if pending > highest:
                     pending = highest
                     if ki > 0.0 and error > 0.0:

@@ -1,7 +1,7 @@
-"""How far the position loop is from instability, as the discrete loop it is, its delay included.
+"""Stability margins of the discrete position loop with its delay.
 
-All polynomials are in w = z - 1 (the delta operator): position loops have their poles close to z = 1, where
-polynomials in z lose half of their digits.
+All polynomials are in w = z - 1 (delta operator): position loops have poles close to z = 1, where polynomials in z lose
+half of their digits.
 """
 
 import math
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 _US_PER_S = 1e6
 _SETTLED = 1e-3
-"""Share of a disturbance that is left when the loop counts as settled."""
+"""Rest of a disturbance at which the loop counts as settled."""
 _GRID = 4000
 _BISECTIONS = 60
 
@@ -30,15 +30,15 @@ class LoopMargins:
     Parameters
     ----------
     stable
-        Whether all poles of the closed loop lie inside the unit circle. All else is None when they do not.
+        Whether all poles of the closed loop lie inside the unit circle. If not, all other values are None.
     phase_margin_deg
-        Smallest turn of the loop's phase that makes it unstable [deg]; None when its gain is never 1.
+        Smallest change of the loop's phase that makes it unstable [deg]; None if its gain is never 1.
     gain_margin_db
-        Smallest change of the loop's gain, up or down, that makes it unstable [dB]; None when no change does.
+        Smallest change of the loop's gain, up or down, that makes it unstable [dB]; None if none does.
     crossover_hz
-        Frequency at which the gain is 1 and the phase margin is counted [Hz]; None when there is none.
+        Frequency of gain 1 at which the phase margin is measured [Hz]; None if there is none.
     settling_us
-        Time in which the slowest part of a disturbance falls to a thousandth [us].
+        Time in which the slowest part of a disturbance decays to a thousandth [us].
     """
 
     stable: bool
@@ -49,14 +49,14 @@ class LoopMargins:
 
 
 def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
-    """Give the stability margins of the discrete position loop.
+    """Compute the stability margins of the discrete position loop.
 
     Parameters
     ----------
     axis
         Gains and drive lag; feed-forward, resolution and friction are not part of the linear loop.
     timing
-        Where the loop is closed and how often; `delay_us` counts for the loop on the host.
+        Timing of the loop; `delay_us` applies to a loop on the host.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
         G = ((h - Td) z + Td) / (z (z - 1)) - tau (b0 z + b1) / (z (z - p)),
         p = exp(-h / tau), b0 = 1 - exp(-(h - Td) / tau), b1 = exp(-(h - Td) / tau) - p.
 
-    Of several crossovers the one nearest to instability counts.
+    With several crossovers, the one nearest to instability counts.
 
     References
     ----------
@@ -93,7 +93,7 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
     """
     numerator, denominator = _loop(axis, timing)
     poles = np.roots(np.polyadd(numerator, denominator))
-    # |z|^2 - 1 without the digits that the 1 in z would cost.
+    # |z|^2 - 1, computed from w to keep all digits.
     outside = 2 * poles.real + np.abs(poles) ** 2
     if not np.all(outside < 0):
         return LoopMargins(stable=False)
@@ -112,7 +112,7 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
 
 
 def loop_gain(frequency_hz: Floats, *, axis: Axis, timing: LoopTiming) -> NDArray[np.complex128]:
-    """Give the frequency response of the open position loop.
+    """Compute the frequency response of the open position loop.
 
     Parameters
     ----------
@@ -172,10 +172,10 @@ def _at(angle: Floats, numerator: Floats, denominator: Floats) -> NDArray[np.com
 
 
 def _grid(numerator: Floats, denominator: Floats, poles: NDArray[Any]) -> Floats:
-    """Angles between which to look for crossovers [rad].
+    """Angles between which to search crossovers [rad].
 
-    The loop gain is smooth between its corners, so a fine grid over all of them misses nothing, but for a notch
-    of lightly damped zeros: their angles are points of the grid themselves.
+    The loop gain is smooth between its corners, so a fine grid over all of them is enough, except at notches of lightly
+    damped zeros, whose angles are added to the grid.
     """
     zeros = np.roots(numerator)
     corners = np.abs(np.concatenate([zeros, np.roots(denominator), poles]))
@@ -185,7 +185,7 @@ def _grid(numerator: Floats, denominator: Floats, poles: NDArray[Any]) -> Floats
 
 
 def _phase_margin(angles: Floats, numerator: Floats, denominator: Floats) -> tuple[float | None, float | None]:
-    """Phase margin [deg] and the angle on the unit circle where it is counted [rad]."""
+    """Phase margin [deg] and its angle on the unit circle [rad]."""
     crossings = _crossings(angles, lambda angle: np.abs(_at(angle, numerator, denominator)) - 1)
     if not crossings.size:
         return None, None
@@ -195,7 +195,7 @@ def _phase_margin(angles: Floats, numerator: Floats, denominator: Floats) -> tup
 
 def _gain_margin(angles: Floats, numerator: Floats, denominator: Floats) -> float | None:
     crossings = _crossings(angles[:-1], lambda angle: _at(angle, numerator, denominator).imag)
-    # At half the control rate everything is real, and no sign need change there.
+    # At half the control rate the response is real without a change of sign.
     response = _at(np.append(crossings, math.pi), numerator, denominator).real
     opposed = -response[response < 0]
     return float(np.abs(20 * np.log10(opposed)).min()) if opposed.size else None

@@ -1,6 +1,6 @@
-"""What lies between the encoders and the table: play, wrong scales, axes that are not square.
+"""Errors between encoders and table: play, scale errors, squareness.
 
-All of it works in place: positions are the one thing here that is large.
+All functions work in place, because the positions are large.
 """
 
 from collections.abc import MutableSequence
@@ -19,12 +19,12 @@ _SIGNATURE = "void(float64[::1], float64)"
 
 
 def move_to_table(x_mm: Floats, *, y_mm: Floats, mechanics: Mechanics, engine: Engine = "auto") -> None:
-    """Turn positions of the motors into positions of the table, in place.
+    """Convert positions of the motors to positions of the table, in place.
 
     Parameters
     ----------
     x_mm, y_mm
-        Positions of the motors in order of time, shape (n,) each [mm]; those of the table afterwards.
+        Positions in order of time, shape (n,) each [mm]: of the motors before, of the table after the call.
     mechanics
         Play, scales, squareness.
     engine
@@ -51,20 +51,20 @@ def move_to_table(x_mm: Floats, *, y_mm: Floats, mechanics: Mechanics, engine: E
 
 
 def add_backlash(position_mm: Floats, *, backlash_mm: float, engine: Engine = "auto") -> None:
-    """Turn positions of a motor into those of a table that it drags through a gap, in place.
+    """Convert positions of a motor to those of a table behind a backlash, in place.
 
     Parameters
     ----------
     position_mm
         Positions in order of time, shape (n,) [mm].
     backlash_mm
-        Width of the gap [mm]; at the start the motor stands in its middle.
+        Width of the gap [mm]; the motor starts in its middle.
     engine
         As for `busplan.servo.axis.simulate_axis`.
 
     Notes
     -----
-    The table stays where it is until the motor reaches one side of the gap: the play operator,
+    The table does not move until the motor reaches one side of the gap. This is the play operator,
     ``table = min(max(table, motor - b / 2), motor + b / 2)``.
 
     References
@@ -86,12 +86,12 @@ def add_backlash(position_mm: Floats, *, backlash_mm: float, engine: Engine = "a
 
 
 def drag(position: MutableSequence[float], half: float) -> None:
-    """Run the play operator in place; plain Python and numba alike.
+    """Run the play operator in place, in plain Python or numba.
 
     Parameters
     ----------
     position
-        Position of the motor in order of time, of the table afterwards [mm].
+        Positions in order of time [mm]: of the motor before, of the table after the call.
     half
         Half the gap [mm].
     """

@@ -1,8 +1,7 @@
-"""What can be set: one axis, the timing of its loop, the delivery of set-points, the mechanics.
+"""Parameters of the simulation: axis, timing of the loop, delivery of set-points, mechanics.
 
-Zero means ideal: no lag, no offset, no play, an encoder and a DAC as fine as the arithmetic. Names, defaults, ranges
-and descriptions stand here alone: profiles take theirs from these fields. No numpy here, so that a profile can be
-checked without loading it.
+Zero means ideal: no lag, no offset, no play, no quantisation. Profiles take names, defaults, ranges and descriptions
+from these fields. This module does not need numpy, so that profiles can be validated without it.
 """
 
 from collections.abc import Iterator
@@ -29,7 +28,7 @@ MAX_SPEED_MM_S = 1e6
 _MIN_SPEED_MM_S = 1e-6
 _MAX_PPM = 1e5
 FINEST_ENCODER_MM = 1e-9
-"""A picometre: finer counts than these would not fit into the 53 bits of a float over metres of travel."""
+"""A picometre: a float of 53 bits cannot count finer steps over metres of travel."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +95,7 @@ class Axis:
         least=0,
         most=MAX_SPEED_MM_S,
     )
-    """Of Coulomb friction in motion; a reversal swings it by twice as much."""
+    """Disturbance in motion; a reversal changes it by twice as much."""
     reversal_recovery_us: float = parameter(
         10_000.0, "Time constant with which that disturbance dies away [us]", example=10000, least=0, most=LARGEST
     )
@@ -109,19 +108,19 @@ class Axis:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated, all of it in one message."""
+        """Refuse invalid values, all in one error."""
         refuse(*out_of_range(self), *self._too_fine())
 
     @property
     def level_mm_s(self) -> float:
-        """Step from one level of the DAC to the next; 0 for an ideal one [mm/s]."""
+        """Step of the DAC, 0 for an ideal one [mm/s]."""
         return 2 * self.max_velocity_mm_s / 2**self.dac_bits if self.dac_bits else 0.0
 
     @property
     def highest_command_mm_s(self) -> float:
         """Largest velocity that can be commanded forwards [mm/s].
 
-        Two's complement, as DACs have it: one level more below zero than above.
+        DACs use two's complement, which has one level more below zero than above.
         """
         return self.max_velocity_mm_s - self.level_mm_s
 
@@ -133,15 +132,14 @@ class Axis:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopTiming:
-    """Where the position loop is closed, and how often.
+    """Timing of the position loop.
 
     Parameters
     ----------
     period_us
-        Communication period T_s: one set-point a period [us].
+        Communication period T_s, with one set-point each [us].
     delay_us
-        Time Td from the sample to the moment its command takes effect, 0 to one period; used by the loop on
-        the host only, where it lies inside the loop [us].
+        Time Td from a sample until its command takes effect, 0 to one period; used only by a loop on the host [us].
 
     Raises
     ------
@@ -165,7 +163,7 @@ class LoopTiming:
         "What a node does between set-points: move on the line between the last two, or hold",
         example="linear",
     )
-    """Without meaning when the loop runs on the host."""
+    """Not used by a loop on the host."""
     step_us: float = parameter(
         100.0,
         "Period of the node's position loop, and step of the simulation [us]",
@@ -176,7 +174,7 @@ class LoopTiming:
     delay_us: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated, all of it in one message."""
+        """Refuse invalid values, all in one error."""
         refuse(*not_positive(period_us=self.period_us), *out_of_range(self))
         refuse(*no_multiple(period_us=self.period_us, step_us=self.step_us), *self._late())
 
@@ -197,7 +195,7 @@ class LoopTiming:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delivery:
-    """How set-points arrive at the nodes.
+    """Delivery of set-points to the nodes.
 
     Raises
     ------
@@ -217,7 +215,7 @@ class Delivery:
         least=0,
         most=LARGEST,
     )
-    """Uniformly, in every cycle anew, and for all axes alike."""
+    """Uniform, drawn anew in every cycle, and common to all axes."""
     skew_us: float = parameter(
         0.0,
         "The y node takes its set-points over this much after x [us]",
@@ -228,19 +226,19 @@ class Delivery:
     loss_probability: float = parameter(
         0.0, "Share of the set-points that never arrive, 0..1", example=0.001, least=0, most=1
     )
-    """Drawn for each cycle and node on its own."""
+    """Drawn for each cycle and node separately."""
     on_loss: OnLoss = parameter("hold", "What a node does without its set-point", example="hold")
-    """It holds the last one, or extrapolates the last two."""
+    """Hold the last one, or extrapolate the last two."""
     seed: int = parameter(0, "Seed of all that is random", example=1, least=0, most=2**63 - 1)
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated, all of it in one message."""
+        """Refuse invalid values, all in one error."""
         refuse(*out_of_range(self))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mechanics:
-    """What lies between the encoders and the table.
+    """Errors between encoders and table.
 
     Raises
     ------
@@ -254,15 +252,15 @@ class Mechanics:
     """
 
     backlash_mm: float = parameter(0.0, "Play between motor and table [mm]", example=0.002, least=0, most=MAX_LENGTH_MM)
-    """The whole gap, on each axis."""
+    """Total gap, on each axis."""
     scale_x_ppm: float = parameter(0.0, "Scale error of the x axis [um/m]", example=10, least=-_MAX_PPM, most=_MAX_PPM)
-    """How much too long the axis moves."""
+    """Positive if the axis moves too far."""
     scale_y_ppm: float = parameter(0.0, "Scale error of the y axis [um/m]", example=-10, least=-_MAX_PPM, most=_MAX_PPM)
     squareness_um_per_m: float = parameter(
         0.0, "Displacement in x for each metre of y [um/m]", example=20, least=-_MAX_PPM, most=_MAX_PPM
     )
-    """How far the y axis leans towards x."""
+    """Inclination of the y axis towards x."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be simulated, all of it in one message."""
+        """Refuse invalid values, all in one error."""
         refuse(*out_of_range(self))

@@ -13,12 +13,12 @@ Direction = Literal["ccw", "cw"]
 Floats = NDArray[np.float64]
 
 MAX_SETPOINTS = 10_000_000
-"""More than ten million set-points are a slip of the keyboard: 2.8 h at 1 ms."""
+"""Most set-points of a move, 2.8 h at 1 ms; more is a typing error."""
 
 _US_PER_S = 1e6
 _S_PER_MIN = 60.0
 _ROUNDING_PERIODS = 1e-9
-"""A move that ends on a period must not gain another one by a rounding error."""
+"""Tolerance in periods, so that rounding does not add a period to a move."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -34,11 +34,11 @@ class CirclePath:
     period_us
         Time from one set-point to the next [us].
     x_mm, y_mm
-        Set-points, the start at time 0 included, shape (setpoints + 1,) [mm].
+        Set-points after the start at time 0, shape (setpoints + 1,) [mm].
     constant_from_us, constant_until_us
-        Time at which the speed reaches the feed, and leaves it [us].
+        Start and end of the constant speed [us].
     direction
-        Which way round the set-points go.
+        Direction of rotation.
     """
 
     radius_mm: float
@@ -52,7 +52,7 @@ class CirclePath:
 
     @property
     def setpoints(self) -> int:
-        """Number of set-points sent, which is the number of periods of the move [1]."""
+        """Number of set-points, equal to the number of periods of the move [1]."""
         return len(self.x_mm) - 1
 
     @property
@@ -102,8 +102,8 @@ def circle_path(
 
     Notes
     -----
-    With ramps of length R the move takes D = 2 pi r / F + R: each ramp covers half the way that full feed would.
-    The number of set-points is D / T, rounded up; the last period is cut short by the end of the path.
+    With ramps of duration R the move takes D = 2 pi r / F + R: each ramp covers half the distance at full feed. The
+    number of set-points is D / T, rounded up; the path ends within the last period.
 
     References
     ----------
@@ -154,7 +154,7 @@ def circle_path(
 
 
 def circle_setpoints(radius_mm: float, *, feed_mm_per_min: float, period_us: float, ramp_periods: int = 100) -> int:
-    """Count the set-points of `circle_path` without making them.
+    """Count the set-points of `circle_path` without computing them.
 
     Parameters
     ----------
@@ -177,11 +177,11 @@ def circle_setpoints(radius_mm: float, *, feed_mm_per_min: float, period_us: flo
 
 
 def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: float) -> Floats:
-    """Way covered at each time [mm]."""
+    """Distance covered at each time [mm]."""
     if ramp_s == 0.0:
         return np.minimum(feed_mm_s * time_s, length_mm)
     left_s = np.maximum(length_mm / feed_mm_s + ramp_s - time_s, 0.0)
-    # Seen from its end the way is the mirror image of the start: one ramp serves both.
+    # The end is the mirror image of the start.
     start_mm = _speeding_up(time_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s)
     end_mm = length_mm - _speeding_up(left_s, feed_mm_s=feed_mm_s, ramp_s=ramp_s)
     return np.where(time_s < left_s, start_mm, end_mm)

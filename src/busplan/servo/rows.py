@@ -1,7 +1,7 @@
-"""What the kernel runs through: the cycles of a move, cut into rows of equal sub-steps.
+"""Input of the kernel: the cycles of a move as rows of equal sub-steps.
 
-A node that closes the loop itself runs one row a cycle: the line between two set-points. A loop on the host is cut
-wherever something happens off the grid of the steps: where it samples and where its command takes effect.
+With the loop on the node, a cycle is one row: the line between two set-points. With the loop on the host, a cycle has
+further rows for events off the grid of the steps: samples, and commands that take effect.
 """
 
 from collections.abc import Iterator
@@ -29,17 +29,17 @@ class KernelRows(NamedTuple):
     substeps
         Number of sub-steps in the row [1].
     target_mm, increment_mm
-        Target at the first control of the row, and what each further one adds [mm].
+        Target at the first control of the row, and its increment at each further one [mm].
     forward_mm_s
         Feed-forward velocity [mm/s].
     action
-        Sum of `CONTROL`, `SWITCH` and `STORE`, for each sub-step of the row.
+        Sum of `CONTROL`, `SWITCH` and `STORE`, applied to each sub-step of the row.
     length_s
-        Length of a sub-step [s]; 0 for a mere event.
+        Length of a sub-step [s]; 0 for an event without duration.
     drive_keep, drive_shift_s
-        What a sub-step leaves of the drive's lag, and its integral over the sub-step [1], [s].
+        Decay factor of the drive's lag over a sub-step [1], and its integral [s].
     friction_keep, friction_shift_s
-        The same of the friction disturbance [1], [s].
+        The same for the friction disturbance [1], [s].
     """
 
     substeps: Ints
@@ -57,26 +57,26 @@ class KernelRows(NamedTuple):
 def kernel_rows(
     setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, chunk_steps: int
 ) -> Iterator[KernelRows]:
-    """Cut a move into rows, so many steps at a time that memory does not grow with the move.
+    """Split a move into rows, in chunks, so that memory does not grow with the move.
 
     Parameters
     ----------
     setpoints_mm
-        Set-points as sent, the start at rest included, shape (cycles + 1,) [mm].
+        Set-points as sent, after the start at rest, shape (cycles + 1,) [mm].
     axis
-        The axis: feed-forward, lag and recovery are needed here.
+        The axis; feed-forward, lag and recovery are used.
     timing
-        Where the loop is closed, and how often.
+        Timing of the loop.
     arrivals
         When and whether the packets of each cycle arrive.
     chunk_steps
-        Steps in one chunk of rows, about [1].
+        Approximate number of steps in a chunk [1].
 
     Raises
     ------
     ValueError
-        The set-points are not finite or fewer than two, or the arrivals do not fit them: other shapes, offsets at
-        the start or the end, or beyond half a period.
+        The set-points are not finite or fewer than two; or the arrivals have another shape, offsets at the start or the
+        end, or offsets beyond half a period.
 
     Yields
     ------
@@ -115,7 +115,7 @@ def kernel_rows(
 
 
 def stored_targets_mm(rows: KernelRows) -> Floats:
-    """Target at the end of every stored sub-step of a chunk of rows.
+    """Targets at the end of every stored sub-step.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def stored_targets_mm(rows: KernelRows) -> Floats:
     Returns
     -------
     ndarray
-        On the line where there is one, else where the target stands [mm].
+        The targets [mm].
 
     Examples
     --------
@@ -142,7 +142,7 @@ def stored_targets_mm(rows: KernelRows) -> Floats:
 
 
 def _check(setpoints_mm: Floats, *, arrivals: Arrivals, half_us: float) -> None:
-    """Refuse what would make the rows store more or fewer positions than there are steps."""
+    """Refuse input for which rows would store more or fewer positions than there are steps."""
     offsets_us, lost = arrivals.offsets_us, arrivals.lost
     if setpoints_mm.ndim != 1 or len(setpoints_mm) < 2 or not np.isfinite(setpoints_mm).all():  # noqa: PLR2004
         raise ValueError("set-points must be at least two finite numbers")
@@ -154,7 +154,7 @@ def _check(setpoints_mm: Floats, *, arrivals: Arrivals, half_us: float) -> None:
 
 def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals: Arrivals, cycles: Ints) -> KernelRows:
     steps = timing.steps_per_period
-    # Held, the previous set-point stands for the cycle; on the line, it is where the line starts.
+    # With hold, the previous set-point is the target of the cycle; with linear, the line starts there.
     ahead = 0 if timing.interpolation == "linear" else -1
     start_mm, end_mm, forward_mm_s = _motion(setpoints_mm, axis=axis, timing=timing, cycles=cycles + ahead)
     offset = arrivals.offsets_us[cycles[0] : cycles[-1] + 2] / timing.step_us
@@ -164,8 +164,8 @@ def _node_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
         return _fill(axis, timing, substeps=available, target_mm=end_mm, forward_mm_s=forward_mm_s)
     slope_mm = (end_mm - start_mm) / steps
     on_line = np.minimum(available, steps)
-    # The next SP is late: the line has ended, and the target stands there. The feed-forward goes on: a step that falls
-    # just before a packet must not tell the drive to stop.
+    # If the next SP is late, the target waits at the end of the line. The feed-forward continues: a step just before a
+    # packet must not stop the drive.
     waiting = available - on_line
     late_mm = slope_mm * (taken - offset)[:-1]
     if not waiting.any():
@@ -192,7 +192,7 @@ def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
     edges = np.append(cycles, cycles[-1] + 1)
     times = edges * timing.steps_per_period + arrivals.offsets_us[edges] / timing.step_us
     sampled, following = times[:-1], times[1:]
-    # A command waits no longer than for the next SP, which takes over whatever has arrived.
+    # A command takes effect with the next SP at the latest.
     switched = np.minimum(sampled + timing.delay_us / timing.step_us, following)
     once, nothing = np.ones_like(cycles), np.zeros_like(sampled)
     pieces = [
@@ -214,7 +214,7 @@ def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
 
 
 def _pieces(start: Floats, stop: Floats) -> list[tuple[Ints, Floats, Ints]]:
-    """Count, length in steps and action of what lies between two times: to the grid, along it, off it again."""
+    """Count, length in steps and action of the parts between two times: up to the grid, on it, and after it."""
     grid, leave = np.ceil(start), np.floor(stop)
     inside = grid > leave
     head = np.where(inside, stop, grid) - start
@@ -228,7 +228,7 @@ def _pieces(start: Floats, stop: Floats) -> list[tuple[Ints, Floats, Ints]]:
 
 
 def _motion(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, cycles: Ints) -> tuple[Floats, Floats, Floats]:
-    """Where the line of each cycle starts and ends [mm], and its feed-forward velocity [mm/s]."""
+    """Start and end of the line of each cycle [mm], and its feed-forward velocity [mm/s]."""
     before, start, end = (setpoints_mm[np.clip(cycles - back, 0, len(setpoints_mm) - 1)] for back in (2, 1, 0))
     period_s = timing.period_us / _US_PER_S
     velocity = (end - start) / period_s
@@ -248,8 +248,8 @@ def _fill(
     action: Ints | None = None,
     length_s: Floats | None = None,
 ) -> KernelRows:
-    """Add what all rows have alike: by default whole steps that control, switch and store, on a standing target."""
-    # One exponential serves all whole steps.
+    """Make rows with defaults: whole steps that control, switch and store, with a constant target."""
+    # Whole steps need only one exponential.
     lengths_s = np.array([timing.step_us / _US_PER_S]) if length_s is None else length_s
     shape = substeps.shape
     timed = (
@@ -268,10 +268,10 @@ def _fill(
 
 
 def _decay(length_s: Floats, *, time_constant_s: float) -> tuple[Floats, Floats]:
-    """What is left of 1 after each length, and its integral until then [1], [s]."""
+    """Exponential decay over each length [1], and its integral [s]."""
     if time_constant_s == 0.0:
         return np.zeros_like(length_s), np.zeros_like(length_s)
-    # A lag far below the step is gone within it, whatever the size of the exponent.
+    # A lag far below the step may overflow the exponent, which is harmless.
     with np.errstate(over="ignore", under="ignore"):
         lost = -np.expm1(-length_s / time_constant_s)
     return 1.0 - lost, time_constant_s * lost

@@ -122,3 +122,5 @@ CIRCLE_FIGURES: Final = (
     Figure("failures", "failures", "profile", "what the circle does not hold"),
     Figure("contributions", "contributions", "simulation", "what each error source takes of the largest error"),
 )
+CIRCLE_BY_KEY: Final = by_key(CIRCLE_FIGURES)
+"""The same by key."""

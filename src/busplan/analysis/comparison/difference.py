@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, Ty
 
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.network import bus_of, model_names
 from busplan.buses import figure as known
 from busplan.buses.bus import Bus
@@ -38,7 +38,7 @@ SHOWN_TO_FIT: Final = Figure(
     better="more",
 )
 _CIRCLE: Final = tuple(
-    by_key(CIRCLE_FIGURES)[key]
+    CIRCLE_BY_KEY[key]
     for key in (
         "passed",
         "stable",

@@ -4,11 +4,10 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.analysis.all_answers import AllAnswers
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_drawing, circle_table, contributions_table
 from busplan.answers.circle_verdict import circle_sentences, servo_sentence
 from busplan.answers.page.commands import Sources
-from busplan.buses.figure import by_key
 from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, attribute_value
 
 _QUESTION: Final = "Is the circle still round?"
@@ -28,9 +27,8 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
             tuple(Sentence((why,)) for why in _why_not(answer)),
             Facts(()),
         )
-    figures = by_key(CIRCLE_FIGURES)
     known = (key for key in _KEYS if getattr(result, key) is not None)
-    facts = ((figures[key].label, attribute_value(figures[key], result, at="/results/0")) for key in known)
+    facts = ((CIRCLE_BY_KEY[key].label, attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0")) for key in known)
     question = Question(
         _QUESTION,
         Words("PASSED", "passes") if result.passed else Words("FAILED", "fails"),

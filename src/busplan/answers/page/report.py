@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.network import bus_of
 from busplan.answers.assumptions import assumptions_table
 from busplan.answers.documents import document
@@ -23,7 +23,6 @@ from busplan.buses.figure import (
     UTILISATION,
     VERDICT,
     Figure,
-    by_key,
 )
 from busplan.forms.blocks import (
     Block,
@@ -43,7 +42,6 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import MISSING, plural
 
-_CIRCLE: Final = by_key(CIRCLE_FIGURES)
 _MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 
 
@@ -204,5 +202,5 @@ def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
         return MISSING, MISSING, MISSING, "not run"
     figures = (*_MEASURES, "passed")
     return subject.sources["circle"].gives(
-        tuple(attribute_value(_CIRCLE[key], result, at="/results/0") for key in figures)
+        tuple(attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0") for key in figures)
     )

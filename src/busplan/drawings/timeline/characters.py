@@ -16,6 +16,7 @@ from busplan.drawings.timeline.lanes import (
     node_lanes,
     only_owner,
     overruns,
+    shows_overrun,
     stretches,
     strip_title,
     time_text,
@@ -75,7 +76,7 @@ def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     yield Line(f"{time_text(window.from_us)} to {time_text(window.to_us)} us by node, {bar.per_column}", "heading")
     for lane in lanes:
         yield Line(f"{lane.label:<{gutter}} |{bar.cells(_marked(window, lane))}|", "drawn")
-    if overruns(window) and window.to_us > window.figures.available_us:
+    if shows_overrun(window):
         yield Line(f"{'over':<{gutter}} |{bar.cells([(_OVER, beyond(window))])}|", "fails")
     yield bar.scale(gutter + 2)
     shown = {event.kind for event in window.events}

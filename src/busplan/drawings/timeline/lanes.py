@@ -56,6 +56,11 @@ def overruns(plan: Schedule) -> bool:
     return "time" in plan.figures.exceeded
 
 
+def shows_overrun(window: Schedule) -> bool:
+    """Whether the window shows time beyond the slice."""
+    return overruns(window) and window.to_us > window.figures.available_us
+
+
 def beyond(plan: Schedule) -> Event:
     """The part of an overrunning cycle beyond its slice."""
     return plan.cycle_events[-1]._replace(start_us=plan.figures.available_us, end_us=plan.end_us)

@@ -20,6 +20,7 @@ from busplan.drawings.timeline.lanes import (
     has_event_lanes,
     node_lanes,
     overruns,
+    shows_overrun,
     stretches,
     strip_title,
     time_text,
@@ -112,7 +113,7 @@ def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:
     for number, lane in enumerate(lanes):
         for event in lane.events:
             _bar(axes, event, lane=number, colour=_colour(window, event.kind))
-    if overruns(window) and window.to_us > window.figures.available_us:
+    if shows_overrun(window):
         _over(axes, window)
     axes.set_xlim(window.from_us, window.to_us)
     axes.set_ylim(len(lanes) - 0.5, -0.5)

@@ -17,6 +17,7 @@ from busplan.drawings.timeline.lanes import (
     node_lanes,
     only_owner,
     overruns,
+    shows_overrun,
     stretches,
     strip_title,
     subject,
@@ -171,7 +172,7 @@ def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int
     area = inside(body, x_percent=_GUTTER_PERCENT, width_percent=100 - _GUTTER_PERCENT, y=0)
     bottom = y + pitch * len(lanes)
     below = scale.marks(area, top=y, bottom=bottom)
-    over = overruns(window) and window.to_us > window.figures.available_us
+    over = shows_overrun(window)
     for number, lane in enumerate(lanes):
         top = y + pitch * number
         text_at(body, lane.label, x="0", y=top + pitch - 5, css="small")
@@ -192,7 +193,7 @@ def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
     y = _words(body, title, y=y, css="head")
     scale = Scale(window.from_us, window.to_us)
     pitch = LINE + _BAR
-    over = overruns(window) and window.to_us > window.figures.available_us
+    over = shows_overrun(window)
     bottom = y + pitch * len(window.events)
     below = scale.marks(body, top=bottom - 4, bottom=bottom)
     for number, lane in enumerate(event_lanes(window)):
