@@ -59,7 +59,7 @@ def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
     judged = {one.figure.key for one in figures}
     models = " and ".join(one.part for one in figures if one.figure.key == "fits")
     state = STATES[judgement]
-    if "verdict_fits" in judged:
+    if "shown_to_fit" in judged:
         timing = f"{models} timing" if models else "each by the timing that decides"
         yield sentence(f"{_FITS[judgement]} ({timing})", state=state)
     elif models:
@@ -70,7 +70,7 @@ def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
 
 
 def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
-    told = {"verdict_fits", "fits", *_loud_figures(found)}
+    told = {"shown_to_fit", "fits", *_loud_figures(found)}
     names = named([one for one in found.judged(judgement) if one.figure.key not in told], found)
     if not names:
         return

@@ -10,6 +10,7 @@ from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, T
 from busplan.answers.capacity import safety_record
 from busplan.answers.documents import document
 from busplan.answers.verdict import story, warnings
+from busplan.buses.figure import VERDICT
 from busplan.drawings.timeline.drawing import TimelineDrawing
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import charged, drawn_window, overruns
@@ -19,6 +20,7 @@ from busplan.forms.blocks import (
     Chart,
     Code,
     JsonDocument,
+    Part,
     Record,
     Report,
     Sentence,
@@ -28,6 +30,7 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
     attribute_value,
+    figure_value,
     joined,
     sentence,
     state_of,

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, by
+from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, by, by_key
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)

@@ -5,17 +5,25 @@ Figures that no operator computes are described in words here: words, truth valu
 
 from typing import Final
 
-from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures, numeric_figures
+from busplan.analysis.capacity.certainty import certainty
+from busplan.analysis.capacity.cycle import available_us
+from busplan.analysis.capacity.figures import (
+    CapacityFigures,
+    capacity,
+    certainty_numbers,
+    figures,
+    numeric_figures,
+)
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.formulas import against
 from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import chosen, remembered
 from busplan.analysis.derivation.origin import short
-from busplan.analysis.derivation.trace import Operand, Traced, found
+from busplan.analysis.derivation.trace import Operand, Traced, found, value_of
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.cures import changeable, listed
-from busplan.buses.bus import Bus, Term
-from busplan.buses.figure import by_key
+from busplan.buses.bus import Bus, BusCycle, Term
+from busplan.buses.figure import CERTAINTY, by_key
 from busplan.buses.network import Network
 from busplan.sections.profile import Profile
 
@@ -59,9 +67,45 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     ).named("max_nodes", known["max_nodes"].symbol)
     named["max_nodes"], named["max_axes"] = most, network.groups[0].axes * most
     named["limited_by"] = found(plain.limited_by, "a search: what keeps N_max + 1 nodes off the bus", (most,))
+    if model == bus.deciding_model:
+        named |= _certainty(profile, cycle, plain)
     named |= _words(named, plain, cycle.terms, _limits(bus, network))
     for key, number in named.items():
         number.named(key, known[key].symbol)
+    return named
+
+
+def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dict[str, Traced]:
+    """Figures of how sure the verdict is; the budget of the uncertainty is its steps."""
+    network, bus, known = cycle.network, bus_of(profile), by_key(CERTAINTY)
+    weighed = certainty(cycle)
+    for doubt in weighed.doubts:
+        remembered(doubt.us, doubt.key, f"u({doubt.label})")
+    numbers = certainty_numbers(weighed, cycle)
+    named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if number is not None}
+    beyond = network.with_nodes(Traced((plain.safe_nodes or 0) + 1))
+    needed_us = certainty(bus.cycle(beyond, model=bus.deciding_model)).safe_required_us
+    most = found(
+        plain.safe_nodes,
+        f"a search: the largest whole N with T_safe <= alpha T_s, within the limits of {_limit_names(bus)}, on a bus set "
+        "safely for N",
+        (*_limits(bus, beyond), needed_us, available_us(network)),
+    ).named("safe_nodes", known["safe_nodes"].symbol)
+    named |= {
+        "safe_nodes": most,
+        "safe_axes": network.groups[0].axes * most,
+        "safe_limited_by": found(plain.safe_limited_by, "a search: what keeps N_safe + 1 nodes off the bus", (most,)),
+    }
+    named["verdict"] = Traced(
+        plain.verdict,
+        formula="fits where T_safe <= alpha T_s, does not fit where margin_c + U < 0 or a limit is broken",
+        numbers=(
+            f"T_safe {short(value_of(named['safe_required_us']))}, alpha T_s {short(plain.available_us)}, margin_c + U "
+            f"{short((plain.margin_corrected_us or 0) + (plain.uncertainty_us or 0))}, broken: "
+            f"{', '.join(plain.exceeded) or 'none'}"
+        ),
+        parts=(named["safe_required_us"], named["margin_corrected_us"], named["uncertainty_us"]),
+    )
     return named
 
 

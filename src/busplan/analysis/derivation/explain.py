@@ -12,9 +12,9 @@ from busplan.analysis.derivation.formulas import formula_text
 from busplan.analysis.derivation.latency import latency_figures, latency_names
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
-from busplan.analysis.network import bus_of, model_names
+from busplan.analysis.network import bus_of, leading_model, model_names
 from busplan.analysis.register import CommandName, figure_named, figures_of
-from busplan.buses.figure import Figure
+from busplan.buses.figure import CERTAINTY, Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress
@@ -102,7 +102,8 @@ def explain(
     periods_us
         Communication periods T_s [us]; by default the profile's own.
     timing_models
-        Timing models; by default the one that decides, which is the only one of a circle test.
+        Timing models; by default the one that leads. Figures of a circle test and of how sure the verdict is have the
+        one that decides, and no other.
     transactions
         Transactions, for a figure of `latency`; by default all.
     progress
@@ -119,11 +120,12 @@ def explain(
         There is no such figure, an option does not apply to it, or the command fails.
     """
     command, one = figure_named(figure, bus=bus_of(profile))
-    deciding = profile.bus.timing_model
-    models = [deciding] if timing_models is None else timing_models
+    deciding = bus_of(profile).deciding_model
+    is_decided = command == "circle-test" or one in CERTAINTY
+    models = [deciding if is_decided else leading_model(profile)] if timing_models is None else timing_models
     kinds: Sequence[str | None] = (transactions or latency_names(profile)) if command == "latency" else [None]
-    if command == "circle-test" and list(models) != [deciding]:
-        raise BusplanError(f"{one.key}: a circle test has the timing model that decides and no other, {deciding}")
+    if is_decided and list(models) != [deciding]:
+        raise BusplanError(f"{one.key}: belongs to the timing model that decides and to no other, {deciding}")
     if one.key in VERDICT_KEYS and timing_models is not None:
         raise BusplanError(f"{one.key}: compares the timing models, so it has no timing model of its own")
     if command != "latency" and transactions is not None:

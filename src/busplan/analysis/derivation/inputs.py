@@ -62,7 +62,8 @@ def given(profile: Profile, key: str) -> Input:
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
-    grade = own_grade or "given"
+    # What is off by default is nobody's measurement.
+    grade = "given" if own_grade is None or (not is_set and not value) else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     bus = bus_of(profile)
     default = bus.key_sources.get(key)

@@ -201,7 +201,9 @@ def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:
         "safe_axes": network.groups[0].axes * safe.nodes,
     }
     return {
-        **{key: _NOTHING if number is None else Column(_typed(number, sorts[key])) for key, number in numbers.items()},
+        **{
+            key: _NO_NUMBER if number is None else Column(_typed(number, sorts[key])) for key, number in numbers.items()
+        },
         "safe_limited_by": Column(np.asarray(safe.limit, np.uint8), tuple(limit.key for limit in limits)),
         "verdict": Column(np.asarray(verdict_code(found, network, is_broken=broken), np.uint8), VERDICTS),
     }

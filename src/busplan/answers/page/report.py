@@ -178,7 +178,7 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         TableColumn("margin", "us"),
         TableColumn("+/-", "us"),
         TableColumn("safe axes"),
-        *(TableColumn(_CIRCLE[key].symbol, group="contour error, um") for key in _MEASURES),
+        *(TableColumn(CIRCLE_BY_KEY[key].symbol, group="contour error, um") for key in _MEASURES),
         TableColumn("circle passed", kind="words"),
     )
     rows = tuple(TableRow(_compared(one)) for one in subjects)

@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Array

@@ -1,6 +1,6 @@
 """One communication cycle on an IEEE 1394 bus: as terms, as events, and the figures that go with it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, reduce
 from typing import Final
 
@@ -16,7 +16,7 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingModelName, delays
-from busplan.buses.ieee1394.transactions import Exchange, events, exchange, link_of, parts
+from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of, parts
 from busplan.buses.network import TRANSACTION_KINDS, Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, is_one, larger, named, rounded_down, total
@@ -54,16 +54,25 @@ class Ieee1394Cycle(BusCycle):
     @cached_property
     def exchanges(self) -> tuple[Exchange, ...]:
         """Every transaction of the cycle, group by group."""
-        network, model, link = self.network, self.model, self.link
+        network, model, link, common = self.network, self.model, self.link, self._delays
         return tuple(
-            exchange(network, group, kind, model=model, link=link, suffix=f",{kind}")
+            exchange(network, group, kind, model=model, link=link, common=common, suffix=f",{kind}")
             for kind in TRANSACTION_KINDS
             for group in network.groups
         )
 
     @cached_property
     def _delays(self) -> Delays:
-        return delays(self.link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes))
+        found = delays(self.link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes))
+        for key, number in (
+            ("arbitration_us", found.arbitration_us),
+            ("acknowledge_us", found.acknowledge_us),
+            ("subaction_gap_us", found.gaps.subaction_us),
+            ("arbitration_reset_gap_us", found.gaps.arbitration_reset_us),
+            ("gaps_us", found.gaps.both_us),
+        ):
+            named(number, key, LATENCY_SYMBOLS[key])
+        return found
 
     @cached_property
     def sync_us(self) -> Number:
@@ -121,8 +130,15 @@ class Ieee1394Cycle(BusCycle):
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
-        of_parts = [(one.nodes, part) for one in self.exchanges for part in parts(one)]
-        own = {key: total(nodes * part.us for nodes, part in of_parts if part.term == key) for key in _OF_TRANSACTIONS}
+        of_parts = [(one.nodes, parts(one)) for one in self.exchanges]
+        own = {
+            key: total(
+                nodes * _sum([part.us for part in found if part.term == key])
+                for nodes, found in of_parts
+                if any(part.term == key for part in found)
+            )
+            for key in _OF_TRANSACTIONS
+        }
         retries_us = 0.0 if self.model == "paper" else self.retries_us
         others = (
             Term("sync_us", self.sync_us),
@@ -238,6 +254,12 @@ class Ieee1394Cycle(BusCycle):
         if is_split and not profile.node.execution.worst_extra_us:
             found.append(LeftOut("the slowest execution", "node.execution.worst_extra_us"))
         return tuple(found)
+
+
+def _sum(parts_us: Sequence[Number]) -> Number:
+    """The sum of some parts, one or more; of equal ones as a product, which a derivation shows shorter."""
+    first_us = parts_us[0]
+    return len(parts_us) * first_us if all(one is first_us for one in parts_us) else total(parts_us)
 
 
 def _one_of_each(exchanges: tuple[Exchange, ...]) -> tuple[Phases, Phases]:

@@ -93,6 +93,9 @@ class Ieee1394(Bus):
     }
     key_symbols: ClassVar[Mapping[str, str]] = {
         "payload.overhead_bytes": "overhead",
+        "host.transaction_us": "T_host",
+        "node.execution.worst_extra_us": "T_extra",
+        "node.response_us": "T_hold",
         "cycle.sync.ping_us": "ping",
         "cycle.sync.ping_per_node_us": "ping_node",
     }

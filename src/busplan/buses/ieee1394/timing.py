@@ -216,6 +216,7 @@ def transaction(
     overhead_bytes: Number,
     responder: Responder,
     alone: Number = False,
+    common: Delays | None = None,
 ) -> Phases:
     """Take one asynchronous transaction apart, equations (3)-(10), (13) and (14).
 
@@ -235,6 +236,8 @@ def transaction(
         How the node answers, and how fast the host goes on.
     alone
         Whether one node alone answers on the bus.
+    common
+        The delays that all transactions of the link share, where they have been computed; then `alone` plays no part.
 
     Returns
     -------
@@ -268,7 +271,7 @@ def transaction(
     """
     answer = responder.answer
     is_split, has_response = answer == "split", answer != "unified"
-    hop_us, arbitration_us, acknowledge_us, gaps = delays(link, model=model, alone=alone)
+    hop_us, arbitration_us, acknowledge_us, gaps = common or delays(link, model=model, alone=alone)
     packets = model.packets(kind, payload_bytes, overhead_bytes)
 
     def data_us(packet_bytes: Number) -> Number:

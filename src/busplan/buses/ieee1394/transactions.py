@@ -8,6 +8,7 @@ from busplan.buses.ieee1394 import figures
 from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, safe_gap_count
 from busplan.buses.ieee1394.timing import (
     TIMING_MODELS,
+    Delays,
     Link,
     Phases,
     Responder,
@@ -20,7 +21,7 @@ from busplan.elementwise import Number, SpecialNumber, alike, is_one, named, wor
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.idle import Answer
 
-_LATENCY_SYMBOLS: Final = {figure.key: figure.symbol for figure in figures.LATENCY}
+LATENCY_SYMBOLS: Final = {figure.key: figure.symbol for figure in figures.LATENCY}
 
 
 def hops_of(network: Network) -> Number:
@@ -66,7 +67,14 @@ class Exchange(NamedTuple):
 
 
 def exchange(
-    network: Network, group: Group, kind: TransactionKind, *, model: TimingModelName, link: Link, suffix: str = ""
+    network: Network,
+    group: Group,
+    kind: TransactionKind,
+    *,
+    model: TimingModelName,
+    link: Link,
+    common: Delays | None = None,
+    suffix: str = "",
 ) -> Exchange:
     """Take the transaction of a group apart.
 
@@ -82,6 +90,8 @@ def exchange(
         Timing model.
     link
         The way of the packets.
+    common
+        The delays that all transactions share, where they have been computed.
     suffix
         What tells its symbols from those of other transactions in a derivation.
     """
@@ -103,6 +113,7 @@ def exchange(
         overhead_bytes=network.profile.payload.overhead_bytes,
         responder=responder,
         alone=is_one(network.nodes),
+        common=common,
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
     return Exchange(kind, group.nodes, size, responder, uncertainty_us, _with_names(phases, suffix))
@@ -113,7 +124,7 @@ def _with_names(phases: Phases, suffix: str) -> Phases:
     if not isinstance(phases.latency_us, SpecialNumber):
         return phases
     return Phases(
-        **{key: named(value, key, f"{_LATENCY_SYMBOLS[key]}{suffix}") for key, value in phases._asdict().items()}
+        **{key: named(value, key, f"{LATENCY_SYMBOLS[key]}{suffix}") for key, value in phases._asdict().items()}
     )
 
 
