@@ -49,18 +49,23 @@ _MEASURED_COLUMNS: Final = {
 """Further columns if T1+T2 was measured, too."""
 
 
-def execution_keys(execution: LinearExecution | TableExecution) -> dict[str, object]:
+_KEPT: Final = "worst_extra_us"
+"""No measurement of typical latencies says it."""
+
+
+def execution_keys(result: Calibration) -> dict[str, object]:
     """Keys and values of the execution time, as in a profile."""
-    return {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in execution.model_dump(exclude_none=True).items()
-    }
+    found = {**result.execution.model_dump(exclude_none=True, exclude={_KEPT}), **result.fit_keys}
+    if result.uncertainty_us is not None:
+        found["uncertainty_us"] = result.uncertainty_us
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in found.items()}
 
 
-def execution_changes(execution: LinearExecution | TableExecution) -> dict[str, object]:
-    """Changes that set a profile's execution time; None removes a key of the other form."""
+def execution_changes(result: Calibration) -> dict[str, object]:
+    """Changes that set a profile's execution time; None removes a key of the other form, or of the old one."""
     gone = dict.fromkeys((*LinearExecution.model_fields, *TableExecution.model_fields))
-    return {f"{SECTION}.{key}": value for key, value in {**gone, **execution_keys(execution)}.items()}
+    changes = {**gone, **execution_keys(result)}
+    return {f"{SECTION}.{key}": value for key, value in changes.items() if key != _KEPT}
 
 
 def provenance(result: Calibration, *, source: str) -> str:
@@ -107,7 +112,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     yield from fit_sentences(result)
     yield from (joined(sentence("Warning: ", state="warns"), one, by="") for one in warning_sentences(result))
     yield _by_payload(result.payloads, measured=result.way == "measured-halves")
-    keys = (f"{key} = {value_text(value)}" for key, value in execution_keys(result.execution).items())
+    keys = (f"{key} = {value_text(value)}" for key, value in execution_keys(result).items())
     yield Snippet((f"[{SECTION}]", *keys))
 
 
@@ -153,7 +158,9 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         method=result.method,
         robust=result.robust,
         measurements=len(result.residuals),
-        execution=execution_keys(result.execution),
+        execution=execution_keys(result),
+        uncertainty_us=result.uncertainty_us,
+        at_most_us=result.at_most_us,
         rms_residual_us=result.rms_residual_us,
         largest_residual=result.largest._asdict(),
         outliers=[one._asdict() for one in result.outliers],

@@ -33,8 +33,8 @@ def fit_sentences(result: Calibration) -> Iterator[Sentence]:
 def _way(result: Calibration) -> Sentence:
     if result.way == "measured-halves":
         return sentence(
-            "T_exec = T_lant - 2 (T1+T2), both as measured; the timing model is not used, and stands beside it to show "
-            "what it leaves unexplained."
+            "T_exec = T_lant - (T1+T2) - (T4+T5): the first half as measured, the second as that of the smallest "
+            f"payload, with the sizes of packets by the {result.timing_model} timing model."
         )
     network = network_of(result.profile)
     bus = bus_of(result.profile)
@@ -117,6 +117,13 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
                 "--form linear.",
                 ShownValue(size, "payload_bytes", "bytes"),
             )
+    short = [fit for fit in result.payloads if fit.execution_us <= result.at_most_us]
+    if short:
+        yield sentence(
+            "the bus waits {} before any response, so a shorter execution cannot be told from a latency: T_exec is "
+            f"at most that at {', '.join(str(fit.payload_bytes) for fit in short)} bytes.",
+            time_value(result.at_most_us, "at_most_us", at="/at_most_us"),
+        )
     longest_us = max(fit.execution_us for fit in result.payloads)
     if longest_us > _LONG_EXECUTION_US:
         yield sentence(

@@ -20,7 +20,7 @@ from busplan.analysis.sweep.circles import (
     run_task,
     with_circles,
 )
-from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid
+from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
 from busplan.answers.sweep.rows import json_footer, json_header, json_rows
 from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows, sweep_report
 from busplan.api.answer import Answer
@@ -161,7 +161,7 @@ def sweep(
     (['time', 'time', 'time'], 3)
     """
     network = load_profile(profile)
-    models = checked_models(timing_models, network)
+    asked = None if timing_models is None else checked_models(timing_models, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
@@ -178,6 +178,7 @@ def sweep(
             f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
             "write them with busplan sweep -o FILE.csv"
         )
+    models = grid_models(network, grid, asked, name="timing_models")
     blocks = analysis.sweep(network, grid, timing_models=models)
     if with_circle:
         _require_circles(network, grid, force=force)

@@ -165,6 +165,13 @@ class Halves(NamedTuple):
     """All of it."""
     request_and_acknowledge_us: float
     """Up to the first acknowledge."""
+    shortest_us: float = 0.0
+    """The bus waits so long whatever the node does: a shorter execution cannot be told from a latency."""
+
+    @property
+    def response_and_acknowledge_us(self) -> float:
+        """Behind the execution."""
+        return self.latency_us - self.request_and_acknowledge_us
 
 
 class BusCycle(ABC):
@@ -312,6 +319,18 @@ class Bus(ABC):
             The kind has no transactions whose latency could be measured.
         """
         raise BusplanError(f"bus.kind {self.kind}: {self.title} has no transactions to find an execution time from")
+
+    def fit_keys(self, network: Network, *, model: str | None) -> dict[str, Value]:  # noqa: ARG002 - a kind may have none
+        """Keys of [node.execution] that say what an execution time was fitted against.
+
+        Parameters
+        ----------
+        network
+            The network that was measured.
+        model
+            Timing model whose packets were taken off; None where their time was measured.
+        """
+        return {}
 
     def cannot_express(self, network: Network, *, model: str) -> tuple[str, ...]:  # noqa: ARG002 - most can
         """Keys of a profile that a timing model has no term for: its figures are not applicable then."""

@@ -79,9 +79,9 @@ def calibrate_command(
     column transaction says read or write (write without it).
 
     T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
-    where the bench was not as the profile. With a column request_and_acknowledge_us, the measured T1+T2, T_exec is
-    T_lant - 2 (T1+T2) as measured, and the report shows how far the timing model is from it. Measurements far from the
-    others are named by their line. Times are in us. A report: it exits 0 whatever the figures are.
+    where the bench was not as the profile. With a column request_and_acknowledge_us, the measured T1+T2, both halves
+    come from it, and the report shows how far the timing model is from it. Measurements far from the others are named
+    by their line. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """
@@ -111,7 +111,7 @@ def calibrate_command(
         )
         if apply:
             note = said.provenance(result, source=Path(name).name)
-            apply_changes(loaded.document, said.execution_changes(result.execution), notes={said.SECTION: note})
+            apply_changes(loaded.document, said.execution_changes(result), notes={said.SECTION: note})
             say(f"wrote [{said.SECTION}] of {profile}; every comment of yours is kept")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 

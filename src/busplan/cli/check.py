@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from busplan.profile.collect import ProfileSource
+    from busplan.rules.baseline import Baseline
     from busplan.rules.gate import FileResult
     from busplan.rules.report import CheckReport
 
@@ -25,7 +26,6 @@ else:
     # The choices for typer.
     FormatName = Literal[tuple(FORMATS)]
 
-Recordings = dict[str, dict[str, float]]
 _BUILD_FORMATS: Final = [name for name, one in FORMATS.items() if one.reader == "builds"]
 
 
@@ -98,9 +98,15 @@ def check_command(
     collection = collect(paths, stdin_name=stdin_filename)
     _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
     recorded = _read_baseline(baseline, needed=not update_baseline)
-    one = partial(
-        check_source, recorded=None if update_baseline else recorded, with_circle=circle, record=update_baseline
-    )
+    before = None
+    if recorded is not None and not update_baseline:
+        before = recorded.profiles if recorded.is_current else None
+        if before is None:
+            say(
+                f"warning: {baseline}: recorded by other timing models, so its figures are not compared; "
+                "record them again with --update-baseline"
+            )
+    one = partial(check_source, recorded=before, with_circle=circle, record=update_baseline)
     report = _check(collection.sources, one, jobs=jobs)
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
@@ -147,7 +153,7 @@ def _check(
     return CheckReport(tuple(found[source] for source in sources))
 
 
-def _read_baseline(path: Path | None, *, needed: bool) -> Recordings | None:
+def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":
     if path is None or (not needed and not path.exists()):
         return None
     from busplan.profile.toml import read_bytes
@@ -171,10 +177,14 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
     now = {file.path: file.figures for file in report.files if file.figures}
     with changing(path):
         # Read again: another run may have changed it since the check began.
-        recorded = _read_baseline(path, needed=False) or {}
-        rewrite(path, write_baseline({**recorded, **now}).encode())
+        old = _read_baseline(path, needed=False)
+        kept = old.profiles if old is not None and old.is_current else {}
+        rewrite(path, write_baseline({**kept, **now}).encode())
     if not quiet:
         say(f"recorded {len(now)} profile{'s' * (len(now) != 1)} in {path}")
+    gone = [] if old is None or old.is_current else [name for name in old.profiles if name not in now]
+    if gone:
+        say(f"warning: {path}: dropped {', '.join(gone)}, recorded by other timing models; check them, too")
 
 
 def _write(report: "CheckReport", *, format_: str, output: Path | None) -> None:

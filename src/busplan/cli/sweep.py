@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import ProfileArgument, TimingOption, form_of_file, output_option, plot_format, timing_models
+from busplan.cli.options import ALL_MODELS, ProfileArgument, TimingOption, form_of_file, output_option, plot_format
 from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.errors import BusplanError
@@ -131,7 +131,7 @@ def sweep_command(
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
-    from busplan.analysis.sweep.grid import checked_grid
+    from busplan.analysis.sweep.grid import checked_grid, grid_models
     from busplan.cli.sweep_run import available_processors, run_sweep
     from busplan.profile.shipped import load
 
@@ -147,7 +147,7 @@ def sweep_command(
         SweepJob(
             profile=loaded,
             grid=grid,
-            timing_models=timing_models(timing, loaded),
+            timing_models=grid_models(loaded, grid, None if timing == ALL_MODELS else [timing], name="--timing"),
             columns=_columns(loaded, columns, grid, circle=circle, short=form in TOP_FORMS, sort_by=sort_by),
             form=form,
             output=output,

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from types import UnionType
-from typing import Annotated, Any, Final, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -12,6 +12,10 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 _NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
 """Sections whose common keys no cycle depends on; a cycle may depend on keys that a kind of bus adds to them."""
+_OF_VERDICT: Final = ("limits.reserve",)
+"""Keys of these sections that a verdict depends on."""
+_CHANGE_NO_FIGURE: Final = ("bus.kind", "bus.timing_model", "node.execution.kind")
+"""Keys that say how the others are read, or what is shown first."""
 
 
 def kind_of(data: Mapping[str, object]) -> str | None:
@@ -50,38 +54,43 @@ def models_of(annotation: Any) -> list[type[BaseModel]]:
     return []
 
 
-def number_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Dotted keys of a model whose value is a number, in the order of the schema."""
+def value_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """Dotted keys of a model whose value is one number, word or truth, in the order of the schema."""
     for name, field in model.model_fields.items():
         inner = models_of(field.annotation)
         for one in inner:
-            yield from number_keys(one, f"{prefix}{name}.")
-        if not inner and _is_number(field.annotation):
+            yield from value_keys(one, f"{prefix}{name}.")
+        if not inner and (_is_number(field.annotation) or _words(field.annotation)):
             yield f"{prefix}{name}"
 
 
 def cycle_keys(kind: str) -> tuple[str, ...]:
-    """Numeric keys that the cycle of a kind of bus may depend on."""
-    others = {key for key in number_keys(Profile) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
-    keys = dict.fromkeys(number_keys(profile_model(kind)))
-    return tuple(key for key in keys if "." in key and key not in others)
+    """Keys that the cycle of a kind of bus, or its verdict, may depend on."""
+    others = {key for key in value_keys(Profile) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
+    keys = dict.fromkeys(value_keys(profile_model(kind)))
+    return tuple(key for key in keys if ("." in key and key not in {*others, *_CHANGE_NO_FIGURE}) or key in _OF_VERDICT)
 
 
 def words_of(kind: str, key: str) -> tuple[str, ...]:
-    """Words that a key allows instead of a number."""
+    """Words allowed for a key, instead of a number or alone; those of a truth are true and false."""
     fields = _fields(profile_model(kind), tuple(key.split(".")))
-    return tuple(text for one in fields if _is_number(one.annotation) for text in _texts(one.annotation))
+    return tuple(dict.fromkeys(text for one in fields for text in _words(one.annotation)))
 
 
 def _is_number(annotation: Any) -> bool:
     if annotation in (int, float):
         return True
-    # Do not look into literals and tuples.
+    # A literal's arguments are values, and a tuple's are elements.
     return get_origin(annotation) in (Union, UnionType, Annotated) and any(map(_is_number, get_args(annotation)))
 
 
-def _texts(annotation: Any) -> Iterator[str]:
-    if isinstance(annotation, str):
-        yield annotation
-    for part in get_args(annotation):
-        yield from _texts(part)
+def _words(annotation: Any) -> tuple[str, ...]:
+    """Words that an annotation allows."""
+    if annotation is bool:
+        return ("true", "false")
+    arguments = get_args(annotation)
+    if get_origin(annotation) is Literal:
+        return tuple(one for one in arguments if isinstance(one, str))
+    if get_origin(annotation) in (Union, UnionType, Annotated):
+        return tuple(word for part in arguments for word in _words(part))
+    return ()

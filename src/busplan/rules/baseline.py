@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 from sys import float_info
-from typing import Final
+from typing import Final, NamedTuple
 
 from busplan.buses.rule import RuleProblem
 from busplan.errors import BusplanError
@@ -11,6 +11,8 @@ from busplan.printable import json_text
 from busplan.rules.finding import Subject
 
 _SCHEMA: Final = 1
+MODELS: Final = 2
+"""Version of the timing models that the figures come from; figures of another version are not compared."""
 MAX_BASELINE_BYTES: Final = 32_000_000
 """At 200 bytes for each profile, enough for any repository; a larger file is something else."""
 _ROUNDING: Final = 1e-9
@@ -25,11 +27,12 @@ Recorded = Mapping[str, float]
 
 def figures_of(subject: Subject) -> dict[str, float]:
     """Figures of a profile to record, by name."""
-    return {
+    found = {
         f"{one.timing_model}.{name}": getattr(one, name)
         for one in sorted((subject.deciding, *subject.others), key=lambda one: one.timing_model)
-        for name in ("max_axes", "margin_us")
+        for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us")
     }
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def regressions(now: Recorded, before: Recorded) -> Iterator[RuleProblem]:
@@ -40,14 +43,27 @@ def regressions(now: Recorded, before: Recorded) -> Iterator[RuleProblem]:
         lost = before[name] - value
         if lost > _ROUNDING * max(abs(before[name]), 1.0):
             model, figure = name.split(".")
-            key = "bus.nodes" if figure == "max_axes" else "cycle.period_us"
+            key = "bus.nodes" if figure.endswith("_axes") else "cycle.period_us"
             yield RuleProblem(
                 key,
                 f"{figure} under the {model} timing fell to {value:.12g} from the {before[name]:.12g} of the baseline",
             )
 
 
-def read_baseline(text: str, *, name: str) -> dict[str, dict[str, float]]:
+class Baseline(NamedTuple):
+    """A recorded baseline."""
+
+    profiles: dict[str, dict[str, float]]
+    models: int
+    """Version of the timing models."""
+
+    @property
+    def is_current(self) -> bool:
+        """Whether its figures may be compared with those of today."""
+        return self.models == MODELS
+
+
+def read_baseline(text: str, *, name: str) -> Baseline:
     """Read a recorded baseline.
 
     Raises
@@ -64,7 +80,10 @@ def read_baseline(text: str, *, name: str) -> dict[str, dict[str, float]]:
     profiles = document.get("profiles")
     if not isinstance(profiles, dict) or not all(map(_are_figures, profiles.values())):
         raise BusplanError(f"{name}: a damaged baseline; {_CURE}")
-    return profiles
+    models = document.get("models", 1)
+    if not isinstance(models, int) or isinstance(models, bool):
+        raise BusplanError(f"{name}: a damaged baseline; {_CURE}")
+    return Baseline(profiles, models)
 
 
 def _are_figures(value: object) -> bool:
@@ -79,6 +98,7 @@ def write_baseline(recorded: Mapping[str, Recorded]) -> str:
     document = {
         "schema": _SCHEMA,
         "command": "baseline",
+        "models": MODELS,
         "profiles": {path: dict(recorded[path]) for path in sorted(recorded)},
     }
     return json_text(document, indent=2) + "\n"

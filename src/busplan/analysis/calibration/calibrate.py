@@ -15,10 +15,10 @@ from busplan.analysis.calibration.execution_fit import (
     theil_sen,
 )
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.bus import Halves
+from busplan.buses.bus import Halves, Value
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement
-from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.execution import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
 Way = Literal["timing-model", "measured-halves"]
@@ -95,6 +95,12 @@ class Calibration(NamedTuple):
     """The measurement farthest from the fit."""
     outliers: tuple[Residual, ...]
     """Measurements farther from the robust fit than the spread of the others explains."""
+    uncertainty_us: float | None
+    """Standard uncertainty of T_exec, the spread of the measurements about the fit; None where nothing is left over."""
+    fit_keys: dict[str, Value]
+    """Further keys of [node.execution]: what it was fitted against."""
+    at_most_us: float
+    """A shorter execution cannot be told from a latency."""
     robust: bool
     """Whether the fit is the robust one, which outliers do not influence."""
 
@@ -111,7 +117,8 @@ def calibrate(
 ) -> Calibration:
     """Find the execution time of a node from measured latencies.
 
-    T_exec is the latency minus 2 (T1 + T2) if T1 + T2 was measured, otherwise minus (T1 + T2) + (T4 + T5) of the
+    T_exec is the latency minus both halves: T1 + T2 as measured, and T4 + T5 as that of the smallest payload with
+    the packets' own sizes; or, where T1 + T2 was not measured, both halves of the
     timing model.
 
     Parameters
@@ -153,7 +160,8 @@ def calibrate(
     model = timing_model or bus_of(profile).deciding_model
     halves = _packets(profile, measurements, model)
     way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
-    raw = [(one, _packets_us(one, halves)) for one in measurements]
+    second_us = _second_halves_us(measurements, halves)
+    raw = [(one, _packets_us(one, halves, second_us)) for one in measurements]
     _require_possible(profile, raw, source=source, way=way, model=model)
     groups: defaultdict[int, list[float]] = defaultdict(list)
     for one, packets_us in raw:
@@ -172,6 +180,9 @@ def calibrate(
         rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
         largest=max(residuals, key=lambda one: abs(one.residual_us)),
         outliers=_outliers(residuals, groups, chosen),
+        uncertainty_us=_uncertainty_us(residuals, fit, robust=robust),
+        fit_keys=bus_of(profile).fit_keys(network_of(profile), model=model if way == "timing-model" else None),
+        at_most_us=max(one.shortest_us for one in halves.values()),
         robust=robust,
     )
 
@@ -188,11 +199,45 @@ def _packets(profile: Profile, measurements: Sequence[Measurement], model: str) 
     }
 
 
-def _packets_us(one: Measurement, halves: _Halves) -> float:
+def _second_halves_us(measurements: Sequence[Measurement], halves: _Halves) -> dict[tuple[str, int], float]:
+    """T4 + T5 of each transaction and payload whose T1 + T2 was measured [us].
+
+    It is the T1 + T2 of the smallest payload, where the two packets differ least, and what the sizes of the packets
+    change. Two equal halves would charge the payload of a write to its response, too.
+    """
+    found: dict[tuple[str, int], float] = {}
+    for kind in {one.transaction for one in measurements}:
+        own = [one for one in measurements if one.transaction == kind]
+        smallest = min(one.payload_bytes for one in own)
+        measured_us = [one.request_and_acknowledge_us for one in own if one.payload_bytes == smallest]
+        first_us = median(us for us in measured_us if us is not None) if None not in measured_us else 0.0
+        for size in {one.payload_bytes for one in own}:
+            second, first = halves[kind, size], halves[kind, smallest]
+            found[kind, size] = first_us + second.response_and_acknowledge_us - first.request_and_acknowledge_us
+    return found
+
+
+def _packets_us(one: Measurement, halves: _Halves, second_us: Mapping[tuple[str, int], float]) -> float:
     """Latency minus T_exec [us]."""
+    key = (one.transaction, one.payload_bytes)
     if one.request_and_acknowledge_us is not None:
-        return 2 * one.request_and_acknowledge_us
-    return halves[one.transaction, one.payload_bytes].latency_us
+        return one.request_and_acknowledge_us + second_us[key]
+    return halves[key].latency_us
+
+
+def _uncertainty_us(
+    residuals: Sequence[Residual], fit: LinearExecution | TableExecution, *, robust: bool
+) -> float | None:
+    """Standard deviation of the measurements about the fit [us]; None where the fit uses all of them up."""
+    parameters = len(fit.payload_bytes) if isinstance(fit, TableExecution) else 2
+    free = len(residuals) - parameters
+    if free <= 0:
+        return None
+    if robust:
+        spread_us = _DEVIATION_PER_MAD * median(abs(one.residual_us) for one in residuals)
+    else:
+        spread_us = (sum(one.residual_us**2 for one in residuals) / free) ** 0.5
+    return round(max(spread_us, float(MEASURED_UNCERTAINTY_US)), 3)
 
 
 def _require_possible(
@@ -201,7 +246,9 @@ def _require_possible(
     """Refuse measurements that are impossible on this bus, all in one error."""
     payloads = bus_of(profile).payloads(network_of(profile))
     limit = payloads.most_bytes
-    needed = "twice its T1 + T2 is" if way == "measured-halves" else f"the packets alone take in the {model} model"
+    needed = (
+        "its T1 + T2 and T4 + T5 are" if way == "measured-halves" else f"the packets alone take in the {model} model"
+    )
     problems = [
         f"{source}:{one.line}: payload {one.payload_bytes} bytes is over the {limit} bytes of {payloads.carrier}"
         for one, _ in raw

@@ -87,8 +87,8 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
     needed_us = certainty(bus.cycle(beyond, model=bus.deciding_model)).safe_required_us
     most = found(
         plain.safe_nodes,
-        f"a search: the largest whole N with T_safe <= alpha T_s, within the limits of {_limit_names(bus)}, on a bus set "
-        "safely for N",
+        "a search: the largest whole N with T_safe <= alpha T_s, on a bus set safely for N, within the limits of "
+        f"{_limit_names(bus)}",
         (*_limits(bus, beyond), needed_us, available_us(network)),
     ).named("safe_nodes", known["safe_nodes"].symbol)
     named |= {

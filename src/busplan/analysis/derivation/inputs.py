@@ -88,7 +88,7 @@ def traced_profile(profile: Profile) -> Profile:
         value: Any = profile
         for part in key.split("."):
             value = getattr(value, part, None)
-        if isinstance(value, int | float):
+        if isinstance(value, int | float) and not isinstance(value, bool):
             found = with_unchecked(found, key, traced(profile, key))
     execution = profile.node.execution
     if isinstance(execution, TableExecution):

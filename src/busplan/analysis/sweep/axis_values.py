@@ -59,7 +59,7 @@ def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) 
     name
         Name of the values in messages.
     words
-        Words allowed among the values.
+        Words allowed among the values; true and false stand for truths.
 
     Raises
     ------
@@ -67,7 +67,8 @@ def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) 
         No values, one that is not allowed, or a repeated one.
     """
     found: dict[int | float | str, None] = {}
-    for value in values:
+    for given in values:
+        value = _TRUTHS.get(given, given) if isinstance(given, str) and given in words else given
         if not _is_value(value, words):
             raise BusplanError(f"{name}: {value!r} is not a finite number")
         if value in found:
@@ -93,10 +94,15 @@ def stepped(values: range, *, name: str) -> Steps:
     return Steps(values.start, values.step, 1, len(values))
 
 
+_TRUTHS: Final = {"true": True, "false": False}
+
+
 def _is_value(value: object, words: Collection[str]) -> TypeGuard[int | float | str]:
+    if isinstance(value, bool):
+        return "true" in words
     if isinstance(value, float):
         return isfinite(value)
-    return value in words if isinstance(value, str) else isinstance(value, int) and not isinstance(value, bool)
+    return value in words if isinstance(value, str) else isinstance(value, int)
 
 
 def _is_whole(number: float) -> bool:

@@ -189,7 +189,7 @@ def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:
     network, bus = cycle.network, bus_of(cycle.network.profile)
     found, limits = certainty(cycle), limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.
-    safe = most_nodes(network, limits, ceiling=int(np.max(most.nodes)))
+    safe = most_nodes(network, limits, ceiling=int(np.max(most.nodes)) + 1)
     broken: Number = False
     for limit in bus.limits:
         if not limit.is_safety:

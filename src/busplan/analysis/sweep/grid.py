@@ -1,6 +1,6 @@
 """A full grid of profile values in row-major order, in chunks: no axis is in memory as a whole."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from math import prod
 from typing import Any, Final, NamedTuple
@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from busplan.analysis.network import known_model, model_names
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
 from busplan.profile.kinds import cycle_keys
@@ -42,7 +43,7 @@ class Listed(NamedTuple):
     @property
     def has_words(self) -> bool:
         """Whether a value is a word."""
-        return any(isinstance(one, str) for one in self.values)
+        return any(isinstance(one, str | bool) for one in self.values)
 
 
 class Steps(NamedTuple):
@@ -201,6 +202,34 @@ def checked_grid(
     return grid
 
 
+def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, name: str) -> tuple[str, ...]:
+    """Timing models of a sweep: those that can express every value of the grid.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    grid
+        Values of its keys.
+    asked
+        Names of timing models; by default all that can.
+    name
+        What messages call them.
+
+    Raises
+    ------
+    BusplanError
+        A model that was asked for cannot express a value.
+    """
+    variants = [override(profile, {key: value}) for key, axis in grid.axes.items() for value in _samples(axis)]
+    if asked is not None:
+        for model in asked:
+            for one in variants:
+                known_model(one, model, name=name)
+        return tuple(asked)
+    return tuple(model for model in model_names(profile) if all(model in model_names(one) for one in variants))
+
+
 def _require_known(profile: Profile, key: str, *, name: str) -> None:
     """Refuse a key that does not exist, or that is a section or a list."""
     *tables, last = key.split(".")
@@ -237,7 +266,7 @@ def _samples(axis: Values) -> list[Value]:
     if isinstance(axis, Listed):
         if axis.size <= _CHECKED_EACH:
             return list(dict.fromkeys(axis.values))
-        numbers = [one for one in axis.values if not isinstance(one, str)]
+        numbers = [one for one in axis.values if not isinstance(one, str | bool)]
         # A fraction among whole numbers may lie between the extremes.
         fractions = [one for one in numbers if isinstance(one, float)][:1]
         words = set(axis.values) - set(numbers)
@@ -249,9 +278,9 @@ def _samples(axis: Values) -> list[Value]:
 
 
 def _least(values: list[Value]) -> Value:
-    return min((one for one in values if not isinstance(one, str)), default=values[0])
+    return min((one for one in values if not isinstance(one, str | bool)), default=values[0])
 
 
 def _greatest(values: list[Value]) -> Value:
-    words = [one for one in values if isinstance(one, str)]
+    words = [one for one in values if isinstance(one, str | bool)]
     return words[0] if words else max(values)

@@ -158,7 +158,11 @@ class Ieee1394(Bus):
             overhead_bytes=network.profile.payload.overhead_bytes,
             responder=Responder(0.0),
         )
-        return Halves(phases.latency_us, phases.request_and_acknowledge_us)
+        return Halves(phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
+
+    def fit_keys(self, network: Network, *, model: str | None) -> dict[str, Value]:
+        """The timing model and the gap count."""
+        return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count: one register in each node."""
