@@ -49,7 +49,7 @@ def calibrate_command(
         typer.Option(
             "--timing",
             metavar="MODEL",
-            help="Timing model that says what the packets take.  [default: the profile's bus.timing_model]",
+            help="Timing model that says what the packets take.  [default: the one that decides]",
             show_default=False,
         ),
     ] = None,

@@ -72,8 +72,8 @@ def diff_command(
     nodes, how the bus is set, time available, largest term) is neutral. JSON and CSV have those that are the same, too.
     Times are in us, contour errors in um in the table and in mm in JSON. Markdown is for a pull request. Exits 0
     whatever the figures are; with --fail-on-regression 1 when the report calls any figure worse, under either timing
-    model whichever decides, or of the circle; --timing and --no-circle leave some out, but never whether B fits as its
-    own timing_model decides. A circle that cannot be run is not passed.
+    model whichever decides, or of the circle; --timing and --no-circle leave some out, but never whether B is shown to
+    fit. A circle that cannot be run is not passed.
 
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """

@@ -59,7 +59,7 @@ def explain_command(
         typer.Option(
             "--timing",
             metavar="MODEL|both",
-            help="Timing model; a circle test has only the one that decides.  "
+            help="Timing model; a circle test and a verdict have only the one that decides.  "
             "[default: the profile's bus.timing_model]",
             show_default=False,
         ),

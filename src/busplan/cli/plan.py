@@ -110,12 +110,12 @@ def plan_command(
 
     Each option changes the profile in one way, and is computed again with it in place: the smallest period that fits
     the bus and passes the circle, the best gap count for the hops, the largest payload (read and write alike), the
-    smallest slice ratio, the most nodes, under the profile's bus.timing_model. Margins are in us.
+    smallest slice ratio, the most nodes: all as far as they are shown to fit. Margins are in us, less the model's bias.
 
-    One is recommended: the cheapest after which the goal fits under both timing models with a safe gap count, and
-    passes the circle. Cheapest comes first: nothing, gap count, slice ratio (up to 0.9), both, period, period and gap
-    count. What is given by an option is kept, and so is the number of nodes; a payload, speed or wiring is changed only
-    where the standard's limits demand it. Exits 0 when there is such a plan, 1 when there is none.
+    One is recommended: the cheapest after which the goal is shown to fit with a safe gap count, and passes the circle.
+    Cheapest comes first: nothing, gap count, slice ratio (up to 0.9), both, period, period and gap count. What is given
+    by an option is kept, and so is the number of nodes; a payload, speed or wiring is changed only where the standard's
+    limits demand it. Exits 0 when there is such a plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
     """

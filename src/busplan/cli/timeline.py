@@ -88,7 +88,7 @@ def timeline_command(
             "--timing",
             metavar="MODEL",
             help="Timing model: the paper's equations as published, or the standard's clock and packets. "
-            "A cycle has one.  [default: the profile's bus.timing_model]",
+            "A cycle has one.  [default: the profile's bus.timing_model, where it is applicable]",
             show_default=False,
         ),
     ] = None,
