@@ -226,8 +226,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 def busplan(run: Run) -> Run:
     """Call the command line in this process, with whatever is written as an argument."""
 
-    def call(*arguments: object, cwd: Path, stdin: str | None = None) -> "subprocess.CompletedProcess[str]":
-        return run(*map(str, arguments), cwd=cwd, stdin=stdin)
+    def call(
+        *arguments: object, cwd: Path, stdin: str | None = None, **inside: object
+    ) -> "subprocess.CompletedProcess[str]":
+        return run(*map(str, arguments), cwd=cwd, stdin=stdin, inside=inside)
 
     return call
 

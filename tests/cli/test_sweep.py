@@ -144,10 +144,13 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
         assert len({len(row) for row in csv.reader(text.splitlines())}) == 1
 
 
-def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: Path) -> None:
+def test_circle_tests_add_their_columns_and_processes_change_nothing(busplan: Run, tmp_path: Path) -> None:
     grid = ["--vary", "cycle.period_us=500,4000", "--vary", "circle.feed_mm_per_min=15000", "--circle"]
     shortened = ["--vary", "circle.radius_mm=20", *grid, "--format", "jsonl"]
-    alone, together = (process("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path) for jobs in ("1", "2"))
+    alone, together = (
+        call("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path)
+        for call, jobs in ((busplan, "1"), (process, "2"))
+    )
     assert (alone.returncode, together.returncode) == (0, 0), alone.stderr + together.stderr
     assert alone.stdout == together.stdout
     _, *rows = [json.loads(line) for line in alone.stdout.splitlines()]
@@ -159,7 +162,7 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: P
     ]
     # What does not fit is not simulated, and does not pass.
     assert (rows[1]["max_contour_error_mm"], rows[1]["passed"]) == (None, False)
-    single = process("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
+    single = busplan("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
     (result,) = json.loads(single.stdout)["results"]
     for name in (
         "mean_contour_error_mm",
@@ -172,11 +175,11 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: P
 
 
 @pytest.mark.parametrize("grid", [["bus.nodes=1:9"], ["bus.gap_count=optimal,63", "cycle.period_us=250,1000,500"]])
-def test_figures_are_drawn(grid: list[str], tmp_path: Path) -> None:
+def test_figures_are_drawn(busplan: Run, grid: list[str], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     varied = [part for spec in grid for part in ("--vary", spec)]
     first, second = (
-        process("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
+        busplan("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
     )
     assert (first.returncode, first.stderr, second.returncode) == (0, "wrote f.svg\n", 0)
     assert (tmp_path / "f.svg").read_bytes().startswith(b"<?xml")

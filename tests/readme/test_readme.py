@@ -151,7 +151,7 @@ DOCUMENTS = {
     "rule": "BP101",
     "diff": "paper-1ms paper-optimal-gap",
     "plan": "paper-1ms --axes 400 --no-circle",
-    "sweep": "paper-4ms --vary bus.nodes=1:2 --circle",
+    "sweep": "paper-4ms --vary bus.nodes=1:2 --circle --jobs 1",
     "calibrate": "paper-two-node table-1.csv",
     "timeline": "paper-4ms",
     "paper": "",
