@@ -194,6 +194,17 @@ def shell() -> Run:
 
 
 @pytest.fixture(scope="session")
+def no_numba(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
+    """Variables for a process whose interpreter, and that of its workers, starts as if numba were not installed.
+
+    To load it takes each of them longer than to simulate a small circle.
+    """
+    folder = tmp_path_factory.mktemp("no_numba")
+    (folder / "sitecustomize.py").write_text('import sys\nsys.modules["numba"] = None\n', encoding="utf-8")
+    return {"PYTHONPATH": str(folder)}
+
+
+@pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Run the program: as a process where a stream, the environment or the interpreter matters, else in this one.
 

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -31,7 +31,9 @@ if __name__ == "__main__":
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, no_numba: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, value in no_numba.items():
+        monkeypatch.setenv(name, value)
     (tmp_path / "p.toml").write_bytes(PROFILE.read_bytes())
     return tmp_path
 
