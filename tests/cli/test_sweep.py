@@ -99,10 +99,11 @@ def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) ->
     assert [float(value) for value, _ in places] == [document["rows"][int(number)]["margin_us"] for _, number in places]
 
 
-def has_open(pid: int, folder: Path) -> bool:
-    """Whether a process has a file open in a folder, be it one without a name."""
+def has_written(pid: int, folder: Path) -> bool:
+    """Whether a process has bytes in a file that it has open in a folder, be it one without a name."""
     with suppress(OSError):
-        return any(str(path.readlink()).startswith(f"{folder}/") for path in Path(f"/proc/{pid}/fd").iterdir())
+        files = [path for path in Path(f"/proc/{pid}/fd").iterdir() if str(path.readlink()).startswith(f"{folder}/")]
+        return any(path.stat().st_size for path in files)
     return False
 
 
@@ -121,9 +122,8 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
     ) as run:
         deadline = time.monotonic() + 60
         # The file is open once Ctrl-C is listened to.
-        while not has_open(run.pid, tmp_path) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        time.sleep(0.3)
+        while not has_written(run.pid, tmp_path) and time.monotonic() < deadline:
+            time.sleep(0.02)
         run.send_signal(signal.SIGINT)
         _, errors = run.communicate(timeout=60)
     assert run.returncode == 130
