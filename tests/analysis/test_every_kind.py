@@ -55,12 +55,9 @@ def test_an_array_of_nodes_gives_what_each_number_gives(
     network, nodes = network_of(profile), np.arange(1, 70)
     for model in model_names(profile):
         together = bus_of(profile).cycle(network.with_nodes(nodes), model=model)
+        alone = [{one.key: one.us for one in cycle_of(profile, model=model, nodes=int(count)).terms} for count in nodes]
         for term in together.terms:
-            alone = [
-                {one.key: one.us for one in cycle_of(profile, model=model, nodes=int(count)).terms}[term.key]
-                for count in nodes
-            ]
-            assert np.broadcast_to(term.us, nodes.shape).tolist() == alone
+            assert np.broadcast_to(term.us, nodes.shape).tolist() == [one[term.key] for one in alone]
         for limit in limits_with_time(network, model=model):
             truths = np.broadcast_to(limit.is_broken(network.with_nodes(nodes)), nodes.shape)
             assert truths.tolist() == [bool(limit.is_broken(network.with_nodes(int(one)))) for one in nodes]

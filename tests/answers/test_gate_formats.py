@@ -88,14 +88,21 @@ def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
     assert len({type(one) for one in made}) == len(made) == 7
     assert all(isinstance(one, GateFormat) for one in made)
     assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["text", "full"]
+    # Each in a process of its own, which has loaded what none of them goes without.
     code = (
-        "import sys; from busplan.answers.gate import gate_format; gate_format(sys.argv[1])\n"
-        "print(*sorted(name for name in sys.modules if name.startswith('busplan.answers.gate.')))"
+        "import os, sys; from busplan.answers.gate import FORMATS, gate_format\n"
+        "for name in FORMATS:\n"
+        "    if not os.fork():\n"
+        "        gate_format(name)\n"
+        "        print(*(one for one in sys.modules if one.startswith('busplan.answers.gate.')), flush=True)\n"
+        "        os._exit(0)\n"
+        "    assert os.wait()[1] == 0\n"
     )
-    for name, one in FORMATS.items():
-        run = subprocess.run([sys.executable, "-c", code, name], capture_output=True, text=True, check=True)
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    for line, one in zip(run.stdout.splitlines(), FORMATS.values(), strict=True):
         # GitHub's log has the plain lines, JUnit their words, and our own document those of the answer.
-        assert set(run.stdout.split()) <= {f"busplan.answers.gate.{module}" for module in (one.module, "plain")}
+        assert set(line.split()) <= {f"busplan.answers.gate.{module}" for module in (one.module, "plain")}
+        assert f"busplan.answers.gate.{one.module}" in line.split()
 
 
 # The answer in blocks

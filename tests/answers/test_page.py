@@ -89,12 +89,14 @@ class Tags(HTMLParser):
 # --- names ------------------------------------------------------------------------------------------------
 
 
+@cache
+def named(text: str) -> Tags:
+    return Tags(render(made(changed(name=text, description=f"Why: {text}"), BASE, title=text), "html"))
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_hostile_name_makes_no_element_and_no_attribute(name: str) -> None:
-    plain, hostile = (
-        Tags(render(made(changed(name=text, description=f"Why: {text}"), BASE, title=text), "html"))
-        for text in ("plain", name)
-    )
+    plain, hostile = named("plain"), named(name)
     assert hostile.tags == plain.tags
     assert not {tag for tag, _ in hostile.tags} & {"script", "img", "iframe", "object", "link", "base", "form"}
     assert not [one for _, attributes in hostile.tags for one in attributes if one.startswith("on")]
@@ -265,7 +267,7 @@ def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
     ],
 )
 def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int, said: str) -> None:
-    profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=2000.0)
+    profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=700.0)
     # A long circle is drawn no larger for more nodes: once is enough.
     results = all_answers(profile, with_circle=nodes == 16)
     html = render(page_report([ReportedProfile("x", results, other_period=False)], title=None), "html")

@@ -1,10 +1,9 @@
 """Each answer's document is the one that the command writes with `--format json`."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 
 import pytest
@@ -54,8 +53,10 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing paper": lambda: busplan.sweep(
         "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_models=["paper"]
     ),
-    "sweep paper-4ms --vary circle.radius_mm=10,20 --vary cycle.period_us=200,4000 --circle": lambda: busplan.sweep(
-        "paper-4ms", vary={"circle.radius_mm": [10, 20], "cycle.period_us": [200.0, 4000.0]}, with_circle=True
+    "sweep paper-4ms --vary circle.radius_mm=10,20 --vary cycle.period_us=200,4000 --circle --jobs 1": lambda: (
+        busplan.sweep(
+            "paper-4ms", vary={"circle.radius_mm": [10, 20], "cycle.period_us": [200.0, 4000.0]}, with_circle=True
+        )
     ),
 }
 
@@ -80,8 +81,9 @@ def test_with_the_options_of_the_command(line: str, tmp_path: Path, monkeypatch:
 
 
 @pytest.mark.parametrize("name", ["latency", "capacity", "plan", "timeline"])
-def test_the_text_is_what_the_command_prints(name: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_text_is_what_the_command_prints(
+    run: Callable[..., CompletedProcess[str]], name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     answer = EVERY[name]("paper-1ms")
-    done = subprocess.run([sys.executable, "-m", "busplan", name, "paper-1ms"], capture_output=True, check=True)
-    assert f"{answer}\n" == done.stdout.decode()
+    assert f"{answer}\n" == run(name, "paper-1ms").stdout
     assert capfd.readouterr() == ("", "")

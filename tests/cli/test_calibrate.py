@@ -1,4 +1,4 @@
-"""`busplan calibrate` as a process: the documents, the profile's file, and what is refused."""
+"""`busplan calibrate`: the documents, the profile's file, and what is refused."""
 
 import csv
 import json
@@ -6,11 +6,14 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from busplan.profile.shipped import load, locate
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 MEASURED = "payload_bytes,latency_us\n4,48\n4,49\n64,80\n64,81\n256,160\n256,400\n256,161\n"
 
@@ -45,19 +48,7 @@ def bench(tmp_path: Path) -> Path:
     return path
 
 
-def busplan(*arguments: object, cwd: Path, stdin: str = "") -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "busplan", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        check=False,
-        input=stdin,
-        timeout=60,
-    )
-
-
-def test_the_shipped_example_gives_the_shipped_table(tmp_path: Path) -> None:
+def test_the_shipped_example_gives_the_shipped_table(busplan: Run, tmp_path: Path) -> None:
     run = busplan("calibrate", "paper-two-node", "table-1.csv", "--format", "json", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
     document = json.loads(run.stdout)
@@ -69,7 +60,7 @@ def test_the_shipped_example_gives_the_shipped_table(tmp_path: Path) -> None:
     assert "\ntime_us = [36.7, 36.3, 44.7, 53.1, 81.7, 135.5, 212.2, 405.2]\n" in people
 
 
-def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bench: Path) -> None:
+def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(busplan: Run, bench: Path) -> None:
     before = bench.read_text()
     run = busplan("calibrate", "bench.toml", "m.csv", "--timing", "standard", "--robust", "--apply", cwd=bench.parent)
     assert (run.returncode, run.stderr[:36]) == (0, "wrote [node.execution] of bench.toml")
@@ -90,7 +81,7 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(be
     assert bench.read_text() == after
 
 
-def test_apply_of_the_shipped_example_is_derived_and_changes_nothing_else(bench: Path) -> None:
+def test_apply_of_the_shipped_example_is_derived_and_changes_nothing_else(busplan: Run, bench: Path) -> None:
     before = bench.read_text()
     run = busplan("calibrate", "bench.toml", "table-1.csv", "--apply", "--format", "csv", cwd=bench.parent)
     rows = list(csv.DictReader(run.stdout.splitlines()))
@@ -102,7 +93,7 @@ def test_apply_of_the_shipped_example_is_derived_and_changes_nothing_else(bench:
     ]
 
 
-def test_apply_from_a_table_to_a_line_and_back(bench: Path) -> None:
+def test_apply_from_a_table_to_a_line_and_back(busplan: Run, bench: Path) -> None:
     bench.write_bytes(b"\xef\xbb\xbf" + bench.read_bytes().replace(b"\n", b"\r\n"))
     run = busplan("calibrate", "bench.toml", "-", "--form", "linear", "--apply", cwd=bench.parent, stdin=MEASURED)
     assert run.returncode == 0
@@ -116,7 +107,7 @@ def test_apply_from_a_table_to_a_line_and_back(bench: Path) -> None:
     assert set(load(str(bench)).document.data()["node"]["execution"]) == {"grade", "kind", "payload_bytes", "time_us"}
 
 
-def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(bench: Path) -> None:
+def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(busplan: Run, bench: Path) -> None:
     text = bench.read_text().replace("payload_bytes = [4, 16", "payload_bytes = [  # from the bench\n4, # least\n16")
     assert "# from the bench" in text
     bench.write_text(text.replace("405.2]", "405.2]  # by Li"))
@@ -126,7 +117,7 @@ def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(bench: Path) 
     assert {"# from the bench", "# least", "# by Li"} <= set(lines)
 
 
-def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(bench: Path) -> None:
+def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan: Run, bench: Path) -> None:
     text = bench.read_text()
     start = text.index("[node.execution]")
     inline = 'execution = { kind = "table", payload_bytes = [4, 64, 256], time_us = [3, 5.5, 9] }  # mine\n'
@@ -170,7 +161,9 @@ def test_a_kill_while_writing_leaves_the_profile_whole(bench: Path, moment: str)
         (("bench.toml", "bad.csv"), "bad.csv:2:3: latency_us 'x': expected a number"),
     ],
 )
-def test_refused_with_exit_2_and_nothing_written(bench: Path, arguments: tuple[str, ...], message: str) -> None:
+def test_refused_with_exit_2_and_nothing_written(
+    busplan: Run, bench: Path, arguments: tuple[str, ...], message: str
+) -> None:
     header = "payload_bytes,latency_us\n"
     for name, row in (("far.csv", "64,90"), ("short.csv", "4,0.05"), ("bad.csv", "4,x")):
         (bench.parent / name).write_text(f"{header}{row}\n", encoding="utf-8")
@@ -181,7 +174,7 @@ def test_refused_with_exit_2_and_nothing_written(bench: Path, arguments: tuple[s
     assert bench.read_bytes() == before
 
 
-def test_bench_options_move_the_packets_and_outliers_are_warned_of(bench: Path) -> None:
+def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run, bench: Path) -> None:
     run = busplan("calibrate", "bench.toml", "m.csv", "--nodes", 5, "--gap-count", 10, cwd=bench.parent)
     assert (
         "(T1+T2) - (T4+T5), eq (3): both halves by the paper timing model for S400, 5 hops, gap count 10." in run.stdout

@@ -3,11 +3,10 @@
 import os
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from subprocess import CompletedProcess
 from typing import Any
 from unittest import mock
 
@@ -20,7 +19,7 @@ from busplan.cli.help import FAILURES
 from busplan.cli.lazy import COMMANDS
 from busplan.profile.shipped import shipped_folder
 
-Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Run = Callable[..., CompletedProcess[str]]
 
 ROOT: Any = get_command(app)
 TOP: Any = ROOT.context_class(ROOT, info_name="busplan", **ROOT.context_settings)
@@ -94,22 +93,13 @@ def test_its_example_is_one_line_that_can_be_copied(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "example"), [pytest.param(name, one, id=one) for name in ("", *COMMANDS) for one in examples(name)]
 )
-def test_its_example_runs_as_it_stands(name: str, example: str, tmp_path: Path) -> None:
+def test_its_example_runs_as_it_stands(shell: Run, name: str, example: str, tmp_path: Path) -> None:
     words = shlex.split(example)
     for before, word in pairwise(words):
         # A profile that a user must have; what follows -o is written.
         if word.endswith(".toml") and before not in {"-o", "--output", ">"}:
             (tmp_path / word).write_bytes((shipped_folder() / "paper-4ms.toml").read_bytes())
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    run = subprocess.run(
-        ["bash", "-c", example],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env={**os.environ, "PATH": path},
-        check=False,
-        timeout=60,
-    )
+    run = shell(example, cwd=tmp_path)
     is_gate = GATE.search(" ".join(paragraphs(name))) is not None
     assert run.returncode in ({0, 1} if is_gate else {0}), run.stderr
     # A gate with nothing to find says so beside the document.
@@ -175,13 +165,12 @@ def test_what_stands_for_a_value_says_what_may_stand_there(param: Any, said: str
 @EVERY_COMMAND
 def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str, shell: str) -> None:
     typed = f"busplan {name} --".replace("  ", " ")
-    offers = run(
-        env={
-            "_BUSPLAN_COMPLETE": f"complete_{shell}",
-            "_TYPER_COMPLETE_ARGS": typed,
-            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-        }
-    ).stdout.splitlines()
+    asked = {
+        "_BUSPLAN_COMPLETE": f"complete_{shell}",
+        "_TYPER_COMPLETE_ARGS": typed,
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+    }
+    offers = run(inside={"variables": asked}).stdout.splitlines()
     here = context(name)
     params = [param for param in here.command.get_params(here) if param.param_type_name == "option"]
     flags = [one for param in params for one in param.opts + param.secondary_opts if one.startswith("--")]

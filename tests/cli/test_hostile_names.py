@@ -120,7 +120,7 @@ def test_markdown_shows_what_the_name_holds(run: Run, folder: Path) -> None:
         ("capacity",),
         ("latency",),
         ("plan", "--no-circle"),
-        ("circle-test", "--contributions"),
+        ("circle-test", "--contributions", "--radius", "40"),
         ("calibrate", str(SHIPPED / "table-1.csv")),
     ],
     ids=lambda command: command[0],

@@ -1,13 +1,16 @@
-"""`busplan plan` as a process: exit codes, documents, files that are written as a whole or not at all."""
+"""`busplan plan`: exit codes, documents, files that are written as a whole or not at all."""
 
 import json
 import signal
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 PROFILE = """\
 # our machine
@@ -45,19 +48,28 @@ def profile(tmp_path: Path) -> Path:
     return path
 
 
-def busplan(*arguments: object, cwd: Path, code: str = RUN, stdin: str = "") -> subprocess.CompletedProcess[str]:
+@pytest.fixture
+def busplan(busplan: Run) -> Run:
+    """Call `plan` in this process."""
+
+    def call(*arguments: object, cwd: Path, stdin: str | None = None) -> "subprocess.CompletedProcess[str]":
+        return busplan("plan", *arguments, cwd=cwd, stdin=stdin)
+
+    return call
+
+
+def process(*arguments: object, cwd: Path, code: str) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(
         [sys.executable, "-c", code, "plan", *map(str, arguments)],
         capture_output=True,
         text=True,
         cwd=cwd,
-        input=stdin,
         check=False,
         timeout=60,
     )
 
 
-def test_apply_changes_the_values_and_nothing_else(profile: Path) -> None:
+def test_apply_changes_the_values_and_nothing_else(busplan: Run, profile: Path) -> None:
     run = busplan(profile.name, "--axes", 15, "--apply", "--format", "json", cwd=profile.parent)
     assert run.returncode == 0
     document = json.loads(run.stdout)
@@ -70,7 +82,7 @@ def test_apply_changes_the_values_and_nothing_else(profile: Path) -> None:
     assert (again.returncode, again.stderr) == (0, "mine.toml: nothing to change, left as it is\n")
 
 
-def test_a_new_file_holds_the_plan_and_the_old_one_stays(profile: Path) -> None:
+def test_a_new_file_holds_the_plan_and_the_old_one_stays(busplan: Run, profile: Path) -> None:
     new = profile.parent / "new.toml"
     run = busplan("-", "--nodes", 4, "--period", "900us", "-o", new.name, cwd=profile.parent, stdin=PROFILE)
     assert (run.returncode, run.stderr) == (0, "wrote new.toml\n")
@@ -95,7 +107,7 @@ def test_a_new_file_holds_the_plan_and_the_old_one_stays(profile: Path) -> None:
         ("report.json", '"command": "plan"'),
     ],
 )
-def test_a_reports_name_takes_the_report(profile: Path, name: str, words: str) -> None:
+def test_a_reports_name_takes_the_report(busplan: Run, profile: Path, name: str, words: str) -> None:
     report = profile.parent / name
     report.write_text("old", encoding="utf-8")
     run = busplan("mine.toml", "-o", name, cwd=profile.parent)
@@ -104,13 +116,13 @@ def test_a_reports_name_takes_the_report(profile: Path, name: str, words: str) -
     assert profile.read_text(encoding="utf-8") == PROFILE
 
 
-def test_a_report_is_written_without_a_plan_too(profile: Path) -> None:
+def test_a_report_is_written_without_a_plan_too(busplan: Run, profile: Path) -> None:
     run = busplan("mine.toml", "--gap-count", 3, "-o", "report.md", cwd=profile.parent)
     assert (run.returncode, run.stdout, run.stderr) == (1, "", "wrote report.md\n")
     assert "NO PLAN" in (profile.parent / "report.md").read_text(encoding="utf-8")
 
 
-def test_a_plan_is_applied_and_reported_in_one_call(profile: Path) -> None:
+def test_a_plan_is_applied_and_reported_in_one_call(busplan: Run, profile: Path) -> None:
     run = busplan("mine.toml", "--nodes", 4, "--apply", "-o", "report.json", cwd=profile.parent)
     assert (run.returncode, run.stdout) == (0, "")
     assert run.stderr == "changed mine.toml: bus.nodes = 4, bus.gap_count = 10\nwrote report.json\n"
@@ -119,7 +131,7 @@ def test_a_plan_is_applied_and_reported_in_one_call(profile: Path) -> None:
     assert "nodes = 4 " in profile.read_text(encoding="utf-8")
 
 
-def test_the_form_beside_a_new_profile_is_that_of_standard_output(profile: Path) -> None:
+def test_the_form_beside_a_new_profile_is_that_of_standard_output(busplan: Run, profile: Path) -> None:
     run = busplan("mine.toml", "-o", "new.toml", "--format", "markdown", cwd=profile.parent)
     assert (run.returncode, run.stderr) == (0, "wrote new.toml\n")
     assert run.stdout.startswith("### Plan of `mine`\n")
@@ -127,7 +139,7 @@ def test_the_form_beside_a_new_profile_is_that_of_standard_output(profile: Path)
 
 
 @pytest.mark.parametrize("option", [["--apply"], ["-o", "new.toml", "--force"], ["-o", "new.toml"]])
-def test_without_a_plan_nothing_is_written(profile: Path, option: list[str]) -> None:
+def test_without_a_plan_nothing_is_written(busplan: Run, profile: Path, option: list[str]) -> None:
     before = sorted(profile.parent.iterdir())
     run = busplan(profile.name, "--gap-count", 3, *option, cwd=profile.parent)
     assert run.returncode == 1
@@ -140,7 +152,7 @@ def test_without_a_plan_nothing_is_written(profile: Path, option: list[str]) -> 
 @pytest.mark.parametrize("code", [KILLED_WHILE_WRITING, KILLED_BEFORE_RENAME])
 @pytest.mark.parametrize("option", [["--apply"], ["-o", "new.toml"]])
 def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path, option: list[str], code: str) -> None:
-    run = busplan(profile.name, "--nodes", 4, *option, cwd=profile.parent, code=code)
+    run = process(profile.name, "--nodes", 4, *option, cwd=profile.parent, code=code)
     assert run.returncode == -signal.SIGKILL
     assert profile.read_text(encoding="utf-8") == PROFILE
     assert not (profile.parent / "new.toml").exists()
@@ -168,7 +180,7 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
         (["none.toml"], "no such file"),
     ],
 )
-def test_what_cannot_be_done_is_said(profile: Path, arguments: list[str], words: str) -> None:
+def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: list[str], words: str) -> None:
     (profile.parent / "link.md").symlink_to("mine.toml")
     run = busplan(*arguments, cwd=profile.parent)
     assert (run.returncode, run.stdout) == (2, "")
@@ -177,7 +189,7 @@ def test_what_cannot_be_done_is_said(profile: Path, arguments: list[str], words:
     assert profile.read_text(encoding="utf-8") == PROFILE
 
 
-def test_the_circle_is_asked_for_and_can_be_left_out(tmp_path: Path) -> None:
+def test_the_circle_is_asked_for_and_can_be_left_out(busplan: Run, tmp_path: Path) -> None:
     circle = "[servo]\nposition_gain_per_s = 50\n[circle]\nradius_mm = 20\nfeed_mm_per_min = 3000\nramp_periods = 20\n"
     (tmp_path / "mine.toml").write_text(PROFILE + circle, encoding="utf-8")
     run = busplan("mine.toml", "--format", "json", cwd=tmp_path)
@@ -186,7 +198,7 @@ def test_the_circle_is_asked_for_and_can_be_left_out(tmp_path: Path) -> None:
     assert all(option["circle_passed"] is True for option in options)
     assert next(one for one in options if one["title"] == "smallest period")["period_us"] % 100 == 0
     loaded = f"import atexit, sys; atexit.register(lambda: print('numpy' in sys.modules, file=sys.stderr)); {RUN}"
-    without = busplan("mine.toml", "--no-circle", "--format", "csv", cwd=tmp_path, code=loaded)
+    without = process("mine.toml", "--no-circle", "--format", "csv", cwd=tmp_path, code=loaded)
     # The equations need no numpy, and nobody waits for it.
     assert (without.returncode, without.stderr) == (0, "False\n")
     assert without.stdout.startswith("profile,title,changes,recommended,")

@@ -1,7 +1,6 @@
-"""`busplan report` as a process: every figure is the JSON's, files, refusals, several profiles, hostile paths."""
+"""`busplan report`: every figure is the JSON's, files, refusals, several profiles, hostile paths."""
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -108,12 +107,11 @@ def at(document: Any, pointer: str) -> Any:
     return document
 
 
-def documents(page: Page, *, cwd: Path) -> dict[str, Any]:
-    """What each command of the page writes, run by a shell as it stands."""
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+def documents(page: Page, *, shell: Run, cwd: Path) -> dict[str, Any]:
+    """What each command of the page writes, run as it stands."""
     found = {}
     for anchor, line in page.lines.items():
-        done = subprocess.run(["bash", "-c", line], cwd=cwd, env=environment, capture_output=True, check=False)
+        done = shell(line, cwd=cwd)
         assert done.returncode in (0, 1), (line, done.stderr)
         found[anchor] = json.loads(done.stdout)
     return found
@@ -133,10 +131,10 @@ def require_rounding(shown: Shown, value: Any) -> None:
         assert abs(text - exact) <= Decimal((0, (5,), int(text.as_tuple().exponent) - 1)) * Decimal("1.000001"), shown
 
 
-def require_the_commands_own(html: str, *, cwd: Path) -> Page:
+def require_the_commands_own(html: str, *, shell: Run, cwd: Path) -> Page:
     """Compare every marked figure with the document of its command."""
     page = Page(html)
-    found = documents(page, cwd=cwd)
+    found = documents(page, shell=shell, cwd=cwd)
     assert page.unmarked == []
     for shown in page.figures:
         value = at(found[shown.source], shown.pointer)
@@ -147,12 +145,12 @@ def require_the_commands_own(html: str, *, cwd: Path) -> Page:
     return page
 
 
-def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, tmp_path: Path) -> None:
+def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, shell: Run, tmp_path: Path) -> None:
     done = run("report", "paper-4ms", "-o", "report.html", cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "wrote report.html\n")
     html = (tmp_path / "report.html").read_bytes()
     assert len(html) < 300_000
-    page = require_the_commands_own(html.decode(), cwd=tmp_path)
+    page = require_the_commands_own(html.decode(), shell=shell, cwd=tmp_path)
     assert len(page.figures) > 200
     assert list(page.lines) == ["p1-capacity", "p1-latency", "p1-timeline", "p1-axes", "p1-circle", "p1-explain"]
     assert page.lines["p1-capacity"] == "busplan capacity paper-4ms --format json"
@@ -164,14 +162,14 @@ def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, tmp_p
     assert ("18.967", "um") in {(shown.text, shown.unit) for shown in page.figures}
 
 
-def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, tmp_path: Path) -> None:
+def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, shell: Run, tmp_path: Path) -> None:
     (tmp_path / "sub").mkdir()
     names = ('it\'s $(a)  `b` "c".toml', "-o.toml", "sub/tab\there \u202e.toml")
     for name in names:
         (tmp_path / name).write_text(QUICK + CIRCLE, encoding="utf-8")
     arguments = ("--period", "0.4ms", "--", *names, names[0])
     html = run("report", *arguments, cwd=tmp_path).stdout
-    page = require_the_commands_own(html, cwd=tmp_path)
+    page = require_the_commands_own(html, shell=shell, cwd=tmp_path)
     assert page.lines["p2-capacity"] == "busplan capacity ./-o.toml --period 400us --format json"
     assert page.lines["p2-latency"] == "busplan latency ./-o.toml --format json"
     assert [html.count(f'id="p{number}"') for number in range(1, 6)] == [1, 1, 1, 1, 0]
@@ -188,13 +186,15 @@ def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, tm
     ],
     ids=["overrun", "unstable", "a million nodes", "a nanosecond", "impossible circle"],
 )
-def test_a_profile_that_fails_is_reported_with_exit_0(run: Run, tmp_path: Path, changes: tuple[str, str]) -> None:
+def test_a_profile_that_fails_is_reported_with_exit_0(
+    run: Run, shell: Run, tmp_path: Path, changes: tuple[str, str]
+) -> None:
     text = QUICK + CIRCLE
     assert changes[0] in text
     (tmp_path / "x.toml").write_text(text.replace(*changes), encoding="utf-8")
     done = run("report", "x.toml", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    require_the_commands_own(done.stdout, cwd=tmp_path)
+    require_the_commands_own(done.stdout, shell=shell, cwd=tmp_path)
     assert run("report", "x.toml", "--format", "markdown", cwd=tmp_path).returncode == 0
 
 

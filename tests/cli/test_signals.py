@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -15,7 +15,9 @@ import pytest
 from busplan.cli.workers import workers
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "paper-1ms.toml"
-SWEEP = ("sweep", "p.toml", "--vary", "servo.position_gain_per_s=100:400", "--circle", "--jobs", "2")
+SMALL = ("sweep", "p.toml", "--vary", "circle.radius_mm=10", "--circle", "--jobs", "2")
+"""A circle that is soon round: rows come early, and a run of many has long to go."""
+SWEEP = (*SMALL, "--vary", "servo.position_gain_per_s=100:1000")
 # Whoever runs the tests may ignore signals, and children inherit that.
 PROGRAM = """
 import signal
@@ -29,7 +31,9 @@ if __name__ == "__main__":
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path: Path, no_numba: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, value in no_numba.items():
+        monkeypatch.setenv(name, value)
     (tmp_path / "p.toml").write_bytes(PROFILE.read_bytes())
     return tmp_path
 
@@ -110,7 +114,7 @@ def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int
 
 
 def test_a_hangup_that_nohup_ignores_stays_ignored(folder: Path) -> None:
-    short = ("sweep", "p.toml", "--vary", "servo.position_gain_per_s=100:112", "--circle", "--jobs", "2")
+    short = (*SMALL, "--vary", "servo.position_gain_per_s=100:112")
     with running(*short, "-o", "c.csv", folder=folder, hangup="SIG_IGN") as process:
         assert until(lambda: workers_of(process))
         os.killpg(process.pid, signal.SIGHUP)

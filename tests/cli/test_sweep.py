@@ -99,10 +99,11 @@ def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) ->
     assert [float(value) for value, _ in places] == [document["rows"][int(number)]["margin_us"] for _, number in places]
 
 
-def has_open(pid: int, folder: Path) -> bool:
-    """Whether a process has a file open in a folder, be it one without a name."""
+def has_written(pid: int, folder: Path) -> bool:
+    """Whether a process has bytes in a file that it has open in a folder, be it one without a name."""
     with suppress(OSError):
-        return any(str(path.readlink()).startswith(f"{folder}/") for path in Path(f"/proc/{pid}/fd").iterdir())
+        files = [path for path in Path(f"/proc/{pid}/fd").iterdir() if str(path.readlink()).startswith(f"{folder}/")]
+        return any(path.stat().st_size for path in files)
     return False
 
 
@@ -121,9 +122,8 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
     ) as run:
         deadline = time.monotonic() + 60
         # The file is open once Ctrl-C is listened to.
-        while not has_open(run.pid, tmp_path) and time.monotonic() < deadline:
-            time.sleep(0.05)
-        time.sleep(0.3)
+        while not has_written(run.pid, tmp_path) and time.monotonic() < deadline:
+            time.sleep(0.02)
         run.send_signal(signal.SIGINT)
         _, errors = run.communicate(timeout=60)
     assert run.returncode == 130
@@ -144,10 +144,13 @@ def test_ctrl_c_leaves_a_valid_partial_file_and_the_old_one(name: str, tmp_path:
         assert len({len(row) for row in csv.reader(text.splitlines())}) == 1
 
 
-def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: Path) -> None:
+def test_circle_tests_add_their_columns_and_processes_change_nothing(busplan: Run, tmp_path: Path) -> None:
     grid = ["--vary", "cycle.period_us=500,4000", "--vary", "circle.feed_mm_per_min=15000", "--circle"]
     shortened = ["--vary", "circle.radius_mm=20", *grid, "--format", "jsonl"]
-    alone, together = (process("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path) for jobs in ("1", "2"))
+    alone, together = (
+        call("sweep", "paper-4ms", *shortened, "--jobs", jobs, cwd=tmp_path)
+        for call, jobs in ((busplan, "1"), (process, "2"))
+    )
     assert (alone.returncode, together.returncode) == (0, 0), alone.stderr + together.stderr
     assert alone.stdout == together.stdout
     _, *rows = [json.loads(line) for line in alone.stdout.splitlines()]
@@ -159,7 +162,7 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: P
     ]
     # What does not fit is not simulated, and does not pass.
     assert (rows[1]["max_contour_error_mm"], rows[1]["passed"]) == (None, False)
-    single = process("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
+    single = busplan("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
     (result,) = json.loads(single.stdout)["results"]
     for name in (
         "mean_contour_error_mm",
@@ -172,11 +175,11 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(tmp_path: P
 
 
 @pytest.mark.parametrize("grid", [["bus.nodes=1:9"], ["bus.gap_count=optimal,63", "cycle.period_us=250,1000,500"]])
-def test_figures_are_drawn(grid: list[str], tmp_path: Path) -> None:
+def test_figures_are_drawn(busplan: Run, grid: list[str], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     varied = [part for spec in grid for part in ("--vary", spec)]
     first, second = (
-        process("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
+        busplan("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
     )
     assert (first.returncode, first.stderr, second.returncode) == (0, "wrote f.svg\n", 0)
     assert (tmp_path / "f.svg").read_bytes().startswith(b"<?xml")

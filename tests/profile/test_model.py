@@ -1,6 +1,7 @@
 """The profile's models: strict, frozen and closed; ranges, defaults, and what the sections compute."""
 
 import math
+from collections.abc import Iterable
 from copy import deepcopy
 from typing import Any
 
@@ -102,10 +103,30 @@ TEXTS = (
     "node__execution__kind",
     "node__execution__grade",
 )
+SECTION_KEYS = ("bus", "cycle", "cycle__sync", "payload", "node", "node__execution")
+KINDS = {
+    *("bus__nodes", "bus__max_hops", "cycle__nonperiodic_us", "limits__max_utilisation", "cycle__period_us"),
+    *("name", "bus__speed", "node__execution__kind", "node__execution__grade", "bus", "cycle__sync", "node__execution"),
+}
+"""One key of each kind of constraint."""
 
 
-@pytest.mark.parametrize("key", NUMBERS)
-@pytest.mark.parametrize("value", ["1", "", b"1", True, False, [1], {"a": 1}, 1j], ids=repr)
+def each(keys: Iterable[str], *values: object) -> pytest.MarkDecorator:
+    """Try all values with one key of each kind, and the first of them with every key."""
+    cases = [(key, value) for key in keys for value in (values if key in KINDS else values[:1])]
+    return pytest.mark.parametrize(("key", "value"), cases, ids=repr)
+
+
+@pytest.mark.parametrize("key", [*SECTION_KEYS, "limits", ""])
+def test_every_section_is_strict_frozen_and_closed(key: str) -> None:
+    loaded = profile(limits={}, cycle__sync={})
+    section = value_of(loaded, key) if key else loaded
+    assert isinstance(section, BaseModel)
+    config = section.model_config
+    assert (config["strict"], config["frozen"], config["extra"]) == (True, True, "forbid")
+
+
+@each(NUMBERS, "1", "", b"1", True, False, [1], {"a": 1}, 1j)
 def test_a_number_is_nothing_but_a_number(key: str, value: object) -> None:
     assert refused(**{key: value})
 
@@ -120,8 +141,7 @@ def test_a_number_that_need_not_be_said_may_be_none(key: str) -> None:
     assert value_of(profile(**{key: None}), key) is None
 
 
-@pytest.mark.parametrize("key", WHOLE)
-@pytest.mark.parametrize("value", [1.0, 1.5, math.nan, math.inf], ids=repr)
+@each(WHOLE, 1.0, 1.5, math.nan, math.inf)
 def test_a_whole_number_is_no_float(key: str, value: float) -> None:
     assert refused(**{key: value})
 
@@ -133,14 +153,12 @@ def test_a_whole_number_may_stand_for_a_float(key: str) -> None:
     assert type(value) is float
 
 
-@pytest.mark.parametrize("key", FRACTIONS)
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -1.0, -5e-324], ids=repr)
+@each(FRACTIONS, math.nan, math.inf, -math.inf, -1.0, -5e-324)
 def test_a_float_is_finite_and_not_negative(key: str, value: float) -> None:
     assert refused(**{key: value})
 
 
-@pytest.mark.parametrize("key", TEXTS)
-@pytest.mark.parametrize("value", [1, 1.0, True, None, b"x", ["x"], {"x": 1}], ids=repr)
+@each(TEXTS, 1, 1.0, True, None, b"x", ["x"], {"x": 1})
 def test_a_text_is_nothing_but_a_text(key: str, value: object) -> None:
     if key == "node__execution__grade" and value is None:
         assert value_of(profile(**{key: None}), key) is None
@@ -148,8 +166,7 @@ def test_a_text_is_nothing_but_a_text(key: str, value: object) -> None:
     assert refused(**{key: value})
 
 
-@pytest.mark.parametrize("key", ["bus", "cycle", "cycle__sync", "payload", "node", "node__execution"])
-@pytest.mark.parametrize("value", [1, "x", True, None, [], [{}]], ids=repr)
+@each(SECTION_KEYS, 1, "x", True, None, [], [{}])
 def test_a_section_is_a_table(key: str, value: object) -> None:
     assert refused(**{key: value})
 

@@ -1,12 +1,10 @@
 """The README and the manual say what the program does: output blocks, tables, keys and links are checked."""
 
 import json
-import os
 import re
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from subprocess import CompletedProcess
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
@@ -27,6 +25,8 @@ from busplan.manual import FOLDER, topics
 from busplan.profile.shipped import shipped_names
 from busplan.sections.machine import AxisOverride
 
+Run = Callable[..., CompletedProcess[str]]
+
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
 PAGES = {path: path.read_text(encoding="utf-8") for path in (README, *sorted(FOLDER.glob("*.md")))}
@@ -45,12 +45,8 @@ def shown_runs() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(("command", "output"), list(shown_runs()), ids=lambda text: text[:40])
-def test_output_blocks_are_the_programs_own(command: str, output: str, tmp_path: Path) -> None:
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
-    environment.pop("FORCE_COLOR", None)
-    run = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path, env=environment, check=False
-    )
+def test_output_blocks_are_the_programs_own(shell: Run, command: str, output: str, tmp_path: Path) -> None:
+    run = shell(command, cwd=tmp_path)
     assert run.stdout + run.stderr == output
 
 
@@ -155,7 +151,7 @@ DOCUMENTS = {
     "rule": "BP101",
     "diff": "paper-1ms paper-optimal-gap",
     "plan": "paper-1ms --axes 400 --no-circle",
-    "sweep": "paper-4ms --vary bus.nodes=1:2 --circle",
+    "sweep": "paper-4ms --vary bus.nodes=1:2 --circle --jobs 1",
     "calibrate": "paper-two-node table-1.csv",
     "timeline": "paper-4ms",
     "paper": "",

@@ -29,7 +29,8 @@ def capacity_command(
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
     The verdict comes first: fits, not shown to fit, or does not fit, always by the standard model, with its margin, its
-    uncertainty U, the largest doubt and the cheapest change. The paper's closed form stands beside it. Times are in us. A report: it exits 0 whatever the verdict is.
+    uncertainty U, the largest doubt and the cheapest change. The paper's closed form stands beside it. Times are in us.
+    A report: it exits 0 whatever the verdict is.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
