@@ -58,32 +58,47 @@ def test_csv_holds_the_same_numbers_to_the_last_digit(profile: Profile) -> None:
 
 
 def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> None:
-    text = words(override(profile, {"cycle.period_us": 600}))
-    figures = capacity(override(profile, {"cycle.period_us": 600})).results
-    assert text.startswith("paper-1ms at 600 us: THE MODELS DISAGREE. paper: fits, ")
-    assert f"{figures[0].margin_us:.3f} us to spare" in text
-    assert f"{-figures[1].margin_us:.3f} us short" in text
-    assert "The paper model decides." in text
-    assert "Largest term: execution, 145.733 us of 205.917 us." in text
-    assert "limited by time" in text
-    assert "Cheapest way to make it fit (paper and standard): bus.gap_count = 7, which leaves " in text
+    text = words(override(profile, {"cycle.period_us": 500}))
+    _, one = capacity(override(profile, {"cycle.period_us": 500})).results
+    margin = f"Margin {one.margin_corrected_us:.3f} us +/- {one.uncertainty_us:.3f} us of 250.000 us"
+    assert text.startswith(f"paper-1ms at 500 us: does not fit. {margin}, less a bias of {one.bias_us:.3f} us. ")
+    assert "Largest doubt: execution time, 54% of U squared." in text
+    assert (
+        "Not in it: host time (host.transaction_us), the slowest execution (node.execution.worst_extra_us)." in text
+    )
+    assert "The paper model says otherwise: 207.117 us needed of 250.000 us. It decides nothing." in text
+    assert f"Largest term: execution, 146.933 us of {one.required_us:.3f} us." in text
+    assert "Shown to fit: 1 node (4 axes), limited by time." in text
+    assert "Cheapest way to make it fit: bus.gap_count = 7, which leaves a margin of " in text
 
 
-def test_models_that_agree_on_the_fit_may_carry_different_numbers(profile: Profile) -> None:
-    text = words(override(profile, {"cycle.period_us": 4000}))
-    assert "standard agrees" in text
-    assert "The bus carries 16 nodes (64 axes) by the paper model, limited by hops; 11 nodes (44 axes) by the" in text
+def test_a_verdict_that_is_not_shown_says_so_with_its_reserve(profile: Profile) -> None:
+    narrow = override(profile, {"cycle.period_us": 545})
+    assert words(narrow).startswith("paper-1ms at 545 us: not shown to fit. Margin 2.564 us +/- 6.311 us of 272.500 us")
+    reserved = override(profile, {"cycle.period_us": 600, "limits.reserve": 0.15})
+    text = words(reserved)
+    assert text.startswith("paper-1ms at 600 us: not shown to fit. Margin 30.064 us +/- 6.311 us of 300.000 us")
+    assert "15% of the slice must stay free (limits.reserve)." in text
+
+
+def test_what_the_paper_cannot_express_is_not_applicable(profile: Profile) -> None:
+    own = override(profile, {"cycle.retries": 1, "host.transaction_us": 5.0})
+    text = words(own)
+    assert "The paper model is not applicable: it has no cycle.retries, host.transaction_us." in text
+    assert "Not in it: the slowest execution (node.execution.worst_extra_us)." in text
+    assert [one.timing_model for one in capacity(own).results] == ["standard"]
 
 
 def test_an_unsafe_gap_count_and_a_long_cable_are_warned_of(profile: Profile) -> None:
     text = words(override(profile, {"bus.gap_count": 5, "bus.cable_length_m": 10}))
     assert "gap count 5 is unsafe for 2 hops (2 nodes); the smallest safe one is 7" in text
     assert "cables of 10 m are longer than the 4.5 m" in text
-    assert "fits, " in text
-    assert "but only with an unsafe gap count" in text
+    assert ": fits, but with an unsafe gap count." in text
     assert "Warning" not in words(override(profile, {"bus.gap_count": 13}))
-    # Safe for the nodes there are, and not for those the sentence before speaks of.
-    assert "unsafe for 5 hops (5 nodes); the smallest safe one is 13" in words(override(profile, {"bus.gap_count": 9}))
+    # No more nodes are spoken of than the gap count is safe for: 8 for three hops.
+    text = words(override(profile, {"bus.gap_count": 9}))
+    assert "Shown to fit: 3 nodes (12 axes), limited by gap table." in text
+    assert "Warning" not in text
 
 
 @pytest.mark.parametrize(
@@ -95,7 +110,7 @@ def test_an_unsafe_gap_count_and_a_long_cable_are_warned_of(profile: Profile) ->
     ],
 )
 def test_the_verdict_says_which_limit_is_broken(profile: Profile, changes: dict[str, object], reason: str) -> None:
-    assert f"does not fit, {reason}" in words(override(profile, changes))
+    assert f"does not fit, {reason}." in words(override(profile, changes))
 
 
 def test_latency_warns_of_payloads_over_the_limit(profile: Profile) -> None:
@@ -124,6 +139,6 @@ def test_every_figure_of_the_blocks_stands_in_the_document(
     profile: Profile, period_us: float, values_in_their_places: Callable[[Report], int]
 ) -> None:
     result = capacity(profile, periods_us=[4000.0, period_us])
-    # Two tables of 24 figures under two models, and the figures of the sentences.
+    # Two tables of 44 figures under two models, and the figures of the sentences.
     assert values_in_their_places(capacity_report(result, verdicts(result))) > 100
-    assert values_in_their_places(latency_report(latency(profile, payloads_bytes=[4, 16]), profile)) == 2 * 4 * 16
+    assert values_in_their_places(latency_report(latency(profile, payloads_bytes=[4, 16]), profile)) == 2 * 4 * 21

@@ -15,6 +15,10 @@ STATES: Final[dict[Judgement, State]] = {
     "neutral": "neutral",
 }
 """State of a judgement on B."""
+_SHOWN: Final[dict[Judgement, str]] = {
+    "worse": "B is not shown to fit where A is",
+    "better": "B is shown to fit where A is not",
+}
 _FITS: Final[dict[Judgement, str]] = {"worse": "B does not fit where A does", "better": "B fits where A does not"}
 _PASSES: Final[dict[Judgement, str]] = {
     "worse": "B does not pass the circle where A does",
@@ -60,10 +64,10 @@ def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
     models = " and ".join(one.part for one in figures if one.figure.key == "fits")
     state = STATES[judgement]
     if "shown_to_fit" in judged:
-        timing = f"{models} timing" if models else "each by the timing that decides"
-        yield sentence(f"{_FITS[judgement]} ({timing})", state=state)
+        yield sentence(_SHOWN[judgement], state=state)
     elif models:
-        yield sentence(f"{_FITS[judgement]} ({models} timing, which does not change the verdict)", state=state)
+        form = f"{_FITS[judgement]} by the closed form of {models}, which does not change the verdict"
+        yield sentence(form, state=state)
     for key, words in _loud_figures(found).items():
         if key in judged:
             yield sentence(words[judgement], state=state)

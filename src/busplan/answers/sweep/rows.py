@@ -108,7 +108,10 @@ def _texts(column: Column, style: Style) -> Array:
 
 def _writer(column: Column, style: Style) -> Callable[[Any], str]:
     if column.words is not None:
-        words = [json_text(word) if style == "jsonl" else str(csv_cell(word)) for word in column.words]
+        words = [
+            json_text(word) if style == "jsonl" else "" if word is None else str(csv_cell(word))
+            for word in column.words
+        ]
         return words.__getitem__
     if column.values.dtype == bool:
         return ("false", "true").__getitem__
