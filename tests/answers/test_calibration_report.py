@@ -44,7 +44,9 @@ def example() -> list[Measurement]:
 
 def test_table_1_shows_what_the_model_leaves_unexplained() -> None:
     text = said(run(example()))
-    assert "Left unexplained by the paper timing model: 3.131 us of T1+T2 on average, 3.463 us at most (13% of" in text
+    assert (
+        "Left unexplained by the standard timing model: 0.827 us of T1+T2 on average, 1.139 us at most (4% of" in text
+    )
     (groups,) = (line.split() for line in text.splitlines() if line.startswith(" ") and "T1+T2" in line)
     assert groups == ["T1+T2"] * 3
     (headings,) = (line.split() for line in text.splitlines() if line.startswith("payload "))
@@ -81,13 +83,20 @@ def test_a_line_in_words_in_provenance_and_as_changes() -> None:
         result
     )
     assert provenance(result, source="m.csv") == (
-        "busplan calibrate: linear (least squares) of 2 measurements in m.csv, packets by the paper model, "
+        "busplan calibrate: linear (least squares) of 2 measurements in m.csv, packets by the standard model, "
         "rms residual 0.000 us"
     ).replace("0.000 us", f"{result.rms_residual_us:.3g} us" if 0 < result.rms_residual_us < 0.001 else "0.000 us")
-    changes = execution_changes(result.execution)
+    changes = execution_changes(result)
     assert changes["node.execution.kind"] == "linear"
     assert changes["node.execution.grade"] == "measured"
     assert (changes["node.execution.payload_bytes"], changes["node.execution.time_us"]) == (None, None)
+    # Two measurements are used up by a line: no spread is left, and an old uncertainty goes.
+    assert changes["node.execution.uncertainty_us"] is None
+    assert changes["node.execution.residual"] == "standard"
+    assert changes["node.execution.measured_gap_count"] == 63
+    assert "node.execution.worst_extra_us" not in changes
+    spread = execution_changes(run(rows((4, 50.0), (4, 52.0), (64, 80.0))))
+    assert spread["node.execution.uncertainty_us"] == pytest.approx(2**0.5, abs=1e-3)
 
 
 def test_no_figure_of_the_table_is_rounding_dust() -> None:
@@ -123,5 +132,8 @@ def test_the_section_of_the_profile_is_toml_to_copy() -> None:
         'grade = "measured"',
         'kind = "table"',
         "payload_bytes = [4, 16, 32, 64, 128, 256, 512, 1024]",
-        "time_us = [36.7, 36.3, 44.7, 53.1, 81.7, 135.5, 212.2, 405.2]",
+        # T_lant - (T1 + T2) - (6.0 - 32 / 393.216), row by row.
+        "time_us = [36.781, 36.681, 45.381, 54.681, 84.881, 141.081, 223.181, 426.681]",
+        'residual = "none"',
+        "measured_gap_count = 63",
     )

@@ -63,9 +63,7 @@ def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> Non
     margin = f"Margin {one.margin_corrected_us:.3f} us +/- {one.uncertainty_us:.3f} us of 250.000 us"
     assert text.startswith(f"paper-1ms at 500 us: does not fit. {margin}, less a bias of {one.bias_us:.3f} us. ")
     assert "Largest doubt: execution time, 54% of U squared." in text
-    assert (
-        "Not in it: host time (host.transaction_us), the slowest execution (node.execution.worst_extra_us)." in text
-    )
+    assert "Not in it: host time (host.transaction_us), the slowest execution (node.execution.worst_extra_us)." in text
     assert "The paper model says otherwise: 207.117 us needed of 250.000 us. It decides nothing." in text
     assert f"Largest term: execution, 146.933 us of {one.required_us:.3f} us." in text
     assert "Shown to fit: 1 node (4 axes), limited by time." in text

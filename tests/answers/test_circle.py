@@ -72,7 +72,7 @@ def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for() -> No
     shown = {value.key for value in values_in(circle_table(small().results))}
     record = circle_document(small(), with_contributions=False)["results"][0]
     assert {key for key in record if key not in shown} == {
-        *("steps", "delay_us", "timing_model", "bus_fits", "required_us", "available_us", "servo_grade"),
+        *("steps", "delay_us", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
         *("centre_offset_mm", "constant_speed_deg", "failures"),
     }
 

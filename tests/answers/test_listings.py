@@ -42,7 +42,7 @@ def test_each_profile_is_a_section(values_in_their_places: Callable[[Report], in
     report = profiles_report([load(name).profile for name in shipped_names()])
     assert values_in_their_places(report) == 2 * len(shipped_names())
     text = render(report, "table")
-    assert "paper-two-node: 1 node at 4 ms, paper model decides\n" in text
+    assert "paper-two-node: 1 node at 4 ms, paper model leads\n" in text
     assert "\n\n\n" not in text
     assert "### Shipped profiles\n\n#### `paper-1ms`" in render(report, "markdown")
 

@@ -239,7 +239,7 @@ def test_all_forms_say_the_same() -> None:
 @pytest.mark.parametrize(
     ("profile", "words"),
     [
-        (changed(cycle__period_us=300.0), "Not drawn: the cycle does not fit the bus: 205.917 us needed of 150."),
+        (changed(cycle__period_us=300.0), "Not drawn: the cycle does not fit the bus: 263.320 us needed of 150."),
         (changed(servo__position_gain_per_s=1e5), "Not drawn: the position loop is unstable."),
         (changed(cycle__period_us=4050.0), "The circle test cannot be run: "),
         (changed(circle__feed_mm_per_min=60000.0), "The circle test cannot be run: "),
@@ -366,7 +366,7 @@ def test_bars_are_the_terms_and_fill_the_slice() -> None:
     wanted = [getattr(results[0], key) / results[0].available_us * 100 for key in (*first, "margin_us")]
     assert [width for _, width in shown] == pytest.approx(wanted, rel=1e-3)
     assert sum(width for _, width in shown) == pytest.approx(100.0, abs=0.01)
-    assert shown[-1][0] == "left of the slice, 1794.083 us"
+    assert shown[-1][0] == "left of the slice, 1792.883 us"
 
 
 def test_bars_of_an_overrun_show_where_the_slice_ends() -> None:

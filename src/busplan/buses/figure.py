@@ -125,7 +125,7 @@ _SLICE: Final = by(time_slice.required_time_slice_us)
 _CYCLE: Final = by(time_slice.time_slice_us, time_slice.required_time_slice_us)
 
 TIMING_MODEL: Final = Figure(
-    "timing_model", "model", "profile", "timing model of the figures", "timing that decides", sort="word"
+    "timing_model", "model", "profile", "timing model of the figures", "timing model", sort="word"
 )
 PERIOD: Final = Figure("period_us", "T_s", "profile", "communication period", "period T_s", decimals=None)
 NODES: Final = Figure("nodes", "N", "profile", "distributed nodes, host not counted", "nodes N", "nodes", "count")
@@ -206,7 +206,7 @@ MARGIN_CORRECTED: Final = Figure(
     "margin_c",
     _CERTAINTY,
     "what is left of the slice, less the bias",
-    "margin, corrected",
+    "corrected margin",
     better="more",
     scale="available_us",
 )

@@ -125,7 +125,7 @@ READ_TRANSACTION: Final = Figure(
     "T_read",
     "idle",
     "what a read takes of the cycle",
-    "read, with idle bus",
+    "read T_lant + idle",
     better="less",
 )
 WRITE_TRANSACTION: Final = Figure(
@@ -133,7 +133,7 @@ WRITE_TRANSACTION: Final = Figure(
     "T_write",
     "idle",
     "what a write takes of the cycle",
-    "write, with idle bus",
+    "write T_lant + idle",
     better="less",
 )
 _PLAIN: Final = (SYNC, NONPERIODIC)
