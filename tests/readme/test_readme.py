@@ -81,7 +81,7 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 def reference_row(model: type[BaseModel], name: str, key: str) -> str:
     """One row of the reference."""
     field = model.model_fields[name]
-    default = "required" if field.default is PydanticUndefined else repr(field.default).replace("'", '"')
+    default = "required" if field.default is PydanticUndefined else repr(field.default).replace("'", '"').replace("False", "false")
     range_ = allowed(model.model_json_schema()["properties"][name])
     return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
 
@@ -92,6 +92,8 @@ def allowed(schema: dict[str, Any]) -> str:
         return " or ".join(allowed(one) for one in schema["anyOf"] if one.get("type") != "null")
     if "enum" in schema or "const" in schema:
         return ", ".join(str(one) for one in schema.get("enum", [schema.get("const")]))
+    if schema["type"] == "boolean":
+        return "true, false"
     if schema["type"] == "array":
         return f"list of {allowed(schema['items'])}"
     if schema["type"] == "string":
