@@ -30,7 +30,9 @@ def expected(run: Run, name: str) -> dict[tuple[str, str], Any]:
     (verdict,) = capacity["verdicts"]
     (circle,) = answer(run, "circle-test", name)["results"]
     deciding = by_model[verdict["timing_model"]]
-    found = {("plan", key): value for key, value in deciding.items()} | {("plan", "verdict_fits"): verdict["fits"]}
+    found = {("plan", key): value for key, value in deciding.items()} | {
+        ("plan", "shown_to_fit"): verdict["verdict"] == "fits"
+    }
     found |= {(model, key): value for model, one in by_model.items() for key, value in one.items()}
     for one in answer(run, "latency", name)["transactions"]:
         key = f"{one['transaction']}_latency"
@@ -92,7 +94,7 @@ def test_a_report_exits_0_and_a_gate_1_on_a_regression(run: Run) -> None:
     assert (run(*better, GATE).returncode, run(*better, GATE).stderr) == (0, "")
     done = run(*worse, GATE)
     assert (done.returncode, done.stdout) == (1, run(*worse).stdout)
-    assert done.stderr.startswith("regression: B is worse in 10 figures: margin, utilisation, required N T_cs, ")
+    assert done.stderr.startswith("regression: B is worse in 16 figures: corrected margin, safe nodes, safe axes, ")
     for form in ("json", "markdown", "html", "csv"):
         assert run(*worse, GATE, "--format", form).returncode == 1
 

@@ -178,5 +178,5 @@ def test_a_gate_that_fails_has_given_its_answer(run: Run, tmp_path: Path) -> Non
     assert (done.returncode, done.stdout) == (1, "")
     wrote, regression = done.stderr.splitlines()
     assert wrote == "wrote diff.md"
-    assert regression.startswith("regression: B is worse in 10 figures: ")
+    assert regression.startswith("regression: B is worse in 16 figures: ")
     assert (tmp_path / "diff.md").read_text(encoding="utf-8").startswith("### Changes from `paper-optimal-gap` to ")

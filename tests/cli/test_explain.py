@@ -140,7 +140,9 @@ def test_what_has_parts_is_json_in_its_cell(run: Run) -> None:
     *_, row = csv.DictReader(StringIO(run(*question, "--format", "csv").stdout))
     (one,) = json.loads(run(*question, "--format", "json").stdout)["derivations"]
     assert json.loads(row["value"]) == one["value"]
-    assert run(*question).stdout.startswith("cheapest_change of paper-1ms at 1 ms, paper model: bus.gap_count = 13\n")
+    assert run(*question).stdout.startswith(
+        "cheapest_change of paper-1ms at 1 ms, standard model: bus.gap_count = 10\n"
+    )
 
 
 def test_markdown_shows_a_hostile_name_and_does_nothing_with_it(run: Run, tmp_path: Path) -> None:

@@ -159,8 +159,8 @@ def test_latency_as_a_table_names_the_equation_of_every_row(run: Run) -> None:
     done = run("latency", "paper-4ms", "--payload", "4,16")
     assert (done.returncode, done.stderr) == (0, "")
     table_rows = re.findall(r"(?m)^(?!-|phase| ).*\d\.\d{3}.*$", done.stdout)
-    assert len(table_rows) == 2 * 14
-    assert all(re.search(r"\(\d+\)|profile", row) for row in table_rows)
+    assert len(table_rows) == 2 * 19
+    assert all(re.search(r"\(\d+\)|profile|idle", row) for row in table_rows)
 
 
 def test_a_payload_over_the_speeds_limit_is_warned_of_and_computed(run: Run) -> None:
@@ -226,23 +226,27 @@ def test_nodes_and_gap_count_replace_the_profiles(run: Run) -> None:
     one = document(run, "capacity", "paper-4ms", "--nodes", "3", "--gap-count", "8")["results"][1]
     optimal = document(run, "capacity", "paper-4ms", "--nodes", "3", "--gap-count", "optimal")["results"][1]
     assert (one["nodes"], one["axes"], one["gap_count"]) == (3, 12, 8)
-    assert {key for key in one if one[key] != optimal[key]} <= {"max_nodes", "max_axes", "limited_by"}
+    assert {key for key in one if one[key] != optimal[key]} <= {
+        *("max_nodes", "max_axes", "limited_by"),
+        *("safe_nodes", "safe_axes", "safe_limited_by"),
+    }
 
 
 def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     done = run("capacity", "paper-4ms")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.match(
-        r"paper-4ms at 4 ms: fits, 1794\.083 us to spare, 10\.3% of 2000\.000 us used "
-        r"\(paper model; standard agrees\)\.\nLargest term: execution",
+        r"paper-4ms at 4 ms: fits\. Margin 1730\.064 us \+/- 6\.311 us of 2000\.000 us, less a bias of 6\.616 us\. "
+        r"Largest doubt: execution time, 54% of U squared\.\nNot in it: host time \(host\.transaction_us\), ",
         done.stdout,
     )
 
 
-def test_models_that_disagree_are_the_headline(run: Run) -> None:
+def test_the_papers_equations_are_said_to_disagree_and_decide_nothing(run: Run) -> None:
     done = run("capacity", "paper-4ms", "--period", "500us")
     assert done.returncode == 0
-    assert done.stdout.startswith("paper-4ms at 500 us: THE MODELS DISAGREE. paper: fits, ")
+    assert done.stdout.startswith("paper-4ms at 500 us: does not fit. Margin -19.936 us +/- 6.311 us of 250.000 us, ")
+    assert "\nThe paper model says otherwise: 207.117 us needed of 250.000 us. It decides nothing.\n" in done.stdout
     assert not any(verdict["models_agree"] for verdict in verdicts(run, "paper-4ms", "--period", "500us"))
 
 

@@ -57,7 +57,7 @@ def test_the_ending_of_the_file_chooses_the_form_and_every_form_has_the_same_row
     for line, row in zip(lines, rows, strict=True):
         assert list(line) == list(row)
         for name, value in line.items():
-            written = " ".join(value) if isinstance(value, list) else value
+            written = " ".join(value) if isinstance(value, list) else "" if value is None else value
             assert row[name] == (str(written).lower() if isinstance(value, bool) else str(written)), name
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rows.csv", "rows.json", "rows.jsonl"]
 
@@ -70,7 +70,7 @@ def test_the_table_shows_the_top_rows_and_how_many_fit(busplan: Run, tmp_path: P
     assert (run.returncode, run.stderr) == (0, "")
     lines = run.stdout.splitlines()
     assert lines[:2] == [
-        "paper-4ms: 16 points; 11 by the standard model fit.",
+        "paper-4ms: 16 points; 13 shown to fit (standard model).",
         "2 of 16 rows, smallest margin_us first.",
     ]
     assert [line.split()[0] for line in lines[-2:]] == ["16", "15"]
@@ -83,7 +83,7 @@ def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) ->
         assert (shown.returncode, shown.stderr) == (0, "")
         run = busplan("sweep", "paper-4ms", *grid, "-o", name, cwd=tmp_path)
         assert (run.returncode, run.stdout) == (0, "")
-        assert run.stderr.endswith(f" fit.\nwrote {name}\n")
+        assert run.stderr.endswith(f", 13 shown to fit (standard model).\nwrote {name}\n")
         assert (tmp_path / name).read_text(encoding="utf-8") == shown.stdout
     rows = [line for line in (tmp_path / "rows.md").read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
     assert rows[0] == "| bus.nodes | timing\\_model | margin\\_us | fits |"

@@ -54,7 +54,7 @@ def test_every_form_goes_to_a_file_by_its_name(busplan: Run, tmp_path: Path) -> 
         "a.mmd": b"gantt\n",
         "a.json": b"{\n",
         "a.csv": b"profile,",
-        "a.txt": b"paper-4ms at 4 ms: fits",
+        "a.txt": b"paper-4ms at 4 ms: 1792.883 us to spare",
         "a.md": b"### Timeline of `paper-4ms`\n",
         "a.html": b"<!DOCTYPE html>",
     }
@@ -73,7 +73,7 @@ def test_a_form_may_be_named_whatever_the_file_is_called(busplan: Run, tmp_path:
 def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> None:
     run = busplan("timeline", "paper-4ms", "--period", "300us", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
-    assert "does not fit, 55.917 us short" in run.stdout
+    assert "57.117 us short, 207.117 us needed of 150.000 us" in run.stdout
     assert "!!!" in run.stdout
 
 
@@ -86,7 +86,7 @@ def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> Non
         (["--from", "3ms"], "the window from 3000 us shows nothing: the cycle runs from 0 to 2000 us"),
         (["--transaction", "read:3"], "--transaction read:3: expected read or write and a node from 1 to 2, as read:1"),
         (["--transaction", "ping:1"], "--transaction ping:1: expected read or write"),
-        (["--transaction", "read:1", "--from", "1ms"], "shows nothing: the read of node 1 runs from 0.4 to 51.77"),
+        (["--transaction", "read:1", "--from", "1ms"], "shows nothing: the read of node 1 runs from 0.4 to 52.07"),
         (["--period", "0s"], "--period 0s"),
         (["--nodes", "1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
         (["-o", "cycle.doc"], "cycle.doc: expected a name ending in .txt, .md, .html, .csv, .json, .mmd, .svg, .png"),

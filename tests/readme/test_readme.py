@@ -81,7 +81,11 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 def reference_row(model: type[BaseModel], name: str, key: str) -> str:
     """One row of the reference."""
     field = model.model_fields[name]
-    default = "required" if field.default is PydanticUndefined else repr(field.default).replace("'", '"').replace("False", "false")
+    default = (
+        "required"
+        if field.default is PydanticUndefined
+        else repr(field.default).replace("'", '"').replace("False", "false")
+    )
     range_ = allowed(model.model_json_schema()["properties"][name])
     return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
 

@@ -59,8 +59,12 @@ def _in_words(explanation: Explanation) -> Explanation:
     return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
 
 
+_OF_DOCUMENT: Final = ("uncertainty_parts", "not_in_it", "not_applicable")
+"""Values that the document of `capacity` makes."""
+
+
 def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
-    if one.figure.key not in ("text", "warnings", "cheapest_change"):
+    if one.figure.key not in (*_OF_DOCUMENT, "text", "warnings", "cheapest_change"):
         return one
     result = capacity(explanation.profile, periods_us=[one.period_us])
     value = capacity_document(result, verdicts(result))["verdicts"][0][one.figure.key]

@@ -28,7 +28,8 @@ from busplan.buses.network import Network
 from busplan.sections.profile import Profile
 
 _SENTENCES: Final = "sentences on what the command computes"
-VERDICT_KEYS: Final = ("models_agree", "cheapest_change", "warnings", "text")
+_OF_DOCUMENT: Final = ("uncertainty_parts", "not_in_it", "not_applicable")
+VERDICT_KEYS: Final = ("models_agree", "reserve", *_OF_DOCUMENT, "cheapest_change", "warnings", "text")
 
 
 def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
@@ -158,10 +159,16 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     safe = tuple(figures[key] for figures in derived for key in safety)
     if key == "models_agree":
         return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
-    # The report fills in the values of changes and sentences.
+    if key == "reserve":
+        return traced(profile, "limits.reserve")
+    (deciding,) = (figures for figures in derived if "uncertainty_us" in figures)
+    # The report fills in the values of changes, lists and sentences.
+    if key in _OF_DOCUMENT:
+        return found(None, _SENTENCES, (deciding["uncertainty_us"],))
+    decided = (deciding["verdict"], deciding["safe_nodes"])
     if key == "cheapest_change":
-        purpose = "carries more nodes" if verdict.all_well else "makes every model fit on a bus that is set safely"
+        purpose = "carries more nodes" if verdict.all_well else "is shown to fit on a bus that is set safely"
         words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
-        return found(None, words, (*fits, *safe))
+        return found(None, words, (*decided, *safe))
     warned: tuple[Operand, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
-    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *safe, *warned))
+    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *decided, *safe, *warned))

@@ -122,7 +122,8 @@ def explain(
     command, one = figure_named(figure, bus=bus_of(profile))
     deciding = bus_of(profile).deciding_model
     is_decided = command == "circle-test" or one in CERTAINTY
-    models = [deciding if is_decided else leading_model(profile)] if timing_models is None else timing_models
+    of_one = is_decided or one.key in VERDICT_KEYS
+    models = [deciding if of_one else leading_model(profile)] if timing_models is None else timing_models
     kinds: Sequence[str | None] = (transactions or latency_names(profile)) if command == "latency" else [None]
     if is_decided and list(models) != [deciding]:
         raise BusplanError(f"{one.key}: belongs to the timing model that decides and to no other, {deciding}")
