@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from math import inf
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import limits_to_be_safe
 from busplan.analysis.capacity.cycle import limits_with_time
@@ -10,7 +10,7 @@ from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polyn
 from busplan.analysis.network import network_of
 from busplan.buses.bus import Limit
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, larger
+from busplan.elementwise import Number, choose, larger, total
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
@@ -89,7 +89,7 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
     nodes: Number = None
     place: Number = 0
     for index, (limit, found) in enumerate(zip(limits, closed, strict=True)):
-        most = _by_halves(limit, network, ceiling) if found is None else found
+        most = _searched(limit, network, ceiling) if found is None else found
         if nodes is None:
             nodes = most
         else:
@@ -117,6 +117,29 @@ def _with_one_node(nodes: Number, limit: Limit, network: Network) -> Number:
     if _least(nodes) > 1:
         return nodes
     return choose(nodes > 1, nodes, choose(limit.is_broken(network.with_nodes(1)), 0.0, 1.0))
+
+
+_VALUE_COST: Final = 30
+"""Operations on each element that the value of a limit takes, about; comparing it takes one."""
+
+
+def _searched(limit: Limit, network: Network, ceiling: int) -> Number:
+    """The most nodes within one limit, in the way that touches fewer elements.
+
+    A value that varies over few axes of an array is cheap: it is asked for every number of nodes, and counted how often
+    it holds. Otherwise few numbers of nodes are asked, each on the whole array.
+    """
+    alone = network.with_nodes(1)
+    own, whole = _size(limit.value(alone)), _size(limit.is_broken(alone))
+    counted = ceiling * (own * _VALUE_COST + whole)
+    if whole == 1 or counted > ceiling.bit_length() * whole * _VALUE_COST:
+        return _by_halves(limit, network, ceiling)
+    # Once broken, a limit stays broken.
+    return total(choose(limit.is_broken(network.with_nodes(nodes)), 0, 1) for nodes in range(1, ceiling + 1))
+
+
+def _size(number: Number) -> int:
+    return int(getattr(number, "size", 1))
 
 
 def _by_halves(limit: Limit, network: Network, ceiling: int) -> Number:

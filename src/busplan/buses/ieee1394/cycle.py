@@ -16,7 +16,7 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingModelName, delays
-from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of, parts
+from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of
 from busplan.buses.network import TRANSACTION_KINDS, Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, is_one, larger, named, rounded_down, total
@@ -130,15 +130,13 @@ class Ieee1394Cycle(BusCycle):
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
-        of_parts = [(one.nodes, parts(one)) for one in self.exchanges]
-        own = {
-            key: total(
-                nodes * _sum([part.us for part in found if part.term == key])
-                for nodes, found in of_parts
-                if any(part.term == key for part in found)
-            )
-            for key in _OF_TRANSACTIONS
-        }
+        own: dict[str, Number] = dict.fromkeys(_OF_TRANSACTIONS, 0.0)
+        for one in self.exchanges:
+            by_term: dict[str, list[Number]] = {}
+            for part in one.parts:
+                by_term.setdefault(part.term, []).append(part.us)
+            for term, parts_us in by_term.items():
+                own[term] = own[term] + one.nodes * _sum(parts_us)
         retries_us = 0.0 if self.model == "paper" else self.retries_us
         others = (
             Term("sync_us", self.sync_us),

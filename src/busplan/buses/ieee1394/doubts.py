@@ -20,7 +20,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.idle import Gaps, busy_us
 from busplan.buses.ieee1394.table_1 import residual
 from busplan.buses.ieee1394.timing import Link
-from busplan.buses.ieee1394.transactions import PACKET_PARTS, Exchange, parts
+from busplan.buses.ieee1394.transactions import PACKET_PARTS, Exchange
 from busplan.buses.network import Network
 from busplan.elementwise import Number, larger, named, total
 
@@ -66,7 +66,7 @@ def of_cycle(
     """
     halves, host = _halves(exchanges, network), network.profile.host
     gap_term_us = _gap_term_us(network, link.gap_count)
-    of_packets = total(one.nodes * sum(part.term in PACKET_PARTS for part in parts(one)) for one in exchanges)
+    of_packets = total(one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) for one in exchanges)
     phy_us = PHY_DELAY_HALF_WIDTH_US / _RECTANGULAR if link.phy_delay_us is None else 0.0
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
@@ -75,6 +75,8 @@ def of_cycle(
         The cycle never falls with either time and has kinks, at which a central difference covers too little.
         """
         own = one.responder
+        if _is_zero(execution_us if own.answer == "split" else 0.0) and _is_zero(host_us):
+            return 0.0
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
 
         def busy_at(steps: int) -> Number:
@@ -102,6 +104,11 @@ def of_cycle(
             total(one.nodes * swing_us(one, 0.0, host.standard_uncertainty_us) for one in exchanges),
         ),
     )
+
+
+def _is_zero(number: Number) -> bool:
+    """Whether a plain number is 0: what is off costs no time."""
+    return isinstance(number, (int, float)) and number == 0
 
 
 def _halves(exchanges: Sequence[Exchange], network: Network) -> Number:

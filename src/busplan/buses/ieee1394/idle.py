@@ -75,6 +75,8 @@ def gaps_as_thresholds(answer: Answer, *, gaps: Gaps, execution_us: Number, host
     """
     if answer == "split":
         alone_us = busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=0.0)
+        if isinstance(host_us, (int, float)) and not host_us:
+            return IdleTime(alone_us - execution_us, 0.0)
         with_host_us = busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us)
         return IdleTime(alone_us - execution_us, with_host_us - alone_us)
     idle_us = gaps.arbitration_reset_us

@@ -64,6 +64,11 @@ class Exchange(NamedTuple):
     execution_uncertainty_us: Number
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
+    parts: tuple[BusEvent, ...]
+    """What the transaction is made of, in the order of the wire; what the answer does not have is not there.
+
+    The idle bus of the gaps is one part here; `events` divides it.
+    """
 
 
 def exchange(
@@ -116,7 +121,8 @@ def exchange(
         common=common,
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
-    return Exchange(kind, group.nodes, size, responder, uncertainty_us, _with_names(phases, suffix))
+    phases = _with_names(phases, suffix)
+    return Exchange(kind, group.nodes, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
 
 
 def _with_names(phases: Phases, suffix: str) -> Phases:
@@ -133,32 +139,17 @@ PACKET_PARTS: Final = ("cycle_arbitration_us", "cycle_data_us", "cycle_acknowled
 """Terms whose parts are one packet's way over the hops."""
 
 
-def parts(one: Exchange) -> tuple[BusEvent, ...]:
-    """What one transaction is made of, in the order of the wire; what the answer does not have is not there.
-
-    The idle bus of the gaps is one part here; `events` divides it.
-    """
-    phases, answer = one.phases, one.responder.answer
-    found = [
-        *_packet(phases, "request", "host", arbitrates=True),
-        *(
-            (
-                BusEvent("execution", "cycle_execution_us", phases.execution_us, "node execution"),
-                BusEvent("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution"),
-            )
-            if answer == "split"
-            else ()
-        ),
-        *(
-            (BusEvent("hold", "cycle_hold_us", phases.hold_us, "node holds the bus"),)
-            if answer == "concatenated"
-            else ()
-        ),
-        *(() if answer == "unified" else _packet(phases, "response", "node", arbitrates=answer == "split")),
-        BusEvent("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps"),
-        BusEvent("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps"),
-    ]
-    return tuple(found)
+def _parts(phases: Phases, answer: "Answer") -> Iterator[BusEvent]:
+    yield from _packet(phases, "request", "host", arbitrates=True)
+    if answer == "split":
+        yield BusEvent("execution", "cycle_execution_us", phases.execution_us, "node execution")
+        yield BusEvent("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
+    if answer == "concatenated":
+        yield BusEvent("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
+    if answer != "unified":
+        yield from _packet(phases, "response", "node", arbitrates=answer == "split")
+    yield BusEvent("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
+    yield BusEvent("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
 
 
 def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[BusEvent]:
@@ -181,7 +172,7 @@ def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> It
 def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
     """The parts of one transaction, of plain numbers; its idle bus is divided by idle period and gap."""
     before, behind = _added_up(one.phases) if model == "paper" else _by_idle_period(one)
-    for part in parts(one):
+    for part in one.parts:
         if part.kind == "idle":
             yield from behind
         else:
