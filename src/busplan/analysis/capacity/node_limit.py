@@ -130,9 +130,11 @@ def _searched(limit: Limit, network: Network, ceiling: int) -> Number:
     it holds. Otherwise few numbers of nodes are asked, each on the whole array.
     """
     alone = network.with_nodes(1)
-    own, whole = _size(limit.value(alone)), _size(limit.is_broken(alone))
-    counted = ceiling * (own * _VALUE_COST + whole)
-    if whole == 1 or counted > ceiling.bit_length() * whole * _VALUE_COST:
+    whole = _size(limit.is_broken(alone))
+    if whole == 1:
+        return _by_halves(limit, network, ceiling)
+    counted = ceiling * (_size(limit.value(alone)) * _VALUE_COST + whole)
+    if counted > ceiling.bit_length() * whole * _VALUE_COST:
         return _by_halves(limit, network, ceiling)
     # Once broken, a limit stays broken.
     return total(choose(limit.is_broken(network.with_nodes(nodes)), 0, 1) for nodes in range(1, ceiling + 1))

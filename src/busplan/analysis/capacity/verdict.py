@@ -47,4 +47,5 @@ def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
         others=tuple(one for one in results if one is not deciding),
         change=None,
     )
-    return verdict._replace(change=change_for_more(profile) if verdict.all_well else change_to_fit(profile))
+    change = change_for_more(profile, now=deciding) if verdict.all_well else change_to_fit(profile)
+    return verdict._replace(change=change)

@@ -11,7 +11,7 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import FITS, certainty
-from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
+from busplan.analysis.capacity.cycle import TIME, available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.capacity.node_limit import safe_nodes
 from busplan.analysis.network import bus_of, network_of
@@ -108,21 +108,23 @@ def changes_to_fit(profile: Profile) -> Iterator[Change]:
             yield Change({**cures, **cure}, nodes, after)
 
 
-def change_for_more(profile: Profile) -> Change | None:
+def change_for_more(profile: Profile, *, now: CapacityFigures | None = None) -> Change | None:
     """Find the cheapest change after which a fitting profile's period carries more safe nodes.
 
     Parameters
     ----------
     profile
         A network that fits.
+    now
+        Its figures under the model that decides, where they have been computed.
 
     Returns
     -------
     Change
         None when neither time nor a setting limits the nodes, or no single kind of change does.
     """
-    most, limit = safe_nodes(profile)
     bus = bus_of(profile)
+    most, limit = safe_nodes(profile) if now is None else (now.safe_nodes or 0, now.safe_limited_by or TIME)
     bound = bus.limit(limit)
     if bound is not None and not bound.is_safety:
         return None
