@@ -12,7 +12,7 @@ from busplan.buses.ieee1394.constants import (
     DATA_RATE_MBIT_S,
     REFERENCE_CABLE_M,
 )
-from busplan.buses.ieee1394.table_1 import TABLE_1
+from busplan.buses.ieee1394.table_1 import TABLE_1, residual
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases
 from busplan.buses.ieee1394.transactions import exchange, link_of
 from busplan.buses.network import Network
@@ -40,6 +40,7 @@ def bus_sections(bench: Network, published: Published) -> tuple[PaperSection, ..
         _theory(),
         _first_half(bench),
         _latency(bench),
+        _bias(),
         *_ratios(bench, published),
         _can(bench, published),
         _equation_15(published),
@@ -105,6 +106,21 @@ def _latency(bench: Network) -> PaperSection:
             Comparison(title, f"{row.payload_bytes} bytes", "us", row.latency_us, method, one.latency_us)
             for row in TABLE_1
             for method, one in _write_phases(bench, row.payload_bytes)
+        ),
+    )
+
+
+def _bias() -> PaperSection:
+    title = "Table I: what half a transaction takes beyond the model"
+    return PaperSection(
+        title,
+        "T1+T2 as measured, less equation (13), over the rows of the table. Every verdict takes the mean of the "
+        "standard model off its margin, and counts the standard uncertainty of one more row (JCGM 100).",
+        tuple(
+            Comparison(title, quantity, "us", None, f"{model} model", float(value))
+            for quantity, key in (("mean", "mean_us"), ("standard uncertainty", "uncertainty_us"))
+            for model in TIMING_MODELS
+            for value in (getattr(residual(model), key),)
         ),
     )
 
@@ -177,11 +193,23 @@ def _equation_10(bench: Network) -> PaperSection:
         for name, model in TIMING_MODELS.items()
     }
     quantity = f"T_sum, gap count {link.gap_count:g}"
+    (group,) = bench.groups
+    own = {
+        name: exchange(bench, group, "write", model=name, link=link).phases  # of the bench's own payload
+        for name in TIMING_MODELS
+    }
+    size = group.write_bytes
     return PaperSection(
         title,
-        "The paper counts gaps in the data rate, the standard in the base rate. The paper prints no figure.",
+        "The paper counts gaps in the data rate, and adds both up behind every transaction. The standard counts them "
+        "in the base rate, as thresholds of one idle period (TI TSB12LV01B, p. 7-6): a node's execution counts towards "
+        "them. The paper prints no figure.",
         (
             *(Comparison(title, quantity, "us", None, f"{name} model", value) for name, value in gaps_us.items()),
             Comparison(title, "standard / paper", "1", None, "standard model", gaps_us["standard"] / gaps_us["paper"]),
+            *(
+                Comparison(title, f"idle bus of a write, {size} bytes", "us", None, f"{name} model", one.idle_us)
+                for name, one in own.items()
+            ),
         ),
     )
