@@ -85,8 +85,8 @@ class Ieee1394Bus(BusSection):
     )
     phy_delay_us: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] | None = Field(
         default=None,
-        description="Repeat delay of one PHY; without it 14 ticks of the base rate, 0.142 us (TI TSB12LV41: 0.144 us in "
-        "the worst case) [us]",
+        description="Repeat delay of one PHY; without it 14 ticks of the base rate, 0.142 us (TI TSB12LV41: 0.144 us "
+        "in the worst case) [us]",
         examples=[0.144],
     )
 
