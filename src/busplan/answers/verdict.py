@@ -113,7 +113,10 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     limits = _broken_limits(figures, profile)
     safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
     why = "".join(f", {words}" for words in limits)
-    found = [sentence(f"{{}}{safe}{why}.", _figure(VERDICT, figures, at=at)), _margin(figures, at=at)]
+    said = sentence(f"{{}}{safe}{why}.", _figure(VERDICT, figures, at=at))
+    if limits:
+        return said  # whatever the time is
+    found = [said, _margin(figures, at=at)]
     doubt = max(figures.doubts, key=lambda one: one.us, default=None)
     if doubt is not None and doubt.us:
         share = doubt.us**2 / sum(one.us**2 for one in figures.doubts)
