@@ -57,7 +57,9 @@ def csv_cell(value: object) -> object:
 
 
 def spelled(value: object) -> object:
-    """Write a boolean in lower case and a list as words; return anything else unchanged."""
+    """Write a boolean in lower case, a list as words and what is missing as nothing; return anything else unchanged."""
+    if value is None:
+        return ""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):
