@@ -49,8 +49,8 @@ def csv_cell(value: object) -> object:
 
     Examples
     --------
-    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "nodes"]), csv_cell(True)
-    ("'=1+1", -1.5, 'time nodes', 'true')
+    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "nodes"]), csv_cell(True), csv_cell(None)
+    ("'=1+1", -1.5, 'time nodes', 'true', '')
     """
     cell = spelled(value)
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell
