@@ -9,8 +9,9 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from io import StringIO
+from math import hypot
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -135,7 +136,7 @@ class Ring(Bus):
 
     kind = "ring"
     title = "Token ring"
-    timing_models = (TimingModel("plain", "as it is"),)
+    timing_models: ClassVar[tuple[TimingModel, ...]] = (TimingModel("plain", "as it is"),)
     deciding_model = "plain"
     term_figures = (DATA, TOKEN, NONPERIODIC)
     capacity_figures = capacity_figures(term_figures, own=(ROUNDS,))
@@ -477,7 +478,7 @@ class DoubtedRing(Ring):
         return DoubtedCycle(network, model)
 
 
-DOUBT_US = 2 * (6.4**2 + 1.0**2) ** 0.5
+DOUBT_US = 2 * hypot(6.4, 1.0)
 """U of that profile, by hand: 1 % of 640 us of data and two rounds of 0.5 us each."""
 
 
@@ -523,7 +524,7 @@ def test_its_safe_stations_are_those_that_a_count_finds(doubted: Path, period_us
 
     def safe_us(nodes: int) -> float:
         rounds = -(-nodes // SHARED)
-        return 128 * nodes + 5 * rounds + 2 * ((1.28 * nodes) ** 2 + (0.5 * rounds) ** 2) ** 0.5
+        return 128 * nodes + 5 * rounds + 2 * hypot(1.28 * nodes, 0.5 * rounds)
 
     most = sum(safe_us(nodes) <= period_us / 2 for nodes in range(1, MOST_STATIONS + 1))
     (one,) = busplan.capacity(profile).results
