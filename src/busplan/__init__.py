@@ -6,8 +6,8 @@ attributes, the report as text, the document of `--format json` by `to_dict()`. 
 Examples
 --------
 >>> import busplan
->>> busplan.capacity("paper-4ms", timing_models=["paper"])
-<CapacityAnswer: paper-4ms at 4 ms: fits, 1794.083 us to spare, 10.3% of 2000.000 us used (paper model).>
+>>> busplan.capacity("paper-4ms")  # doctest: +ELLIPSIS
+<CapacityAnswer: paper-4ms at 4 ms: fits. Margin 1730.064 us +/- 6.311 us of 2000.000 us, less a bias of 6.616 us...>
 """
 
 from importlib import import_module

@@ -28,25 +28,45 @@ def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
     for name, column in dict(answer).items():
         expected = [row[name] for row in document["rows"]]
         if column.dtype.kind == "U":
-            expected = [" ".join(one) if isinstance(one, list) else str(one) for one in expected]
-        assert column.tolist() == expected
+            # A word that is missing, as the verdict of the paper is, is no word.
+            expected = [" ".join(one) if isinstance(one, list) else "" if one is None else str(one) for one in expected]
+            assert column.tolist() == expected
+        else:
+            wanted = [float("nan") if one is None else one for one in expected]
+            np.testing.assert_array_equal(column, wanted)
+            assert {type(one) for one in column.tolist()} <= {float, *map(type, expected)}
         assert column.shape == (len(answer),)
 
 
 def test_numbers_are_numbers_and_words_are_text() -> None:
     answer = busplan.sweep("paper-4ms", vary=GRID)
     kinds = {name: answer[name].dtype.kind for name in answer}
-    words = {"bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded"}
+    words = {
+        *("bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded"),
+        *("safe_limited_by", "verdict"),
+    }
     assert {name for name, kind in kinds.items() if kind == "U"} == words
     assert (kinds["max_axes"], kinds["margin_us"], kinds["fits"], kinds["bus.nodes"]) == ("i", "f", "b", "i")
     assert kinds["gap_count"] == "i"
+
+
+def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]})
+    paper, standard = answer["timing_model"] == "paper", answer["timing_model"] == "standard"
+    for name in ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_nodes", "safe_axes"):
+        assert np.isnan(answer[name][paper]).all()
+        assert not np.isnan(answer[name][standard]).any()
+    assert answer["verdict"].tolist() == ["", "fits", "", "does not fit"]
+    assert answer["safe_limited_by"].tolist() == ["", "time", "", "time"]
+    alone = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]}, timing_models=["standard"])
+    assert alone["safe_nodes"].dtype.kind == "i"  # where none is missing, counts are whole
 
 
 def test_a_point_is_what_capacity_says_of_it() -> None:
     periods = range(250, 4001, 250)
     answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_models=["standard"])
     found = busplan.capacity("paper-4ms", periods_us=periods, timing_models=["standard"]).results
-    for name in ("max_axes", "margin_us", "limited_by", "fits"):
+    for name in ("max_axes", "margin_us", "limited_by", "fits", "safe_axes", "safe_required_us", "verdict"):
         assert answer[name].tolist() == [getattr(one, name) for one in found]
 
 
@@ -101,8 +121,10 @@ def test_a_column_that_is_not_there_is_a_key_error() -> None:
 def test_the_text_is_the_table_of_the_command() -> None:
     lines = str(busplan.sweep("paper-4ms", vary={"bus.nodes": "1:16"})).splitlines()
     assert lines[1] == "20 of 32 rows."
-    # Some columns have a unit of their own below their name.
-    assert len(lines) == 2 + 1 + 3 + 20
+    # Two of the heading, an empty one, the names with a rule below: every unit is in its name.
+    assert len(lines) == 2 + 1 + 2 + 20
+    assert lines[3].split()[-4:] == ["max_axes", "safe_axes", "safe_limited_by", "verdict"]
+    assert lines[5].split() == ["1", "paper", "102.955", "2000.000", "1897.045", "-", "-", "64", "-", "-", "-"]
 
 
 @pytest.mark.parametrize(

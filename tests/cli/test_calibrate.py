@@ -53,11 +53,34 @@ def test_the_shipped_example_gives_the_shipped_table(busplan: Run, tmp_path: Pat
     assert (run.returncode, run.stderr) == (0, "")
     document = json.loads(run.stdout)
     assert (document["schema"], document["command"], document["profile"]) == (1, "calibrate", "paper-two-node")
-    assert document["execution"] == load("paper-two-node").document.data()["node"]["execution"]
-    assert (document["way"], document["rms_residual_us"], document["applied_to"]) == ("measured-halves", 0, None)
+    shipped = load("paper-two-node").document.data()["node"]["execution"]
+    found = document["execution"]
+    # The shipped one has the paper's one digit, and the defaults of what it was fitted against.
+    assert {**found, "time_us": [round(one, 1) for one in found["time_us"]]} == {
+        **shipped,
+        "residual": "none",
+        "measured_gap_count": 63,
+    }
+    # Table I measured writes: the response is the half of 4 bytes, 6.0 us, without its 32 bits at 393.216 Mbit/s.
+    response_us = 6.0 - 32 / 393.216
+    rows = [
+        (48.7, 6.0),
+        (48.9, 6.3),
+        (57.9, 6.6),
+        (68.1, 7.5),
+        (99.9, 9.1),
+        (158.5, 11.5),
+        (246.0, 16.9),
+        (460.0, 27.4),
+    ]
+    assert found["time_us"] == pytest.approx([one - half - response_us for one, half in rows], abs=5.1e-4)
+    assert (document["way"], document["applied_to"]) == ("measured-halves", None)
+    assert document["rms_residual_us"] < 5e-4  # a table has three decimals
     people = busplan("calibrate", "paper-two-node", "table-1.csv", cwd=tmp_path).stdout
-    assert "T_exec = T_lant - 2 (T1+T2), both as measured; the timing model is not used" in people
-    assert "\ntime_us = [36.7, 36.3, 44.7, 53.1, 81.7, 135.5, 212.2, 405.2]\n" in people
+    assert (
+        "T_exec = T_lant - (T1+T2) - (T4+T5): the first half as measured, the second as that of the smallest" in people
+    )
+    assert "\ntime_us = [36.781, 36.681, 45.381, 54.681, 84.881, 141.081, 223.181, 426.681]\n" in people
 
 
 def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(busplan: Run, bench: Path) -> None:
@@ -70,13 +93,20 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
     after = bench.read_text()
     old, new = before.splitlines(), after.splitlines()
     at = next(index for index, line in enumerate(new) if line.startswith(note))
-    assert new[:at] + new[at + 1 : at + 2] == old[: at + 1]
-    assert new[at + 1 :][1:3] == [
+    start = old.index("[node.execution]") + 1
+    # The note stands above the comments of the section, and all of them stay.
+    assert new[:at] + new[at + 1 : start + 1] == old[:start]
+    assert new[start + 1 :][:2] == [
         'grade = "measured"',
         'kind = "table"             # or "linear": base_us, per_byte_us',
     ]
-    assert new[-2] == "payload_bytes = [4, 64, 256]"
-    assert load(str(bench)).profile.node.execution.grade == "measured"
+    # Half of 0.5, 0.5 and 1 us off the median: 1.4826 * 0.5 us, whatever the outlier.
+    assert [new[start + 3], *new[start + 5 :]] == [
+        "payload_bytes = [4, 64, 256]",
+        *("uncertainty_us = 0.741", 'residual = "standard"', "measured_gap_count = 63"),
+    ]
+    execution = load(str(bench)).profile.node.execution
+    assert (execution.grade, execution.uncertainty_us) == ("measured", 0.741)
     busplan("calibrate", "bench.toml", "m.csv", "--timing", "standard", "--robust", "--apply", cwd=bench.parent)
     assert bench.read_text() == after
 
@@ -85,11 +115,18 @@ def test_apply_of_the_shipped_example_is_derived_and_changes_nothing_else(buspla
     before = bench.read_text()
     run = busplan("calibrate", "bench.toml", "table-1.csv", "--apply", "--format", "csv", cwd=bench.parent)
     rows = list(csv.DictReader(run.stdout.splitlines()))
-    assert [row["execution_us"] for row in rows] == ["36.7", "36.3", "44.7", "53.1", "81.7", "135.5", "212.2", "405.2"]
+    assert [row["execution_us"] for row in rows] == [
+        *("36.78138", "36.68138", "45.38138", "54.68138", "84.88138", "141.08138", "223.18138", "426.68138")
+    ]
     assert {row["profile"] for row in rows} == {"paper-two-node"}
     added = [line for line in bench.read_text().splitlines() if line not in before.splitlines()]
     assert added == [
-        "# busplan calibrate: table (mean) of 8 measurements in table-1.csv, T1+T2 as measured, rms residual 0.000 us"
+        (
+            "# busplan calibrate: table (mean) of 8 measurements in table-1.csv, T1+T2 as measured, "
+            "rms residual 0.00038 us"
+        ),
+        "time_us = [36.781, 36.681, 45.381, 54.681, 84.881, 141.081, 223.181, 426.681]",
+        *('residual = "none"', "measured_gap_count = 63"),
     ]
 
 
@@ -98,19 +135,51 @@ def test_apply_from_a_table_to_a_line_and_back(busplan: Run, bench: Path) -> Non
     run = busplan("calibrate", "bench.toml", "-", "--form", "linear", "--apply", cwd=bench.parent, stdin=MEASURED)
     assert run.returncode == 0
     execution = load(str(bench)).document.data()["node"]["execution"]
-    assert set(execution) == {"grade", "kind", "base_us", "per_byte_us"}
-    assert "in <stdin>, packets by the paper model" in bench.read_text()
+    fitted = {"residual", "measured_gap_count", "uncertainty_us"}
+    assert set(execution) == {"grade", "kind", "base_us", "per_byte_us", *fitted}
+    # The timing model that decides, whatever leads the tables of the profile.
+    assert "in <stdin>, packets by the standard model" in bench.read_text()
     content = bench.read_bytes()
     assert content.startswith(b"\xef\xbb\xbf")
     assert content.count(b"\n") == content.count(b"\r\n")
     busplan("calibrate", "bench.toml", "m.csv", "--form", "table", "--apply", cwd=bench.parent)
-    assert set(load(str(bench)).document.data()["node"]["execution"]) == {"grade", "kind", "payload_bytes", "time_us"}
+    execution = load(str(bench)).document.data()["node"]["execution"]
+    assert set(execution) == {"grade", "kind", "payload_bytes", "time_us", *fitted}
+
+
+@pytest.mark.parametrize(
+    ("timing", "options", "residual", "gap_count"),
+    [("paper", (), "paper", 63), ("standard", (), "standard", 63), ("standard", ("--gap-count", "10"), "standard", 10)],
+)
+def test_what_a_time_was_fitted_against_is_written_and_weighed(
+    busplan: Run, bench: Path, timing: str, options: tuple[str, ...], residual: str, gap_count: int
+) -> None:
+    run = busplan("calibrate", "bench.toml", "m.csv", "--timing", timing, *options, "--apply", cwd=bench.parent)
+    assert run.returncode == 0, run.stderr
+    execution = load(str(bench)).document.data()["node"]["execution"]
+    assert (execution["residual"], execution["measured_gap_count"]) == (residual, gap_count)
+    document = json.loads(busplan("capacity", "bench.toml", "--format", "json", cwd=bench.parent).stdout)
+    (deciding,) = [one for one in document["results"] if one["timing_model"] == "standard"]
+    # Two transactions of two halves: the mean residual of Table I is in a time that was fitted against the standard,
+    # and the gap term counts from the gap count of the bench.
+    b_us = 0 if residual == "standard" else 0.8270253906
+    d_us = 2 * (gap_count - 63) / 98.304 if residual == "standard" else 0
+    assert deciding["bias_us"] == pytest.approx(4 * (b_us + d_us))
+
+
+def test_a_new_fit_leaves_nothing_of_the_one_before(busplan: Run, bench: Path) -> None:
+    busplan("calibrate", "bench.toml", "m.csv", "--gap-count", "10", "--apply", cwd=bench.parent)
+    busplan("calibrate", "bench.toml", "table-1.csv", "--apply", cwd=bench.parent)
+    execution = load(str(bench)).document.data()["node"]["execution"]
+    # One measurement of a payload says nothing of how far they scatter.
+    assert set(execution) == {"grade", "kind", "payload_bytes", "time_us", "residual", "measured_gap_count"}
+    assert (execution["grade"], execution["residual"], execution["measured_gap_count"]) == ("derived", "none", 63)
 
 
 def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(busplan: Run, bench: Path) -> None:
     text = bench.read_text().replace("payload_bytes = [4, 16", "payload_bytes = [  # from the bench\n4, # least\n16")
     assert "# from the bench" in text
-    bench.write_text(text.replace("405.2]", "405.2]  # by Li"))
+    bench.write_text(text.replace("426.7]", "426.7]  # by Li"))
     run = busplan("calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply", cwd=bench.parent)
     assert (run.returncode, run.stderr) == (0, "wrote [node.execution] of bench.toml; every comment of yours is kept\n")
     lines = bench.read_text().splitlines()
@@ -130,7 +199,8 @@ def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan
     assert note.startswith("# busplan calibrate: linear (least squares) of 7 measurements in m.csv, ")
     assert header == "[node.execution]"
     assert [line.partition(" = ")[0] for line in lines] == [
-        *("kind", "grade", "base_us", "per_byte_us", "# remove payload_bytes", "# remove time_us")
+        *("kind", "grade", "uncertainty_us", "base_us", "per_byte_us", "residual", "measured_gap_count"),
+        *("# remove payload_bytes", "# remove time_us"),
     ]
     assert bench.read_bytes() == before
 
@@ -177,7 +247,8 @@ def test_refused_with_exit_2_and_nothing_written(
 def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run, bench: Path) -> None:
     run = busplan("calibrate", "bench.toml", "m.csv", "--nodes", 5, "--gap-count", 10, cwd=bench.parent)
     assert (
-        "(T1+T2) - (T4+T5), eq (3): both halves by the paper timing model for S400, 5 hops, gap count 10." in run.stdout
+        "(T1+T2) - (T4+T5), eq (3): both halves by the standard timing model for S400, 5 hops, gap count 10."
+        in run.stdout
     )
     assert (
         "Warning: 1 outlier, more than 3.5 robust standard deviations off: line 7; with a pull on this fit"

@@ -357,6 +357,8 @@ def test_a_baseline_is_recorded_and_held(busplan: Busplan, folder: Path) -> None
         run = busplan("check", path, "--baseline", "b.json", cwd=folder)
         assert run.returncode == 1
         assert run.stdout.startswith("p/clean.toml:8:1: BP301 bus.nodes: max_axes under the paper timing fell to ")
+        # 14 nodes are shown to fit: 56 axes, of three each 42.
+        assert "BP301 bus.nodes: safe_axes under the standard timing fell to 42 from the 56" in run.stdout
     assert busplan("check", "p/clean.toml", "--baseline", "b.json", "--update-baseline", cwd=folder).returncode == 0
     assert busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder).returncode == 0
 
@@ -376,8 +378,74 @@ def test_an_update_keeps_what_was_not_checked(busplan: Busplan, folder: Path) ->
     assert after["p/fails.toml"] == before["p/fails.toml"]
 
 
+def older_baseline(folder: Path, *, models: int | None = None) -> str:
+    """A record of the whole folder by other timing models, with axes that nobody has any more; gives its text."""
+    figures = {"paper.max_axes": 640, "paper.margin_us": 1e6, "standard.max_axes": 520, "standard.margin_us": 1e6}
+    names = ("p/clean.toml", "p/fails.toml", "p/gone.toml", "p/warns.toml")
+    document = {"schema": 1, "command": "baseline", "profiles": dict.fromkeys(names, figures)}
+    text = json.dumps(document if models is None else {**document, "models": models})
+    (folder / "b.json").write_text(text, encoding="utf-8")
+    return text
+
+
+@pytest.mark.parametrize("models", [None, 1, 3])
+def test_a_baseline_of_other_timing_models_is_not_compared(busplan: Busplan, folder: Path, models: int | None) -> None:
+    before = older_baseline(folder, models=models)
+    warning = (
+        "warning: b.json: recorded by other timing models, so its figures are not compared; record them again with "
+        "--update-baseline\n"
+    )
+    run = busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder)
+    assert (run.returncode, run.stdout) == (0, "")
+    assert run.stderr == f"{warning}checked 1 profile: 0 errors, 0 warnings\n"
+    # It is one warning of the run, no finding of a file, and what else is wrong fails as always.
+    run = busplan("check", "p", "--baseline", "b.json", "--fail-on", "warning", "--quiet", cwd=folder)
+    assert (run.returncode, run.stderr) == (1, warning)
+    assert run.stdout == busplan("check", "p", cwd=folder).stdout
+    run = busplan("check", "p/clean.toml", "--baseline", "b.json", "--fail-on", "warning", cwd=folder)
+    assert run.returncode == 0
+    assert (folder / "b.json").read_text(encoding="utf-8") == before
+
+
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_older_baseline_is_not_compared_whatever_the_jobs_and_the_format(
+    busplan: Busplan, folder: Path, jobs: str
+) -> None:
+    older_baseline(folder)
+    call = busplan if jobs == "1" else process
+    run = call("check", "p", "--baseline", "b.json", "--format", "json", "--jobs", jobs, cwd=folder)
+    assert run.returncode == 1
+    assert "BP301" not in run.stdout
+    assert run.stderr.count("recorded by other timing models") == 1
+
+
+def test_an_update_of_an_older_baseline_drops_what_was_not_checked_and_says_so(busplan: Busplan, folder: Path) -> None:
+    older_baseline(folder)
+    run = busplan("check", "p/clean.toml", "p/warns.toml", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    assert run.returncode == 0
+    assert run.stderr.splitlines() == [
+        "recorded 2 profiles in b.json",
+        "warning: b.json: dropped p/fails.toml, p/gone.toml, recorded by other timing models; check them, too",
+        "checked 2 profiles: 0 errors, 1 warning",
+    ]
+    document = json.loads((folder / "b.json").read_text(encoding="utf-8"))
+    assert (document["models"], list(document["profiles"])) == (2, ["p/clean.toml", "p/warns.toml"])
+    # From now on it is one like any other.
+    run = busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    assert run.stderr.splitlines()[0] == "recorded 3 profiles in b.json"
+    assert "dropped" not in run.stderr
+    assert busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder).stderr.count("warning:") == 0
+
+
+def test_the_warning_of_dropped_records_is_not_silenced(busplan: Busplan, folder: Path) -> None:
+    older_baseline(folder)
+    run = busplan("check", "p", "--baseline", "b.json", "--update-baseline", "--quiet", cwd=folder)
+    assert run.stderr == "warning: b.json: dropped p/gone.toml, recorded by other timing models; check them, too\n"
+
+
 def test_what_is_no_baseline_is_never_overwritten(busplan: Busplan, folder: Path) -> None:
-    for content in ("{", '{"schema": 2, "command": "baseline", "profiles": {}}', "[project]\n"):
+    other_models = '{"schema": 1, "command": "baseline", "models": "2", "profiles": {}}'
+    for content in ("{", other_models, '{"schema": 2, "command": "baseline", "profiles": {}}', "[project]\n"):
         (folder / "b.json").write_text(content, encoding="utf-8")
         for more in ([], ["--update-baseline"]):
             run = busplan("check", "p", "--baseline", "b.json", *more, cwd=folder)
@@ -462,7 +530,7 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     listed = busplan("rule", cwd=tmp_path)
     assert listed.returncode == 0
     codes = re.findall(r"^(BP\d+) ", listed.stdout, re.MULTILINE)
-    assert len(codes) == 25
+    assert len(codes) == 27
     for code in ("BP110", "bp110"):
         page = busplan("rule", code, cwd=tmp_path)
         assert page.returncode == 0
@@ -471,7 +539,7 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     document = json.loads(busplan("rule", "--format", "json", cwd=tmp_path).stdout)
     assert (document["schema"], document["command"]) == (1, "rule")
     assert [rule["code"] for rule in document["rules"]] == codes
-    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * 25
+    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * 27
     (one,) = json.loads(busplan("rule", "BP110", "--format", "json", cwd=tmp_path).stdout)["rules"]
     assert one in document["rules"]
 
@@ -522,7 +590,7 @@ def test_completion_of_names_codes_and_values(busplan: Busplan, tmp_path: Path) 
         "paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node",
     ]  # fmt: skip
     assert completed("busplan check paper-4ms paper-1") == ["paper-1ms"]
-    assert completed("busplan rule BP11") == ["BP110", "BP111", "BP112"]
+    assert completed("busplan rule BP11") == ["BP110", "BP111", "BP112", "BP113", "BP114"]
     assert completed("busplan check --format s") == ["sarif"]
     assert completed("busplan check --fail-on ") == ["error", "warning"]
     # Nothing of ours: the shell goes on to files.

@@ -9,8 +9,9 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from io import StringIO
+from math import hypot
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -24,7 +25,9 @@ from busplan.buses.bus import (
     Bus,
     BusCycle,
     BusEvent,
+    Doubt,
     EventKind,
+    LeftOut,
     Limit,
     PayloadRange,
     Setting,
@@ -133,7 +136,8 @@ class Ring(Bus):
 
     kind = "ring"
     title = "Token ring"
-    timing_models = (TimingModel("plain", "as it is"),)
+    timing_models: ClassVar[tuple[TimingModel, ...]] = (TimingModel("plain", "as it is"),)
+    deciding_model = "plain"
     term_figures = (DATA, TOKEN, NONPERIODIC)
     capacity_figures = capacity_figures(term_figures, own=(ROUNDS,))
     table_figures = (ROUNDS,)
@@ -431,6 +435,170 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
     assert "ring.toml:7:1: RG101 bus.rate_mbit_s: 0.5 Mbit/s is slower than any station" in done.stdout
     assert "41 stations are over the 40 of a ring" in run("capacity", ring.name, cwd=ring.parent).stdout
     assert "RG101" in run("rule", cwd=ring.parent).stdout
+
+
+# --- how sure its verdict is ------------------------------------------------------------------------------
+
+
+def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> None:
+    (one,) = busplan.capacity(ring).results
+    assert (one.verdict, one.bias_us, one.uncertainty_us) == ("fits", None, 0)
+    # Without a bias and without doubts, what is needed is all that there is to show.
+    assert (one.safe_required_us, one.margin_corrected_us) == (NEEDED_US, one.margin_us)
+    assert (one.safe_nodes, one.safe_limited_by, one.safe_min_period_us) == (one.max_nodes, "time", one.min_period_us)
+    said = run("capacity", ring.name, cwd=ring.parent).stdout
+    assert said.splitlines()[0] == (
+        "ring at 1.5 ms: fits. Margin 100.000 us of 750.000 us; how far the bus is from this timing model is not "
+        "known, so no bias is in it."
+    )
+    assert "Not in it" not in said
+    ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1299"), encoding="utf-8")
+    assert "no bias of the model is known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
+    document = json.loads(run("capacity", ring.name, "--format", "json", cwd=ring.parent).stdout)
+    assert document["results"][0]["bias_us"] is None
+    rows = list(csv.DictReader(StringIO(run("capacity", ring.name, "--format", "csv", cwd=ring.parent).stdout)))
+    assert (rows[0]["bias_us"], rows[0]["verdict"]) == ("", "does not fit")
+
+
+class DoubtedCycle(RingCycle):
+    """The rate is known to 1 %, a round of the token to 0.5 us; nobody has measured how far the bus is from it."""
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        data, *_ = self.terms
+        return (Doubt("bus.rate_mbit_s", "rate", 0.01 * data.us), Doubt("bus.token_us", "token", 0.5 * self.rounds))
+
+    def left_out(self) -> tuple[LeftOut, ...]:
+        return (LeftOut("guard time", "guard.guard_us"),) if not self.network.profile.guard.guard_us else ()
+
+
+class DoubtedRing(Ring):
+    """The invented kind, whose cycle is known to rest on what is not."""
+
+    def cycle(self, network: Network, *, model: str) -> RingCycle:
+        return DoubtedCycle(network, model)
+
+
+DOUBT_US = 2 * hypot(6.4, 1.0)
+"""U of that profile, by hand: 1 % of 640 us of data and two rounds of 0.5 us each."""
+
+
+@pytest.fixture
+def doubted(ring_file: Path) -> Iterator[Path]:
+    """The profile, while the kind with doubts is registered."""
+    with registered(DoubtedRing()):
+        yield ring_file
+
+
+@pytest.mark.parametrize(
+    ("slice_us", "verdict", "code"),
+    [
+        (NEEDED_US - DOUBT_US - 0.001, "does not fit", 1),
+        (NEEDED_US - DOUBT_US + 0.001, "not shown to fit", 1),
+        (NEEDED_US, "not shown to fit", 1),
+        (NEEDED_US + DOUBT_US - 0.001, "not shown to fit", 1),
+        (NEEDED_US + DOUBT_US + 0.001, "fits", 0),
+    ],
+)
+def test_doubts_without_a_bias_make_three_verdicts(
+    run: Run, doubted: Path, slice_us: float, verdict: str, code: int
+) -> None:
+    doubted.write_text(TEXT.replace("period_us = 1500", f"period_us = {2 * slice_us}"), encoding="utf-8")
+    (one,) = busplan.capacity(doubted).results
+    assert (one.verdict, one.bias_us) == (verdict, None)
+    assert one.uncertainty_us == pytest.approx(DOUBT_US)
+    assert one.fits == (slice_us >= NEEDED_US)
+    said = run("capacity", doubted.name, cwd=doubted.parent).stdout
+    margin = f"Margin {slice_us - NEEDED_US:.3f} us +/- {DOUBT_US:.3f} us of {slice_us:.3f} us; how far the bus is from"
+    assert said.startswith(f"ring at {2 * slice_us / 1000:.12g} ms: {verdict}. {margin}".replace("-0.000", "0.000"))
+    assert "Largest doubt: rate, 98% of U squared." in said  # 6.4 squared of 41.96
+    assert "Not in it: guard time (guard.guard_us)." in said
+    done = run("check", doubted.name, "--no-circle", cwd=doubted.parent)
+    assert done.returncode == code
+    codes = {"not shown to fit": {"BP114"}, "does not fit": {"BP101"}, "fits": set()}
+    assert {one for one in ("BP101", "BP114") if one in done.stdout} == codes[verdict]
+
+
+@pytest.mark.parametrize("period_us", [300, 1325.9, 1326, 5000, 12_000])
+def test_its_safe_stations_are_those_that_a_count_finds(doubted: Path, period_us: float) -> None:
+    profile = override(busplan.load_profile(doubted), {"cycle.period_us": period_us})
+
+    def safe_us(nodes: int) -> float:
+        rounds = -(-nodes // SHARED)
+        return 128 * nodes + 5 * rounds + 2 * hypot(1.28 * nodes, 0.5 * rounds)
+
+    most = sum(safe_us(nodes) <= period_us / 2 for nodes in range(1, MOST_STATIONS + 1))
+    (one,) = busplan.capacity(profile).results
+    assert (one.safe_nodes, one.safe_axes) == (most, 2 * most)
+
+
+@pytest.mark.parametrize(("command", "form"), [(one, form) for one, forms in FORMS.items() for form in forms])
+def test_a_kind_with_doubts_is_answered_in_every_form(run: Run, doubted: Path, command: str, form: str) -> None:
+    done = run(command, doubted.name, "--format", form, cwd=doubted.parent)
+    assert done.returncode == 0, done
+
+
+def test_the_budget_of_its_uncertainty_is_explained(run: Run, doubted: Path) -> None:
+    done = run("explain", doubted.name, "uncertainty_us", cwd=doubted.parent)
+    assert done.returncode == 0, done
+    assert "rate" in done.stdout
+    assert f"{DOUBT_US:.3f}" in done.stdout
+
+
+class HastyRing(DoubtedRing):
+    """The invented kind with a second timing model, which forgets the token and stands first in every report."""
+
+    timing_models = (TimingModel("hasty", "without the token"), TimingModel("plain", "as it is"))
+
+    def profile_model(self) -> type[Profile]:
+        return HastyProfile
+
+    def cycle(self, network: Network, *, model: str) -> RingCycle:
+        return HastyCycle(network, model)
+
+
+class HastySection(RingSection):
+    """Section [bus] with both timing models."""
+
+    timing_model: Literal["hasty", "plain"] = Field(default="hasty", description="Timing model", examples=["plain"])  # type: ignore[assignment]
+
+
+class HastyProfile(RingProfile):
+    """A profile with both timing models."""
+
+    bus: HastySection = Field(description="The bus")
+
+
+class HastyCycle(DoubtedCycle):
+    """The cycle of either timing model."""
+
+    @cached_property
+    def round_us(self) -> Number:
+        return 0.0 if self.model == "hasty" else super().round_us
+
+
+def test_one_of_its_timing_models_decides_whatever_leads_and_whatever_is_asked_for(run: Run, ring_file: Path) -> None:
+    # 640 us fit 645 us, 650 us do not, and 12.955 us are in doubt.
+    ring_file.write_text(TEXT.replace("period_us = 1500", "period_us = 1290"), encoding="utf-8")
+    with registered(HastyRing()):
+        hasty, plain = busplan.capacity(ring_file).results
+        assert [(one.timing_model, one.fits, one.verdict) for one in (hasty, plain)] == [
+            ("hasty", True, None),
+            ("plain", False, "not shown to fit"),
+        ]
+        assert (hasty.safe_nodes, hasty.bias_us, hasty.uncertainty_us) == (None, None, None)
+        for asked in ((), ("--timing", "hasty"), ("--timing", "plain")):
+            done = run("capacity", ring_file.name, *asked, cwd=ring_file.parent)
+            assert done.stdout.startswith("ring at 1.29 ms: not shown to fit. Margin -5.000 us +/- 12.955 us of")
+            says_otherwise = "The hasty model says otherwise: 640.000 us needed of 645.000 us. It decides nothing."
+            assert (says_otherwise in done.stdout) == (asked != ("--timing", "plain"))
+        assert run("check", ring_file.name, "--no-circle", cwd=ring_file.parent).returncode == 1
+
+
+def test_a_limit_of_its_own_without_a_rule_fails_the_gate(run: Run, ring: Path) -> None:
+    ring.write_text(TEXT.replace("nodes = 5", "nodes = 41").replace("period_us = 1500", "period_us = 1e6"), "utf-8")
+    done = run("check", ring.name, "--no-circle", cwd=ring.parent)
+    assert done.returncode == 1
+    assert "BP101 cycle.period_us: 41 stations are over the 40 of a ring; a second ring has room" in done.stdout
 
 
 def test_an_unknown_kind_is_answered_with_the_known_ones_at_its_line(run: Run, ring: Path) -> None:

@@ -12,16 +12,21 @@ from pydantic import BaseModel, ValidationError
 
 from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
-from busplan.buses.ieee1394.cycle import Ieee1394Cycle, gap_count_of, hops_of, link_of
+from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.section import (
+    Host,
     Ieee1394Bus,
     Ieee1394CycleSection,
+    Ieee1394LinearExecution,
+    Ieee1394Node,
     Ieee1394Payload,
     Ieee1394Profile,
+    Ieee1394TableExecution,
     Sync,
 )
-from busplan.sections.cycle import NodeSection
+from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
 from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.limits import Limits
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 
 TABLE = {"kind": "table", "payload_bytes": [4, 16, 64], "time_us": [40.0, 34.0, 58.0]}
@@ -81,6 +86,8 @@ WHOLE = {
     "bus__gap_count": (0, 63),
     "limits__min_spare_nodes": (0, 1_000_000),
     "limits__min_spare_axes": (0, 1_000_000),
+    "cycle__retries": (0, 1_000_000),
+    "node__execution__measured_gap_count": (0, 63),
 }
 TIMES = {
     "cycle__nonperiodic_us": (0, 1e9),
@@ -88,12 +95,32 @@ TIMES = {
     "cycle__sync__ping_per_node_us": (0, 1e9),
     "node__execution__base_us": (0, 1e9),
     "node__execution__per_byte_us": (0, 1e9),
+    "node__execution__uncertainty_us": (0, 1e9),
+    "node__execution__worst_extra_us": (0, 1e9),
+    "host__transaction_us": (0, 1e9),
+    "host__uncertainty_us": (0, 1e9),
+    # IEEE 1394a, MAX_BUS_HOLD: longer than this between an acknowledge and its response, and the bus is another's.
+    "node__response_us": (0, 1.63),
 }
-SHARES = {"limits__max_utilisation": (0, 1)}
-ABOVE_ZERO = {"cycle__period_us": (1e-3, 1e9), "cycle__slice_ratio": (1e-6, 1), "bus__cable_length_m": (5e-324, 100)}
+SHARES = {"limits__max_utilisation": (0, 1), "limits__reserve": (0, 0.99)}
+ABOVE_ZERO = {
+    "cycle__period_us": (1e-3, 1e9),
+    "cycle__slice_ratio": (1e-6, 1),
+    "bus__cable_length_m": (5e-324, 100),
+    "bus__phy_delay_us": (5e-324, 10),
+}
 NUMBERS = (*WHOLE, *TIMES, *SHARES, *ABOVE_ZERO)
 FRACTIONS = (*TIMES, *SHARES, *ABOVE_ZERO)
-OPTIONAL = {"bus__max_hops", "limits__max_utilisation", "limits__min_spare_nodes", "limits__min_spare_axes"}
+OPTIONAL = {
+    *("bus__max_hops", "limits__max_utilisation", "limits__min_spare_nodes", "limits__min_spare_axes"),
+    *("bus__phy_delay_us", "node__execution__uncertainty_us", "host__uncertainty_us"),
+}
+TRUTHS = ("bus__cycle_master",)
+WORDS = {
+    "node__read_response": ("split", "concatenated"),
+    "node__write_response": ("split", "unified"),
+    "node__execution__residual": ("none", "paper", "standard"),
+}
 TEXTS = (
     "name",
     "description",
@@ -102,8 +129,9 @@ TEXTS = (
     "bus__timing_model",
     "node__execution__kind",
     "node__execution__grade",
+    *WORDS,
 )
-SECTION_KEYS = ("bus", "cycle", "cycle__sync", "payload", "node", "node__execution")
+SECTION_KEYS = ("bus", "cycle", "cycle__sync", "payload", "node", "node__execution", "host")
 KINDS = {
     *("bus__nodes", "bus__max_hops", "cycle__nonperiodic_us", "limits__max_utilisation", "cycle__period_us"),
     *("name", "bus__speed", "node__execution__kind", "node__execution__grade", "bus", "cycle__sync", "node__execution"),
@@ -148,8 +176,9 @@ def test_a_whole_number_is_no_float(key: str, value: float) -> None:
 
 @pytest.mark.parametrize("key", FRACTIONS)
 def test_a_whole_number_may_stand_for_a_float(key: str) -> None:
-    value = value_of(profile(**{key: 1}), key)
-    assert value == 1
+    whole = 0 if key == "limits__reserve" else 1
+    value = value_of(profile(**{key: whole}), key)
+    assert value == whole
     assert type(value) is float
 
 
@@ -171,7 +200,9 @@ def test_a_section_is_a_table(key: str, value: object) -> None:
     assert refused(**{key: value})
 
 
-@pytest.mark.parametrize("key", ["", "bus__", "cycle__", "cycle__sync__", "payload__", "node__", "node__execution__"])
+@pytest.mark.parametrize(
+    "key", ["", "bus__", "cycle__", "cycle__sync__", "payload__", "node__", "node__execution__", "host__", "limits__"]
+)
 def test_an_unknown_key_is_refused_in_every_section(key: str) -> None:
     assert refused(**{f"{key}surprise": 1}) == ["Extra inputs are not permitted"]
 
@@ -280,6 +311,61 @@ def test_defaults_are_those_of_the_reference() -> None:
     assert (loaded.cycle.slice_ratio, loaded.cycle.nonperiodic_us) == (0.5, 0.0)
     assert (loaded.cycle.sync.ping_us, loaded.cycle.sync.ping_per_node_us) == (0.3, 0.1)
     assert loaded.payload.overhead_bytes == 20
+    # What no bus of the paper has is off.
+    assert (loaded.bus.cycle_master, loaded.bus.isochronous_us, loaded.bus.phy_delay_us) == (False, 0.0, None)
+    assert (loaded.cycle.retries, loaded.limits.reserve) == (0, 0.0)
+    assert (loaded.node.read_response, loaded.node.write_response, loaded.node.response_us) == ("split", "split", 1.63)
+    assert (loaded.node.execution.residual, loaded.node.execution.measured_gap_count) == ("none", 63)
+    assert (loaded.node.execution.uncertainty_us, loaded.node.execution.worst_extra_us) == (None, 0.0)
+    assert (loaded.host.transaction_us, loaded.host.uncertainty_us) == (0.0, None)
+
+
+@pytest.mark.parametrize(("key", "word"), [(key, word) for key, words in WORDS.items() for word in words])
+def test_a_key_of_words_takes_each_of_them(key: str, word: str) -> None:
+    assert value_of(profile(**{key: word}), key) == word
+
+
+@pytest.mark.parametrize("key", WORDS)
+def test_a_key_of_words_takes_no_other(key: str) -> None:
+    own = WORDS[key]
+    for word in ("", own[0].upper(), f"{own[0]} ", "both", {"split": "none"}.get(own[0], "split")):
+        (message,) = refused(**{key: word})
+        assert all(f"'{one}'" in message for one in own)
+
+
+def test_reads_and_writes_are_not_answered_alike() -> None:
+    assert refused(node__read_response="unified")  # nothing would carry the data
+    assert refused(node__write_response="concatenated")
+
+
+@pytest.mark.parametrize("key", TRUTHS)
+def test_a_truth_is_nothing_but_a_truth(key: str) -> None:
+    assert [value_of(profile(**{key: value}), key) for value in (True, False)] == [True, False]
+    for value in (0, 1, "true", "", None, [True]):
+        assert refused(**{key: value})
+
+
+def test_isochronous_traffic_needs_a_cycle_master() -> None:
+    message = "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true"
+    assert refused(bus__isochronous_us=20) == [message]
+    assert refused(bus__isochronous_us=20, bus__cycle_master=False) == [message]
+    assert profile(bus__isochronous_us=20, bus__cycle_master=True).bus.isochronous_us == 20
+    assert profile(bus__isochronous_us=0).bus.isochronous_us == 0
+    # It has its place within the 125 us of one cycle start.
+    assert profile(bus__isochronous_us=125, bus__cycle_master=True)
+    for value in (-1e-9, 125.1, math.inf, math.nan, "20", True, None):
+        assert refused(bus__isochronous_us=value, bus__cycle_master=True)
+
+
+def test_what_is_not_said_of_an_uncertainty_follows_from_the_grade_or_is_a_tenth() -> None:
+    by_grade = {"measured": 0.1 / math.sqrt(12), "derived": 1 / math.sqrt(3), "calibrated": 4, "assumed": 4, None: 4}
+    for grade, expected in by_grade.items():
+        execution = profile(node__execution__grade=grade).node.execution
+        assert execution.standard_uncertainty_us(40.0) == pytest.approx(expected)
+        said = profile(node__execution__grade=grade, node__execution__uncertainty_us=0.25).node.execution
+        assert said.standard_uncertainty_us(40.0) == 0.25
+    assert profile(host__transaction_us=5).host.standard_uncertainty_us == 0.5
+    assert profile(host__transaction_us=5, host__uncertainty_us=0).host.standard_uncertainty_us == 0
 
 
 @pytest.mark.parametrize("grade", ["measured", "derived", "calibrated", "assumed", None])
@@ -302,9 +388,11 @@ SECTIONS = (
     Ieee1394CycleSection,
     Sync,
     Ieee1394Payload,
-    NodeSection,
-    LinearExecution,
-    TableExecution,
+    Ieee1394Node,
+    Ieee1394LinearExecution,
+    Ieee1394TableExecution,
+    Host,
+    Limits,
 )
 
 
@@ -313,7 +401,7 @@ def test_every_example_is_a_value_that_the_schema_takes(section: type[BaseModel]
     # Messages about a missing key show the first one.
     examples = {name: field.examples[0] for name, field in section.model_fields.items() if field.examples}
     sections = {"bus": data()["bus"], "cycle": data()["cycle"], "payload": data()["payload"], "node": data()["node"]}
-    rest = {Ieee1394Profile: sections, NodeSection: {"execution": data()["node"]["execution"]}}
+    rest = {Ieee1394Profile: sections, Ieee1394Node: {"execution": data()["node"]["execution"]}}
     assert section.model_validate({**examples, **rest.get(section, {})})
 
 
@@ -390,7 +478,9 @@ def test_the_optimal_gap_count_is_refused_for_cables_the_table_does_not_know() -
 def test_a_link_has_the_rate_and_the_limits_of_its_speed(speed: str, rate_mbit_s: float, limit: int) -> None:
     loaded = profile(bus__speed=speed, bus__gap_count=9, bus__cable_length_m=2)
     link = link_of(network_of(loaded).with_nodes(3))
-    assert tuple(link) == pytest.approx((rate_mbit_s, 9, 3, 2.0), rel=1e-15)
+    assert tuple(link)[:4] == pytest.approx((rate_mbit_s, 9, 3, 2.0), rel=1e-15)
+    assert link.phy_delay_us is None
+    assert link_of(network_of(profile(bus__phy_delay_us=0.05))).phy_delay_us == 0.05
     assert float(MAX_PAYLOAD_BYTES[loaded.bus.speed]) == limit
 
 
@@ -414,10 +504,15 @@ def test_what_breaks_the_standards_limits_loads(changes: dict[str, object]) -> N
 # --- the cycle --------------------------------------------------------------------------------------------
 
 
-def test_the_synchronous_packet_grows_with_each_further_node() -> None:
+def test_the_synchronous_packet_is_a_ping_for_the_paper_and_a_broadcast_for_the_standard() -> None:
     network = network_of(profile(cycle__sync={"ping_us": 0.3, "ping_per_node_us": 0.1}))
-    cycles = [Ieee1394Cycle(network.with_nodes(nodes), "standard") for nodes in (1, 2, 11)]
-    assert [cycle.sync_us for cycle in cycles] == pytest.approx([0.3, 0.4, 1.3])
+    paper = [Ieee1394Cycle(network.with_nodes(nodes), "paper").sync_us for nodes in (1, 2, 11)]
+    assert paper == pytest.approx([0.3, 0.4, 1.3])
+    # 20 bytes at 393.216 Mbit/s, arbitration of (4) and the arbitration reset gap of (10) at gap count 63, and twice
+    # the hops: the measured ping is propagation, and in them.
+    hop_us, gaps_us = 0.023 + 14 / 98.304, 1.63 + (4 * 63 + 53 + 32 * 63) / 98.304
+    standard = [Ieee1394Cycle(network.with_nodes(nodes), "standard").sync_us for nodes in (1, 2, 11)]
+    assert standard == pytest.approx([160 / 393.216 + gaps_us + 2 * nodes * hop_us for nodes in (1, 2, 11)])
 
 
 # --- execution times --------------------------------------------------------------------------------------

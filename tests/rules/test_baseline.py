@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.rules.baseline import read_baseline, regressions, write_baseline
+from busplan.rules.baseline import MODELS, Baseline, read_baseline, regressions, write_baseline
 from busplan.rules.gate import FileResult
 
 Changed = Callable[..., str]
@@ -80,8 +80,14 @@ def test_what_is_written_can_be_read_and_is_sorted_by_path(check: Check, clean: 
     figures = check(clean).figures
     text = write_baseline({"b.toml": figures, "a.toml": figures, "ü\udc80.toml": {}})
     assert list(json.loads(text)["profiles"]) == ["a.toml", "b.toml", "ü\udc80.toml"]
-    assert read_baseline(text, name="b.json") == {"a.toml": figures, "b.toml": figures, "ü\udc80.toml": {}}
-    assert set(figures) == {"paper.max_axes", "paper.margin_us", "standard.max_axes", "standard.margin_us"}
+    assert read_baseline(text, name="b.json") == Baseline(
+        {"a.toml": figures, "b.toml": figures, "ü\udc80.toml": {}}, MODELS
+    )
+    # What a user may rely on is the verdict's: the closed forms of the paper have no such figures.
+    assert set(figures) == {
+        *("paper.max_axes", "paper.margin_us", "standard.max_axes", "standard.margin_us"),
+        *("standard.safe_axes", "standard.margin_corrected_us"),
+    }
 
 
 GOOD = {"schema": 1, "command": "baseline", "profiles": {"a.toml": {"paper.max_axes": 4}}}
@@ -101,6 +107,10 @@ GOOD = {"schema": 1, "command": "baseline", "profiles": {"a.toml": {"paper.max_a
         json.dumps({**GOOD, "schema": 2}),
         json.dumps({**GOOD, "schema": None}),
         json.dumps({**GOOD, "command": "check"}),
+        json.dumps({**GOOD, "models": "2"}),
+        json.dumps({**GOOD, "models": True}),
+        json.dumps({**GOOD, "models": 2.0}),
+        json.dumps({**GOOD, "models": None}),
         json.dumps({**GOOD, "profiles": []}),
         json.dumps({**GOOD, "profiles": {"a.toml": []}}),
         json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": "4"}}}),
@@ -120,4 +130,21 @@ def test_what_is_no_baseline_is_refused_in_one_message(document: str) -> None:
 
 
 def test_a_good_one_is_read() -> None:
-    assert read_baseline(json.dumps(GOOD), name="b.json") == GOOD["profiles"]
+    assert read_baseline(json.dumps(GOOD), name="b.json").profiles == GOOD["profiles"]
+
+
+@pytest.mark.parametrize(("models", "is_current"), [(None, False), (1, False), (MODELS, True), (MODELS + 1, False)])
+def test_a_record_of_other_timing_models_is_read_and_known_for_it(models: int | None, is_current: bool) -> None:
+    document = GOOD if models is None else {**GOOD, "models": models}
+    found = read_baseline(json.dumps(document), name="b.json")
+    assert (found.models, found.is_current) == (models or 1, is_current)
+
+
+def test_safe_axes_are_held_where_the_closed_form_still_has_them(clean: str, check: Check) -> None:
+    # 2097.465 us make 15 nodes safe and 1942.386 us are needed: a reserve takes safe nodes, and no others.
+    before = check(clean).figures
+    now = check(f"{clean}\n[limits]\nreserve = 0.1\n", baseline=before)
+    assert [(one.code, one.key) for one in now.findings] == [("BP301", "bus.nodes")]
+    # 1911.497 us for 14 nodes, and 1737.510 us for 13, of 1800 us.
+    assert "safe_axes under the standard timing fell to 52 from the 56" in now.findings[0].message
+    assert now.figures["standard.max_axes"] == before["standard.max_axes"] == 60

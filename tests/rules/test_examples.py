@@ -12,13 +12,15 @@ import pytest
 
 from busplan.errors import PlacedError
 from busplan.profile.toml import decode
-from busplan.rules.baseline import read_baseline
+from busplan.rules.baseline import MODELS, read_baseline
 from busplan.rules.gate import FileResult, check_document, unreadable
 from busplan.rules.registry import all_rules
 
 EXAMPLES = Path(__file__).parent / "examples"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
 VALID = sorted(EXAMPLES.glob("*/valid*.toml"))
+CURED = ("BP101", "BP103", "BP104", "BP105", "BP114")
+"""Rules whose message ends with the cheapest cure."""
 EXPECT = re.compile(rb"# expect: ((?:\d+:\d+ ?)+)")
 
 
@@ -28,7 +30,9 @@ def name_of(path: Path) -> str:
 
 def checked(path: Path) -> FileResult:
     record = path.parent / "baseline.json"
-    recorded = read_baseline(record.read_text(encoding="utf-8"), name="baseline.json") if record.exists() else {}
+    recorded = (
+        read_baseline(record.read_text(encoding="utf-8"), name="baseline.json").profiles if record.exists() else {}
+    )
     content = path.read_bytes()
     try:
         return check_document(decode(content, name=path.name), baseline=recorded.get(path.name))
@@ -93,6 +97,8 @@ def test_codes_are_stable() -> None:
         "BP110": "gap-count-wasteful",
         "BP111": "payload-not-quadlets",
         "BP112": "execution-unmeasured",
+        "BP113": "fits-only-until-bus-reset",
+        "BP114": "not-shown-to-fit",
         "BP201": "circle-tolerance",
         "BP202": "no-stability-margin",
         "BP203": "circle-impossible",
@@ -105,22 +111,34 @@ def test_codes_are_stable() -> None:
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        ("BP101", ["183.862 us", "150.000 us", "33.862 us too much", "cheapest cure: cycle.slice_ratio = 0.6129"]),
-        ("BP102", ["fits the paper's timing, not the standard's", "175.000 us", "cheapest cure: "]),
-        ("BP103", ["9.2%", "5.0% allowed", "cheapest cure: cycle.period_us = 7355"]),
-        ("BP104", ["11 to spare", "12 asked for", "cheapest cure: cycle.slice_ratio = 0.5245"]),
-        ("BP105", ["44 to spare", "45 asked for", "cheapest cure: cycle.slice_ratio = 0.5245"]),
+        # Two nodes at gap count 7 need 177.992 us and 205.094 us to be safe: bias 8 (0.827 + 1.139), U 11.372 us.
+        (
+            "BP101",
+            ["177.992 us of 150.000 us", "margin is -43.7 +/- 11.4 us", "cheapest cure: cycle.slice_ratio = 0.6837"],
+        ),
+        # At S100 the paper counts gaps as fast as the standard, and more of them: 329.254 us against 279.975 us.
+        ("BP102", ["cycle.period_us: fits, and the paper timing says that it does not"]),
+        # 177.992 us of 2000 us; 177.992 us / 0.05 / 4000 us is 0.88996.
+        ("BP103", ["8.9%", "5.0% allowed", "cheapest cure: cycle.slice_ratio = 0.89"]),
+        # 14 nodes need 1911.497 us to be safe, 15 need 2097.465 us: 0.524366 of 4000 us.
+        ("BP104", ["12 to spare that are shown to fit", "13 asked for", "cheapest cure: cycle.slice_ratio = 0.5244"]),
+        ("BP105", ["48 to spare that are shown to fit", "49 asked for", "cheapest cure: cycle.slice_ratio = 0.5244"]),
         ("BP106", ["63 nodes", "62 of one bus", "second bus"]),
         ("BP107", ["17 hops", "16 of one bus", "bus.max_hops = 16"]),
         ("BP108", ["516 bytes", "512 bytes", 'cheapest cure: bus.speed = "S200"']),
         ("BP109", ["gap count 4", "3 hops", "smallest safe one is 8"]),
-        ("BP110", ["gap count 63", "7 that 2 hops need", "127.604 us", "win 2 nodes"]),
+        # 253.187 us less 177.992 us; 13 nodes are safe at gap count 63, and 14 at that of their hops.
+        ("BP110", ["gap count 63", "7 that 2 hops need", "75.195 us", "win 1 node"]),
         ("BP111", ["13 bytes", "16 bytes travel", "say 16"]),
         ("BP112", ["assumption", "measure it"]),
+        # 253.187 us and a bias of 8 * 0.827 us, U 4.306 us.
+        ("BP113", ["gap count 7 alone", "with the 63", "does not fit", "253.187 us of 250.000 us", "-9.8 +/- 4.3 us"]),
+        # 269.053 us and the same bias and U at S100 with cables of 10 m; 279.975 us / 550 us is 0.50905.
+        ("BP114", ["not shown to fit", "269.053 us of 275.000 us", "-0.7 +/- 4.3 us", "cycle.slice_ratio = 0.5091"]),
         ("BP201", ["20.012 um", "1 um", "attack velocity_feedforward first"]),
         ("BP202", ["unstable", "lower servo.position_gain_per_s"]),
         ("BP203", ["feed_mm_per_min", "choose at most"]),
-        ("BP301", ["margin_us", "1749.51112695", "1834.91690495 of the baseline"]),
+        ("BP301", ["margin_corrected_us", "standard timing fell to 1704.44431055", "1806.27761133 of the baseline"]),
     ],
 )
 def test_a_finding_says_the_value_the_limit_and_the_cheapest_cure(code: str, words: list[str]) -> None:
@@ -130,17 +148,41 @@ def test_a_finding_says_the_value_the_limit_and_the_cheapest_cure(code: str, wor
         assert word in finding.message
 
 
-@pytest.mark.parametrize("code", ["BP101", "BP102", "BP103", "BP104", "BP105"])
-def test_the_cheapest_cure_cures(code: str) -> None:
-    text = (EXAMPLES / code / "invalid.toml").read_text(encoding="utf-8")
-    message = checked(EXAMPLES / code / "invalid.toml").findings[0].message
+@pytest.mark.parametrize("path", [path for path in INVALID if path.parent.name in CURED], ids=name_of)
+def test_the_cheapest_cure_cures(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    message = checked(path).findings[0].message
     key, value = message.rpartition("cheapest cure: ")[2].split(" = ")
     section, name = key.split(".")
     said = re.sub(rf"^{name} = .*\n", "", text, flags=re.MULTILINE)
     cured = said.replace(f"[{section}]\n", f"[{section}]\n{name} = {value}\n")
-    assert check_document(decode(cured.encode(), name="cured.toml")).findings == ()
+    found = check_document(decode(cured.encode(), name="cured.toml")).findings
+    # It is a cure by the standard and for the gap count of the profile; what else is said of it are warnings.
+    assert {one.code for one in found} <= {"BP102", "BP113"}
+
+
+def test_a_reserve_is_named_where_it_is_what_is_missing() -> None:
+    # 279.975 us are safe and 310 us are given, of which 14 % must stay free.
+    (finding,) = checked(EXAMPLES / "BP114" / "invalid-reserve.toml").findings
+    assert "269.053 us of 310.000 us" in finding.message
+    assert "limits.reserve asks for 14% of the slice" in finding.message
+    assert finding.message.endswith("cheapest cure: cycle.slice_ratio = 0.5251")  # 279.975 / 0.86 / 620
+
+
+def test_the_paper_alone_is_no_reason_to_build() -> None:
+    (finding,) = checked(EXAMPLES / "BP102" / "invalid-paper-fits.toml").findings
+    assert finding.message == "cycle.period_us: does not fit, and the paper timing says that it fits"
+    # Without the comment the verdict itself is there, too.
+    text = (EXAMPLES / "BP102" / "invalid-paper-fits.toml").read_text(encoding="utf-8")
+    found = check_document(
+        decode(text.partition("  # busplan")[0].encode() + text[text.index("\n\n[payload]") :].encode(), name="a.toml")
+    )
+    assert {one.code for one in found.findings} == {"BP101", "BP102"}
 
 
 def test_the_record_is_one_that_the_program_writes() -> None:
     record = (EXAMPLES / "BP301" / "baseline.json").read_text(encoding="utf-8")
-    assert set(json.loads(record)["profiles"]["valid.toml"]) == set(checked(EXAMPLES / "BP301" / "valid.toml").figures)
+    document = json.loads(record)
+    assert document["models"] == MODELS
+    # Worked out by hand; the last digits are the machine's.
+    assert document["profiles"]["valid.toml"] == pytest.approx(checked(EXAMPLES / "BP301" / "valid.toml").figures)

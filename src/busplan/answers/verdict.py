@@ -134,11 +134,14 @@ def _margin(figures: CapacityFigures, *, at: str) -> Sentence:
     """The margin of {}, as far as it is known."""
     of = _figure(AVAILABLE, figures, at=at)
     margin = _figure(MARGIN_CORRECTED, figures, at=at)
-    if figures.bias_us is None:
-        words = "Margin {} of {}; how far the bus is from this timing model is not known, so no bias is in it."
-        return sentence(words, margin, of)
-    values = (margin, _figure(UNCERTAINTY, figures, at=at), of, _figure(BIAS, figures, at=at))
-    return sentence("Margin {} +/- {} of {}, less a bias of {}.", *values)
+    uncertainty = _figure(UNCERTAINTY, figures, at=at)
+    if figures.bias_us is not None:
+        bias = _figure(BIAS, figures, at=at)
+        return sentence("Margin {} +/- {} of {}, less a bias of {}.", margin, uncertainty, of, bias)
+    unknown = "how far the bus is from this timing model is not known, so no bias is in it"
+    if figures.doubts:
+        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown}.", margin, uncertainty, of)
+    return sentence(f"Margin {{}} of {{}}; {unknown}.", margin, of)
 
 
 def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:

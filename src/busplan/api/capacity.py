@@ -79,11 +79,11 @@ def capacity(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.capacity("paper-1ms", periods_us=[600])
+    >>> answer = busplan.capacity("paper-1ms", periods_us=[500])
     >>> [(one.timing_model, one.fits, one.max_axes) for one in answer.results]
     [('paper', True, 8), ('standard', False, 4)]
-    >>> answer.verdicts[0].models_agree
-    False
+    >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
+    (False, 'does not fit')
     """
     network = load_profile(profile)
     found = analysis.capacity(

@@ -76,7 +76,7 @@ def latency(
     >>> import busplan
     >>> answer = busplan.latency("paper-two-node", payloads_bytes=[4, 1024], timing_models=["paper"])
     >>> [(one.transaction, one.payload_bytes, round(one.phases.latency_us, 2)) for one in answer.transactions]
-    [('read', 4, 43.07), ('write', 4, 43.07), ('read', 1024, 453.07), ('write', 1024, 453.07)]
+    [('read', 4, 43.17), ('write', 4, 43.17), ('read', 1024, 474.57), ('write', 1024, 474.57)]
     """
     network = load_profile(profile)
     sizes = None if payloads_bytes is None else items(payloads_bytes, name="payloads_bytes")

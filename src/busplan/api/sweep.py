@@ -155,8 +155,8 @@ def sweep(
     --------
     >>> import busplan
     >>> answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [500, 1000, 4000]}, timing_models=["standard"])
-    >>> answer["max_axes"]
-    array([ 4, 12, 44])
+    >>> answer["safe_axes"]
+    array([ 4, 12, 52])
     >>> answer["limited_by"].tolist(), len(answer)
     (['time', 'time', 'time'], 3)
     """

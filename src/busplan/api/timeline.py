@@ -92,7 +92,7 @@ def timeline(
     >>> import busplan
     >>> answer = busplan.timeline("paper-4ms", transaction=("read", 1))
     >>> [(one.kind, round(one.duration_us, 3)) for one in answer.events][1:4]
-    [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.433)]
+    [('request_data', 0.768), ('acknowledge', 0.367), ('execution', 36.733)]
     """
     network = load_profile(profile)
     model = None if timing_model is None else checked_models([timing_model], network)[0]

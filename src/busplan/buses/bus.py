@@ -91,6 +91,8 @@ class Limit(NamedTuple):
     """What makes room where this limit keeps nodes out."""
     failure: str = ""
     """What a circle test calls a broken one, where not by its key."""
+    has_rule: bool = False
+    """A rule of the kind reports a broken one; otherwise the rule of the verdict does."""
     is_safety: bool = False
     """A cycle fits without it, but nothing is advised that breaks it."""
 

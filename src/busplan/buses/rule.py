@@ -52,6 +52,10 @@ class RuleFigures(Protocol):
         """fits, not shown to fit, or does not fit; of the model that decides."""
 
     @property
+    def bias_us(self) -> float | None:
+        """What the bus takes beyond the model [us]; None where nobody has measured it."""
+
+    @property
     def margin_corrected_us(self) -> float | None:
         """What is left of the slice, less the bias [us]; of the model that decides."""
 
@@ -117,4 +121,6 @@ def overrun(one: RuleFigures) -> str:
     if one.uncertainty_us is None or one.margin_corrected_us is None:
         return f"{sides} under the {one.timing_model} timing, {microseconds(-one.margin_us)} too much"
     margin = f"{one.margin_corrected_us:.1f} +/- {one.uncertainty_us:.1f} us"
+    if one.bias_us is None:
+        return f"{sides}; the margin is {margin}, and no bias of the model is known"
     return f"{sides}; with the model's bias the margin is {margin}"

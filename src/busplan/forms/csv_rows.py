@@ -49,15 +49,17 @@ def csv_cell(value: object) -> object:
 
     Examples
     --------
-    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "nodes"]), csv_cell(True)
-    ("'=1+1", -1.5, 'time nodes', 'true')
+    >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "nodes"]), csv_cell(True), csv_cell(None)
+    ("'=1+1", -1.5, 'time nodes', 'true', '')
     """
     cell = spelled(value)
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell
 
 
 def spelled(value: object) -> object:
-    """Write a boolean in lower case and a list as words; return anything else unchanged."""
+    """Write a boolean in lower case, a list as words and what is missing as nothing; return anything else unchanged."""
+    if value is None:
+        return ""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list):

@@ -6,14 +6,21 @@ from typing import Final
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
 from busplan.analysis.capacity.cycle import TIME
-from busplan.analysis.network import bus_of
+from busplan.analysis.network import bus_of, network_of
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, overrun
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle does not fit, whatever is not known of it."""
-    one = subject.deciding
-    if one.verdict == DOES_NOT_FIT and (TIME in one.exceeded or not one.exceeded):
+    one, bus = subject.deciding, bus_of(subject.profile)
+    if one.verdict != DOES_NOT_FIT:
+        return
+    broken = [limit for limit in map(bus.limit, one.exceeded) if limit is not None]
+    alone = [limit for limit in broken if not limit.has_rule]
+    for limit in alone:
+        way_out = f"; {limit.way_out}" if limit.way_out else ""
+        yield RuleProblem("cycle.period_us", f"{limit.words(network_of(subject.profile))}{way_out}")
+    if not alone and (TIME in one.exceeded or not broken):
         yield RuleProblem("cycle.period_us", f"{overrun(one)}; {subject.cure()}")
 
 
@@ -81,7 +88,8 @@ RULES: Final = (
         "error",
         "the cycle does not fit its time slice",
         "All terms of one cycle together (equation 2), with the bias of the timing model, take longer than "
-        "slice_ratio * period_us (equation 1), by more than is not known. The message names the cheapest cure: a "
+        "slice_ratio * period_us (equation 1), by more than is not known; or a limit is broken that has no rule of its "
+        "own. The message names the cheapest cure: a "
         "setting of the bus needs no new parts, the slice ratio is computing time of the host, the period is what the "
         "machine is for.",
         slice_overrun,

@@ -5,6 +5,7 @@ added one by one, and the end of the last one must be the same.
 """
 
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from math import fsum
 from typing import Final, NamedTuple
 
@@ -18,7 +19,8 @@ from busplan.sections.profile import Profile
 
 MOST_NODES: Final = 1000
 """Most nodes laid out one by one: far more than a bus may have, so that a profile beyond its limit can be shown."""
-
+MOST_EVENTS: Final = 50_000
+"""Most events: those of so many nodes, and more retries or cycle starts than anyone can look at."""
 
 EVENTS: Final = Figure("events", "n", "schedule", "events of one kind in the window", "events", sort="count")
 TOTAL: Final = Figure("total_us", "t", "schedule", "what the events of one kind take together", "time")
@@ -112,7 +114,7 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     Raises
     ------
     BusplanError
-        More nodes than can be laid out one by one.
+        More nodes or events than can be laid out one by one.
 
     References
     ----------
@@ -134,7 +136,9 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
         raise BusplanError(f"bus.nodes = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(profile) if model is None else model
     closed = figures(profile, model=model)
-    events = list(_laid_out(cycle_of(profile, model=model).events()))
+    events = list(islice(_laid_out(cycle_of(profile, model=model).events()), MOST_EVENTS + 1))
+    if len(events) > MOST_EVENTS:
+        raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
     end_us = events[-1].end_us
     # A rest that is only float rounding is no idle time.
     if not fits_in(closed.available_us, available_us=end_us):

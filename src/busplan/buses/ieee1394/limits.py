@@ -34,6 +34,7 @@ LIMITS: Final = (
         _most_payload,
         way_out="the payload fits no packet",
         failure="payload_bytes",
+        has_rule=True,
     ),
     Limit(
         "nodes",
@@ -41,6 +42,7 @@ LIMITS: Final = (
         lambda network: network.nodes,
         lambda _network: MAX_NODES,
         way_out=f"a second bus has {MAX_NODES:g} more",
+        has_rule=True,
     ),
     Limit(
         "hops",
@@ -48,6 +50,7 @@ LIMITS: Final = (
         hops_of,
         lambda _network: MAX_HOPS,
         way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
+        has_rule=True,
     ),
     Limit(
         "cycle starts",

@@ -40,7 +40,7 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits with gap count {one.gap_count} alone: with the {MAX_GAP_COUNT} of a bus after its reset it is "
+                f"fits with gap count {one.gap_count} alone; with the {MAX_GAP_COUNT} of a bus after its reset: "
                 f"{after.verdict}, {overrun(after)}; have the bus manager write the gap count after each reset",
             )
 
