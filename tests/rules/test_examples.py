@@ -117,7 +117,7 @@ def test_codes_are_stable() -> None:
             ["177.992 us of 150.000 us", "margin is -43.7 +/- 11.4 us", "cheapest cure: cycle.slice_ratio = 0.6837"],
         ),
         # At S100 the paper counts gaps as fast as the standard, and more of them: 329.254 us against 279.975 us.
-        ("BP102", ["cycle.period_us: fits, and the paper timing says that it does not"]),
+        ("BP102", ["cycle.period_us: the paper's equations say that it does not fit; the verdict is: fits"]),
         # 177.992 us of 2000 us; 177.992 us / 0.05 / 4000 us is 0.88996.
         ("BP103", ["8.9%", "5.0% allowed", "cheapest cure: cycle.slice_ratio = 0.89"]),
         # 14 nodes need 1911.497 us to be safe, 15 need 2097.465 us: 0.524366 of 4000 us.
@@ -171,7 +171,7 @@ def test_a_reserve_is_named_where_it_is_what_is_missing() -> None:
 
 def test_the_paper_alone_is_no_reason_to_build() -> None:
     (finding,) = checked(EXAMPLES / "BP102" / "invalid-paper-fits.toml").findings
-    assert finding.message == "cycle.period_us: does not fit, and the paper timing says that it fits"
+    assert finding.message == "cycle.period_us: the paper's equations say that it fits; the verdict is: does not fit"
     # Without the comment the verdict itself is there, too.
     text = (EXAMPLES / "BP102" / "invalid-paper-fits.toml").read_text(encoding="utf-8")
     found = check_document(
@@ -186,3 +186,11 @@ def test_the_record_is_one_that_the_program_writes() -> None:
     assert document["models"] == MODELS
     # Worked out by hand; the last digits are the machine's.
     assert document["profiles"]["valid.toml"] == pytest.approx(checked(EXAMPLES / "BP301" / "valid.toml").figures)
+
+
+def test_a_plan_that_lacks_its_reserve_alone_contradicts_no_equation() -> None:
+    # At S400 the paper says that it fits, and only the reserve keeps the verdict from saying so.
+    text = (EXAMPLES / "BP114" / "invalid-reserve.toml").read_text(encoding="utf-8")
+    text = text.replace('"S100"', '"S400"').replace("cable_length_m = 10\n", "")
+    found = check_document(decode(text.encode(), name="a.toml"))
+    assert "BP102" not in {one.code for one in found.findings}

@@ -66,11 +66,11 @@ def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, star
         Index of the first one in the document's results.
     """
     first, bus = figures[0], bus_of(profile)
+    setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network_of(profile))),) if words)
     caption = sentence(
-        "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + "; {}",
+        "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + setup,
         count_value(first.nodes, "nodes", at=f"/results/{start}/nodes"),
         count_value(first.axes, "axes", at=f"/results/{start}/axes"),
-        ", ".join(bus.setup_words(network_of(profile))),
     )
     leading = leading_model(profile)
     owners = [
