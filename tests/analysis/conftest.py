@@ -163,7 +163,17 @@ def _starts(profile: Profile, nodes: int) -> int:
     """Cycle starts in a cycle, from what it needs with and without them."""
     if not profile.bus.cycle_master:
         return 0
+    alone = profile.model_copy(update={"bus": profile.bus.model_copy(update={"cycle_master": False})})
+    others_us = exact_required_us(alone, "standard", nodes)
+    required_us = exact_required_us(profile, "standard", nodes)
+    return round((required_us - others_us) / exact_cycle_start_us(profile, nodes))
+
+
+def exact_cycle_start_us(profile: Profile, nodes: int) -> Fraction:
+    """What one cycle start costs; 0 where none are sent. Beyond 124 us there is no time for anything else."""
     bus = profile.bus
+    if not bus.cycle_master:
+        return Fraction(0)
     hops = nodes if bus.max_hops is None else bus.max_hops
     gap = bus.gap_count
     if gap == "optimal":
@@ -171,10 +181,7 @@ def _starts(profile: Profile, nodes: int) -> int:
     phy_us = Fraction(14) / Fraction("98.304") if bus.phy_delay_us is None else Fraction(bus.phy_delay_us)
     hop_us = Fraction("0.023") * Fraction(bus.cable_length_m) / Fraction("4.5") + phy_us
     gaps_us = Fraction(53 + 32 * gap + 4 * gap + 160) / Fraction("98.304") + Fraction("1.63")
-    start_us = gaps_us + 2 * hops * hop_us + Fraction(bus.isochronous_us)
-    alone = profile.model_copy(update={"bus": bus.model_copy(update={"cycle_master": False})})
-    others_us = exact_required_us(alone, "standard", nodes)
-    return round((exact_required_us(profile, "standard", nodes) - others_us) / start_us)
+    return gaps_us + 2 * hops * hop_us + Fraction(bus.isochronous_us)
 
 
 def make_profile(**changes: Any) -> Profile:
@@ -252,6 +259,12 @@ def exact() -> Callable[[Profile, str, int], Fraction]:
 def safely() -> Callable[[Profile, int], Fraction]:
     """The second implementation of what a slice must give."""
     return exact_safe_required_us
+
+
+@pytest.fixture(scope="session")
+def start() -> Callable[[Profile, int], Fraction]:
+    """The second implementation of what one cycle start costs."""
+    return exact_cycle_start_us
 
 
 @pytest.fixture(scope="session")

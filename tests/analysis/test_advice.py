@@ -107,7 +107,7 @@ def test_advice_for_shipped_profiles_is_safe(name: str) -> None:
 
 
 def test_no_gap_count_is_advised_for_cables_that_the_table_does_not_know(make: Make) -> None:
-    profile = make(cycle__period_us=600.0, bus__cable_length_m=20.0)
+    profile = make(cycle__period_us=550.0, bus__cable_length_m=20.0)
     change = change_to_fit(profile)
     assert change is not None
     assert "bus.gap_count" not in change.changes

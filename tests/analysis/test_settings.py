@@ -139,7 +139,7 @@ def test_payload_stays_inside_the_execution_table_which_need_not_ascend(make: Ma
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_most_nodes_are_safe_for_their_gap_count(
-    data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely, start: Safely
 ) -> None:
     profile = override(data.draw(any_profile), {"payload.read_bytes": 12, "payload.write_bytes": 12})
     bus, cycle = profile.bus, profile.cycle
@@ -148,13 +148,7 @@ def test_most_nodes_are_safe_for_their_gap_count(
         hops = bus.max_hops or nodes
         gap_count = safe(hops) if bus.gap_count == "optimal" else bus.gap_count
         in_time = fit(safely(profile, nodes), ratio=cycle.slice_ratio, period=cycle.period_us)
-        return hops <= 16 and gap_count >= safe(hops) and in_time and has_room_for_cycle_starts(hops, gap_count)
-
-    def has_room_for_cycle_starts(hops: int, gap_count: int) -> bool:
-        clock, way = Fraction("98.304"), Fraction("0.023") * Fraction(bus.cable_length_m) / Fraction("4.5")
-        way = hops * (way + (Fraction(14) / clock if bus.phy_delay_us is None else Fraction(bus.phy_delay_us)))
-        start = 2 * way + Fraction(53 + 36 * gap_count + 160) / clock + Fraction("1.63") + Fraction(bus.isochronous_us)
-        return not bus.cycle_master or start <= 124
+        return hops <= 16 and gap_count >= safe(hops) and in_time and start(profile, nodes) <= 124
 
     assert safe_nodes(profile)[0] == max(filter(good, range(1, 63)), default=0)
 

@@ -280,6 +280,8 @@ class Bus(ABC):
     """Keys of a profile whose default is a figure with a source."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""
+    choosing_keys: ClassVar[tuple[str, ...]] = ("node.execution.grade",)
+    """Keys whose word chooses between numbers by `choose`, so that a derivation has them among its inputs."""
     warning_keys: ClassVar[tuple[str, ...]] = ()
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()

@@ -200,9 +200,7 @@ FITS: Final = Figure(
     better="more",
 )
 _CERTAINTY: Final = "JCGM 100"
-BIAS: Final = Figure(
-    "bias_us", "bias", "Table I", "what the bus takes beyond the timing model, on the mean", "bias", better="less"
-)
+BIAS: Final = Figure("bias_us", "bias", "Table I", "what the bus takes beyond the timing model, on the mean", "bias")
 MARGIN_CORRECTED: Final = Figure(
     "margin_corrected_us",
     "margin_c",

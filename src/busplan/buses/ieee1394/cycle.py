@@ -133,9 +133,9 @@ class Ieee1394Cycle(BusCycle):
         of_parts = [(one.nodes, parts(one)) for one in self.exchanges]
         own = {
             key: total(
-                nodes * _sum([part.us for part in found if part.term == key])
+                nodes * _sum(of_term)
                 for nodes, found in of_parts
-                if any(part.term == key for part in found)
+                if (of_term := [part.us for part in found if part.term == key and not _is_nothing(part.us)])
             )
             for key in _OF_TRANSACTIONS
         }
@@ -254,6 +254,11 @@ class Ieee1394Cycle(BusCycle):
         if is_split and not profile.node.execution.worst_extra_us:
             found.append(LeftOut("the slowest execution", "node.execution.worst_extra_us"))
         return tuple(found)
+
+
+def _is_nothing(us: Number) -> bool:
+    """Whether a part is off, and no number that happens to be 0."""
+    return isinstance(us, float) and us == 0
 
 
 def _sum(parts_us: Sequence[Number]) -> Number:
