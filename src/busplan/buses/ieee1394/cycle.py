@@ -151,13 +151,13 @@ class Ieee1394Cycle(BusCycle):
             starts_us = self.starts(total(one.us for one in others)) * self.cycle_start_us
         return (Term("cycle_starts_us", starts_us), *others)
 
-    def required_with(self, extra_us: Number) -> Number:
-        """What the cycle needs if its transactions take longer: then there are more cycle starts, too [us]."""
-        _, *others = self.terms
-        others_us = total(one.us for one in others)
+    def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
+        """What the cycle grows by if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
-            return others_us + extra_us
-        return others_us + extra_us + self.starts(others_us + extra_us) * self.cycle_start_us
+            return extra_us
+        before_us = total(one.us for one in self.terms[1:]) + after_us
+        more = self.starts(before_us + extra_us) - self.starts(before_us)
+        return extra_us + more * self.cycle_start_us
 
     def bias_us(self) -> Number | None:
         """What the transactions take beyond the model, on the mean [us]."""

@@ -78,14 +78,16 @@ def of_cycle(
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
 
         def busy_at(steps: int) -> Number:
-            return busy_us(
+            found_us = busy_us(
                 answer,
                 gaps=gaps,
                 execution_us=bound_us + steps * execution_us if steps else bound_us,
                 host_us=own.host_us + steps * host_us if steps else own.host_us,
             )
+            return named(found_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
 
-        return larger(busy_at(2) - busy_at(0), busy_at(0) - busy_at(-2)) / 2
+        above_us, own_us, below_us = busy_at(2), busy_at(0), busy_at(-2)
+        return larger(above_us - own_us, own_us - below_us) / 2
 
     return (
         Doubt("residual", "residual of Table I", halves * _spread_us(network)),
