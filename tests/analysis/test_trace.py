@@ -25,7 +25,7 @@ PRINTED = {
     "required_time_slice_us": "T_need / N",
     "transaction_latency_us": "T_req + T_ack1 + T_exec + T_resp + T_ack2",
     "phy_delay_us": "14 / C",
-    "hop_delay_us": "0.023 L / 4.5 + phy",
+    "hop_delay_us": "0.023 L / 4.5 + T_phy",
     "arbitration_phase_us": "hop H + 4 g / C + 1.63",
     "data_phase_us": "hop H + 8 B / R",
     "acknowledge_phase_us": "hop H + 0.25",
