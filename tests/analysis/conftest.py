@@ -30,10 +30,7 @@ def exact_required_us(profile: Profile, model: str, nodes: int, *, extra_us: flo
     rate = {"S100": Fraction("98.304"), "S200": Fraction("196.608"), "S400": Fraction("393.216")}[bus["speed"]]
     base = Fraction("98.304")
     clock = rate if model == "paper" else base
-    hops = nodes if bus["max_hops"] is None else bus["max_hops"]
-    gap = bus["gap_count"]
-    if gap == "optimal":
-        gap = GAP_COUNTS[hops - 1] if hops <= 23 else 63
+    hops, gap = _setup(bus, nodes)
     phy_us = Fraction(14) / clock if bus["phy_delay_us"] is None else Fraction(bus["phy_delay_us"])
     way_us = hops * (Fraction("0.023") * Fraction(bus["cable_length_m"]) / Fraction("4.5") + phy_us)
     arbitration_us = way_us + Fraction(4 * gap) / clock + Fraction("1.63")
@@ -42,12 +39,8 @@ def exact_required_us(profile: Profile, model: str, nodes: int, *, extra_us: flo
     host_us = Fraction(data["host"]["transaction_us"])
 
     def packets(kind: str, size: int) -> tuple[int, int]:
-        if model == "paper":
-            return size + payload["overhead_bytes"], size + payload["overhead_bytes"]
-        padded = -(-size // 4) * 4
-        if kind == "read":
-            return (16, 20) if size == 4 else (20, 24 + padded)
-        return (20, 16) if size == 4 else (24 + padded, 16)
+        paper_bytes = size + int(payload["overhead_bytes"])
+        return (paper_bytes, paper_bytes) if model == "paper" else _standard_packets(kind, size)
 
     def data_us(size: int) -> Fraction:
         return way_us + Fraction(8 * size) / rate
@@ -60,17 +53,17 @@ def exact_required_us(profile: Profile, model: str, nodes: int, *, extra_us: flo
         answer = node[f"{kind}_response"]
         if model == "paper":
             both_us = half_us + arbitration_us + data_us(response) + acknowledge_us
-            return both_us + execution_us + Fraction(82 + 48 * gap) / clock
+            return Fraction(both_us + execution_us + Fraction(82 + 48 * gap) / clock)
         if answer == "unified":
             return half_us + max(reset_us, host_us)
         if answer == "concatenated":
             second_us = Fraction(node["response_us"]) + data_us(response) + acknowledge_us
-            return half_us + second_us + max(reset_us, host_us)
+            return Fraction(half_us + second_us + max(reset_us, host_us))
         # Any faster node, too: the largest lies at an end or just below the arbitration reset gap.
         most_us = execution_us + Fraction(execution["worst_extra_us"])
         first_us = reset_us if nodes == 1 else max(sub_us, min(most_us, reset_us))
         waits_us = max(first_us + max(reset_us, host_us), most_us + max(sub_us, host_us))
-        return half_us + arbitration_us + data_us(response) + acknowledge_us + waits_us
+        return Fraction(half_us + arbitration_us + data_us(response) + acknowledge_us + waits_us)
 
     total = Fraction(cycle["nonperiodic_us"]) + nodes * (transaction_us("read") + transaction_us("write"))
     if model == "paper":
@@ -82,13 +75,34 @@ def exact_required_us(profile: Profile, model: str, nodes: int, *, extra_us: flo
     total += Fraction(extra_us)
     if bus["cycle_master"]:
         start_us = reset_us + arbitration_us + way_us + Fraction(160) / base + Fraction(bus["isochronous_us"])
-        starts = 1
-        if start_us > 124:  # no time is left: a broken limit, and any finite number
-            starts = total // 1 + 1
-        while start_us <= 124 and starts != (total + starts * start_us) // 125 + 1:
-            starts += 1
-        total += starts * start_us
-    return total
+        total += _number_of_starts(total, start_us) * start_us
+    return Fraction(total)
+
+
+def _setup(bus: dict[str, Any], nodes: int) -> tuple[int, int]:
+    """Hops, and gap count in force."""
+    hops = int(nodes if bus["max_hops"] is None else bus["max_hops"])
+    if bus["gap_count"] == "optimal":
+        return hops, GAP_COUNTS[hops - 1] if hops <= 23 else 63
+    return hops, int(bus["gap_count"])
+
+
+def _standard_packets(kind: str, size: int) -> tuple[int, int]:
+    """Bytes of request and response."""
+    padded = -(-size // 4) * 4
+    if kind == "read":
+        return (16, 20) if size == 4 else (20, 24 + padded)
+    return (20, 16) if size == 4 else (24 + padded, 16)
+
+
+def _number_of_starts(others_us: Fraction, start_us: Fraction) -> int:
+    """The smallest fixed point; where no time is left, which is a broken limit, any finite number."""
+    if start_us > 124:
+        return int(others_us) + 1
+    starts = 1
+    while starts != (others_us + starts * start_us) // 125 + 1:
+        starts += 1
+    return starts
 
 
 def table_1_residuals_us() -> list[float]:
@@ -103,10 +117,7 @@ def exact_safe_required_us(profile: Profile, nodes: int) -> Fraction:
     data = profile.model_dump()
     bus, node, host, retries = data["bus"], data["node"], data["host"], data["cycle"]["retries"]
     execution = node["execution"]
-    hops = nodes if bus["max_hops"] is None else bus["max_hops"]
-    gap = bus["gap_count"]
-    if gap == "optimal":
-        gap = GAP_COUNTS[hops - 1] if hops <= 23 else 63
+    hops, gap = _setup(bus, nodes)
     is_fitted = execution["residual"] == "standard"
     mean_us, spread_us = 0.0, 0.0
     if not is_fitted:
@@ -174,10 +185,7 @@ def exact_cycle_start_us(profile: Profile, nodes: int) -> Fraction:
     bus = profile.bus
     if not bus.cycle_master:
         return Fraction(0)
-    hops = nodes if bus.max_hops is None else bus.max_hops
-    gap = bus.gap_count
-    if gap == "optimal":
-        gap = GAP_COUNTS[hops - 1] if hops <= 23 else 63
+    hops, gap = _setup(bus.model_dump(), nodes)
     phy_us = Fraction(14) / Fraction("98.304") if bus.phy_delay_us is None else Fraction(bus.phy_delay_us)
     hop_us = Fraction("0.023") * Fraction(bus.cable_length_m) / Fraction("4.5") + phy_us
     gaps_us = Fraction(53 + 32 * gap + 4 * gap + 160) / Fraction("98.304") + Fraction("1.63")

@@ -56,7 +56,7 @@ def test_there_is_always_a_way_unless_a_bound_is_reached(
     # With linear execution times a payload can shrink, a period grow and a chain become a tree.
     profile = data.draw(any_profile)
     # Nothing that is advised makes a cycle start shorter; a gap count that is safe can make it longer.
-    repaired = override(profile, bus_of(profile).repairs(network_of(profile)))
+    repaired = override(profile, dict(bus_of(profile).repairs(network_of(profile))))
     assume("cycle starts" not in broken_limits(repaired))
     verdict = verdicts(capacity(profile))[0]
     assert verdict.all_well or verdict.change is not None

@@ -32,7 +32,11 @@ def brute_force(profile: Profile, model: str, exact: Exact, start: Start) -> int
     for nodes in range(1, 63):
         hops = nodes if profile.bus.max_hops is None else profile.bus.max_hops
         # A float's rounding in the product of two floats is no reason to refuse an exact fit.
-        if hops <= 16 and start(profile, nodes) <= 124 and exact(profile, model, nodes) <= available * (1 + Fraction(1, 10**12)):
+        if (
+            hops <= 16
+            and start(profile, nodes) <= 124
+            and exact(profile, model, nodes) <= available * (1 + Fraction(1, 10**12))
+        ):
             answer = nodes
     return answer
 

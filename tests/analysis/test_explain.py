@@ -284,7 +284,7 @@ def another(profile: Profile, key: str) -> Profile | None:
     value: Any = profile
     for part in key.split("."):
         value = getattr(value, part)
-    if key == "bus.isochronous_us" and not profile.bus.cycle_master:  # type: ignore[attr-defined]  # of its kind
+    if key == "bus.isochronous_us" and not profile.bus.cycle_master:
         return None
     if key == "servo.loop":
         return override(profile, {key: "host" if value == "node" else "node"})

@@ -70,7 +70,8 @@ def test_every_phase_of_a_shipped_profile_stands_in_the_order_of_the_protocol(na
     wanted: list[tuple[object, ...]] = [("sync", None, None, None)]
     read, _ = (one.phases for one in Ieee1394Cycle(network_of(profile), model).exchanges)
     # A gap is a threshold: what of it has run while the node executes is not waited for again.
-    before, behind = (), ("subaction_gap", "arbitration_reset_gap")
+    before: tuple[str, ...] = ()
+    behind: tuple[str, ...] = ("subaction_gap", "arbitration_reset_gap")
     if model == "standard":
         before = () if read.execution_us >= read.subaction_gap_us else ("subaction_gap",)
         behind = ("subaction_gap",) if read.execution_us > read.arbitration_reset_gap_us else ("arbitration_reset_gap",)
@@ -116,11 +117,17 @@ def test_figure_4_of_the_paper_by_hand(make: Maker) -> None:
     ("changes", "idle"),
     [
         # The response waits for the rest of T_sub, and no idle period has ended the interval before the next request.
-        ({"node__execution__base_us": 4.0}, [("subaction_gap", 1037 / 98.304 - 4), ("arbitration_reset_gap", 21.04696)]),
+        (
+            {"node__execution__base_us": 4.0},
+            [("subaction_gap", 1037 / 98.304 - 4), ("arbitration_reset_gap", 21.04696)],
+        ),
         # The node takes longer than T_sub, less than T_reset: the response goes at once.
         ({"node__execution__base_us": 15.0}, [("arbitration_reset_gap", 21.04696)]),
         # It takes longer than T_reset; one that took just that would need T_reset again: 2 T_reset - 25 - T_sub.
-        ({"node__execution__base_us": 25.0}, [("subaction_gap", 10.54891), ("allowance", 2 * 21.04696 - 25 - 10.54891)]),
+        (
+            {"node__execution__base_us": 25.0},
+            [("subaction_gap", 10.54891), ("allowance", 2 * 21.04696 - 25 - 10.54891)],
+        ),
         ({"node__execution__base_us": 40.0}, [("subaction_gap", 10.54891)]),
         ({"node__execution__worst_extra_us": 40.0, "node__execution__base_us": 0.0}, [("subaction_gap", 10.54891)]),
         ({"node__read_response": "concatenated"}, [("arbitration_reset_gap", 21.04696)]),

@@ -45,7 +45,9 @@ def test_smallest_ratio(data: st.DataObject, any_profile: st.SearchStrategy[Prof
 
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
-def test_smallest_period_of_the_bus(data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely) -> None:
+def test_smallest_period_of_the_bus(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely
+) -> None:
     profile = data.draw(any_profile)
     required = safely(profile, profile.bus.nodes)
     ratio = profile.cycle.slice_ratio

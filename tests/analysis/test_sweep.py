@@ -92,7 +92,7 @@ def assert_rows_are_those_of_capacity(profile: Profile, grid: Grid, *, chunk_poi
 def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
     strategies = {**FLOATS, **COUNTS, **WORDS}
-    if profile.bus.isochronous_us:  # type: ignore[attr-defined]  # of its kind
+    if profile.bus.isochronous_us:
         del strategies["bus.cycle_master"]
     if data.draw(st.booleans()):
         changes: dict[str, object] = {"node.execution": TABLE, "payload.read_bytes": 4, "payload.write_bytes": 40}
@@ -163,7 +163,10 @@ def test_a_chunk_of_a_huge_axis_is_no_larger_than_asked() -> None:
         ({"bus.nods": Listed((1,))}, "--vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
         ({"bsu.nodes": Listed((1,))}, "--vary bsu.nodes: no such key of this profile; did you mean bus.nodes?"),
         ({"node.execution": Listed((1,))}, "--vary node.execution: is a section; expected the key of one number"),
-        ({"node.execution.per_byte_us": Listed((1,))}, "known in node.execution are residual, measured_gap_count, grade, uncertainty_us, worst_extra_us, kind, payload"),
+        (
+            {"node.execution.per_byte_us": Listed((1,))},
+            "known in node.execution are residual, measured_gap_count, grade, uncertainty_us, worst_extra_us, kind",
+        ),
         ({"node.execution.time_us": Listed((1,))}, "--vary node.execution.time_us: is a list"),
         ({"bus.nodes": Listed((1, 0))}, "bus.nodes 0: must be 1 or more"),
         ({"bus.nodes": Listed((1, 2.5))}, "bus.nodes 2.5: expected a whole number"),

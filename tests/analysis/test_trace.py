@@ -18,8 +18,8 @@ from busplan.buses.ieee1394 import equations
 from busplan.elementwise import choose
 from busplan.sourced import EQUATIONS
 
-# As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each, are
-# equations of their own. The sum in (2) is one quantity here: a bus of another kind has other terms.
+# As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
+# are equations of their own. The sum in (2) is one quantity here: a bus of another kind has other terms.
 PRINTED = {
     "time_slice_us": "alpha T_s / N",
     "required_time_slice_us": "T_need / N",

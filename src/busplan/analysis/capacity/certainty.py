@@ -60,7 +60,8 @@ def certainty(cycle: BusCycle) -> Certainty:
         bias_us=None if bias_us is None else longer_us,
         margin_corrected_us=available_us(network) - biased_us,
         uncertainty_us=uncertain_us,
-        safe_required_us=(biased_us + named(uncertain_us, UNCERTAINTY.key, UNCERTAINTY.symbol)) / (1 - network.profile.limits.reserve),
+        safe_required_us=(biased_us + named(uncertain_us, UNCERTAINTY.key, UNCERTAINTY.symbol))
+        / (1 - network.profile.limits.reserve),
         doubts=doubts,
     )
 

@@ -56,8 +56,8 @@ _CIRCLE: Final = tuple(
 def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
     """Figures of the plan: the verdict of the model that decides, and what all models share.
 
-    A longer period or one more node is a choice, neither good nor bad by itself. Nor is the bias or the uncertainty: the
-    corrected margin and the smallest safe period have them.
+    A longer period or one more node is a choice, neither good nor bad by itself. Nor are the bias and the uncertainty:
+    the corrected margin and the smallest safe period have them.
     """
     setup = by_key(figure for bus in buses for figure in bus.setup_figures)
     return (

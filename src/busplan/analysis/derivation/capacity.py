@@ -167,9 +167,7 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
         return found(verdict.models_agree, "a comparison: fits is the same under every timing model", fits)
     # The report fills in the values of changes and sentences.
     if key == "cheapest_change":
-        purpose = (
-            "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"
-        )
+        purpose = "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"
         words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
         return found(None, words, (*judged, *safe))
     warned: tuple[Operand, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)

@@ -174,11 +174,7 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
         one
         for one in found.values()
         if one.grade != "given"
-        or (
-            one.name.startswith("node.execution.")
-            and one.name not in choices
-            and not one.source.startswith("default")
-        )
+        or (one.name.startswith("node.execution.") and one.name not in choices and not one.source.startswith("default"))
     )
     return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 
