@@ -1,6 +1,7 @@
 """How sure a verdict is: by hand, against a Monte Carlo of the inputs, and what may never make it better."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from math import sqrt
 from typing import Any
 
@@ -60,6 +61,19 @@ def test_six_nodes_by_hand(make: Maker, gap_count: int, required_us: float, bias
     # At gap count 63, T_exec lies between T_reset and twice T_reset less T_sub in neither case.
     assert {doubt.key: float(doubt.us) for doubt in one.doubts} == pytest.approx(parts_us, rel=1e-4)
     assert one.uncertainty_us == pytest.approx(2 * sqrt(sum(us**2 for us in parts_us.values())), rel=1e-4)
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data(), nodes=st.integers(1, 62), reserve=st.floats(0.0, 0.9))
+def test_what_a_slice_must_give_is_what_the_second_implementation_says(
+    data: st.DataObject,
+    nodes: int,
+    reserve: float,
+    any_profile: st.SearchStrategy[Profile],
+    safely: Callable[[Profile, int], Fraction],
+) -> None:
+    profile = override(data.draw(any_profile), {"limits.reserve": reserve, "bus.nodes": nodes})
+    assert of(profile).safe_required_us == pytest.approx(float(safely(profile, nodes)), rel=1e-12)
 
 
 def test_two_nodes_of_the_paper_by_hand(make: Maker) -> None:

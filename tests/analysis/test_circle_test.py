@@ -77,11 +77,28 @@ def test_a_cycle_that_does_not_fit_fails_before_any_simulation(small: Profile) -
     assert result.setpoints > 0
 
 
-def test_the_deciding_model_decides_whether_there_is_a_circle(small: Profile) -> None:
-    # Between what the paper's clock and the standard's clock need.
-    tight = override(small, {"cycle.period_us": 500, "servo.step_us": 100})
-    assert not only(tight).bus_fits
-    assert only(override(tight, {"bus.timing_model": "paper"})).bus_fits
+@pytest.mark.parametrize("own", ["paper", "standard"])
+def test_one_model_decides_whether_there_is_a_circle(small: Profile, own: str) -> None:
+    # 250 us lie between the 197.0 that paper needs and the 253.2 of standard.
+    tight = override(small, {"cycle.period_us": 500, "servo.step_us": 100, "bus.timing_model": own})
+    result = only(tight)
+    assert (result.timing_model, result.bus_fits, result.stable) == ("standard", False, None)
+    assert figures(tight, model="paper").fits
+
+
+def test_a_circle_that_the_bus_is_not_shown_to_carry_is_simulated_and_fails(small: Profile) -> None:
+    # 280 us: over the 253.2 that are needed, under the 287.5 that show it.
+    tight = override(small, {"cycle.period_us": 560, "servo.step_us": 80})
+    result, capacity = only(tight), figures(tight, model="standard")
+    assert (result.bus_fits, result.verdict, result.stable, result.passed) == (True, "not shown to fit", True, False)
+    assert [(one.name, one.value, one.limit) for one in result.failures] == [
+        ("safe_required_us", capacity.safe_required_us, capacity.available_us)
+    ]
+    assert result.failures[0].text == (
+        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve 287.499 us needed of 280.000 us"
+    )
+    # 290 us show it.
+    assert only(override(tight, {"cycle.period_us": 580, "servo.step_us": 20})).verdict == "fits"
 
 
 @pytest.mark.parametrize(

@@ -18,16 +18,17 @@ from busplan.buses.ieee1394 import equations
 from busplan.elementwise import choose
 from busplan.sourced import EQUATIONS
 
-# As the paper prints them, in this program's symbols; hop is written out as the paper does. The sum in (2) is one
-# quantity here: a bus of another kind has other terms.
+# As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
+# are equations of their own. The sum in (2) is one quantity here: a bus of another kind has other terms.
 PRINTED = {
     "time_slice_us": "alpha T_s / N",
     "required_time_slice_us": "T_need / N",
     "transaction_latency_us": "T_req + T_ack1 + T_exec + T_resp + T_ack2",
-    "hop_delay_us": "0.023 L / 4.5 + 14 / C",
-    "arbitration_phase_us": "(0.023 L / 4.5 + 14 / C) H + 4 g / C + 1.63",
-    "data_phase_us": "(0.023 L / 4.5 + 14 / C) H + 8 B / R",
-    "acknowledge_phase_us": "(0.023 L / 4.5 + 14 / C) H + 0.25",
+    "phy_delay_us": "14 / C",
+    "hop_delay_us": "0.023 L / 4.5 + T_phy",
+    "arbitration_phase_us": "hop H + 4 g / C + 1.63",
+    "data_phase_us": "hop H + 8 B / R",
+    "acknowledge_phase_us": "hop H + 0.25",
     "request_us": "ArbP + DTP",
     "response_us": "ArbP + DTP",
     "acknowledge_us": "AckP",

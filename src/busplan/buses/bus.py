@@ -199,15 +199,17 @@ class BusCycle(ABC):
         """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
         return total(term.us for term in self.terms)
 
-    def required_with(self, extra_us: Number) -> Number:
-        """What the whole cycle needs if what it transmits takes longer [us].
+    def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
+        """What the whole cycle grows by if what it transmits takes longer [us].
 
         Parameters
         ----------
         extra_us
-            By how much [us].
+            By how much it takes longer [us].
+        after_us
+            By how much it took longer before [us].
         """
-        return self.required_us + extra_us
+        return extra_us
 
     def bias_us(self) -> Number | None:
         """What the bus takes beyond the timing model, on the mean [us]; None where nobody has measured it."""
@@ -282,6 +284,8 @@ class Bus(ABC):
     """Keys of a profile whose default is a figure with a source."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""
+    choosing_keys: ClassVar[tuple[str, ...]] = ("node.execution.grade",)
+    """Keys whose word chooses between numbers by `choose`, so that a derivation has them among its inputs."""
     warning_keys: ClassVar[tuple[str, ...]] = ()
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()

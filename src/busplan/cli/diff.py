@@ -104,6 +104,7 @@ def _models(timing: str, one: "Profile", other: "Profile") -> "tuple[str, ...] |
         raise BusplanError(
             f"--timing {timing}: the kinds of bus, {kinds}, have no timing model in common; leave it out"
         )
+    timing_models(timing, other)  # refuses a model that cannot express this one
     return timing_models(timing, one)
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from busplan.elementwise import Number, interpolated
+from busplan.elementwise import Number, choose, interpolated
 from busplan.sections.base import Bytes, Problem, Section, TimeUs, refused
 from busplan.sourced import Sourced
 
@@ -22,6 +22,7 @@ MEASURED_UNCERTAINTY_US: Final = Sourced(
     grade="derived",
     source="one digit of 0.1 us, rectangular (JCGM 100, 4.3.7)",
     meaning="standard uncertainty of a measured execution time",
+    symbol="u(T_exec)",
 )
 DERIVED_UNCERTAINTY_US: Final = Sourced(
     1 / 3**0.5,
@@ -29,6 +30,7 @@ DERIVED_UNCERTAINTY_US: Final = Sourced(
     grade="derived",
     source="1 us either way, rectangular (JCGM 100, 4.3.7)",
     meaning="standard uncertainty of an execution time derived from measured figures",
+    symbol="u(T_exec)",
 )
 
 
@@ -55,9 +57,8 @@ class GradedExecution(Section):
         """
         if self.uncertainty_us is not None:
             return self.uncertainty_us
-        by_grade = {"measured": MEASURED_UNCERTAINTY_US, "derived": DERIVED_UNCERTAINTY_US}
-        known = by_grade.get(self.grade or "")
-        return UNKNOWN_SHARE * execution_us if known is None else known
+        other_us = choose(self.grade == "derived", DERIVED_UNCERTAINTY_US, UNKNOWN_SHARE * execution_us)
+        return choose(self.grade == "measured", MEASURED_UNCERTAINTY_US, other_us)
 
 
 class LinearExecution(GradedExecution):

@@ -10,6 +10,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME, available_us, fits_in
 from busplan.analysis.network import bus_of
 from busplan.buses.bus import BusCycle, Doubt, Limit
+from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
 from busplan.elementwise import Number, choose, named, total
 
@@ -52,13 +53,15 @@ def certainty(cycle: BusCycle) -> Certainty:
     extra_us: Number = 0.0 if bias_us is None else bias_us
     combined_us = total(one.us * one.us for one in doubts) ** 0.5
     expanded_us = COVERAGE * named(combined_us, "combined_uncertainty_us", "u_c")
-    biased_us = cycle.required_with(extra_us)
-    bounded_us = cycle.required_with(extra_us + expanded_us)
+    longer_us = cycle.added_us(extra_us)
+    uncertain_us = cycle.added_us(expanded_us, after_us=extra_us)
+    biased_us = cycle.required_us + named(longer_us, BIAS.key, BIAS.symbol)
     return Certainty(
-        bias_us=None if bias_us is None else biased_us - cycle.required_us,
+        bias_us=None if bias_us is None else longer_us,
         margin_corrected_us=available_us(network) - biased_us,
-        uncertainty_us=bounded_us - biased_us,
-        safe_required_us=bounded_us / (1 - network.profile.limits.reserve),
+        uncertainty_us=uncertain_us,
+        safe_required_us=(biased_us + named(uncertain_us, UNCERTAINTY.key, UNCERTAINTY.symbol))
+        / (1 - network.profile.limits.reserve),
         doubts=doubts,
     )
 

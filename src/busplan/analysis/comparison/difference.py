@@ -56,7 +56,8 @@ _CIRCLE: Final = tuple(
 def plan_figures(*buses: Bus) -> tuple[Figure, ...]:
     """Figures of the plan: the verdict of the model that decides, and what all models share.
 
-    A longer period or one more node is a choice, neither good nor bad by itself.
+    A longer period or one more node is a choice, neither good nor bad by itself. Nor are the bias and the uncertainty:
+    the corrected margin and the smallest safe period have them.
     """
     setup = by_key(figure for bus in buses for figure in bus.setup_figures)
     return (
@@ -176,8 +177,8 @@ def difference(
     a, b
         The profiles; B is judged against A.
     timing_models
-        Timing models, in this order; by default all of the kind of bus. If the kinds differ, the models that decide
-        are compared.
+        Timing models, in this order; by default all that can express both profiles. If the kinds differ, the models
+        that decide are compared.
     circle
         Function that runs the circle test; it is called if either profile asks for a circle. None for no circle tests.
 
@@ -228,7 +229,8 @@ def _figures(
     buses = (bus_of(a), bus_of(b))
     yield from _compared("plan", plan_figures(*buses), _plan(a), _plan(b))
     deciding = (("deciding", buses[0].deciding_model, buses[1].deciding_model),)
-    models = model_names(a) if timing_models is None else timing_models
+    common = tuple(model for model in model_names(a) if model in model_names(b))
+    models = common if timing_models is None else timing_models
     pairs = tuple((model, model, model) for model in models) if buses[0] is buses[1] else deciding
     for part, of_a, of_b in pairs:
         yield from _compared(part, cycle_figures(*buses), _cycle(a, of_a), _cycle(b, of_b))

@@ -90,7 +90,7 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
         plain.safe_nodes,
         "a search: the largest whole N with T_safe <= alpha T_s, on a bus set safely for N, within the limits of "
         f"{_limit_names(bus)}",
-        (*_limits(bus, beyond), needed_us, available_us(network)),
+        (*_limits(bus, beyond, with_safety=True), needed_us, available_us(network)),
     ).named("safe_nodes", known["safe_nodes"].symbol)
     named |= {
         "safe_nodes": most,
@@ -105,7 +105,12 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
             f"{short((plain.margin_corrected_us or 0) + (plain.uncertainty_us or 0))}, broken: "
             f"{', '.join(plain.exceeded) or 'none'}"
         ),
-        parts=(named["safe_required_us"], named["margin_corrected_us"], named["uncertainty_us"]),
+        parts=(
+            named["safe_required_us"],
+            named["margin_corrected_us"],
+            named["uncertainty_us"],
+            *_limits(bus, network),
+        ),
     )
     return named
 
@@ -114,9 +119,10 @@ def _limit_names(bus: Bus) -> str:
     return " and ".join(limit.key for limit in bus.limits if not limit.is_safety)
 
 
-def _limits(bus: Bus, network: Network) -> tuple[Operand, ...]:
+def _limits(bus: Bus, network: Network, *, with_safety: bool = False) -> tuple[Operand, ...]:
     """Values and bounds of the limits of the bus."""
-    pairs = ((limit.value(network), limit.most(network)) for limit in bus.limits if not limit.is_safety)
+    limits = (limit for limit in bus.limits if with_safety or not limit.is_safety)
+    pairs = ((limit.value(network), limit.most(network)) for limit in limits)
     return tuple(one for pair in pairs for one in pair)
 
 
@@ -155,6 +161,7 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     (verdict,) = verdicts(capacity(profile, timing_models=(model, *others)))
     bus, derived = bus_of(profile), [capacity_figures(profile, model=name) for name in model_names(profile)]
     fits = tuple(figures["fits"] for figures in derived)
+    judged = tuple(figures[key] for figures in derived for key in ("verdict", "safe_nodes") if key in figures)
     safety = () if bus.safety_figure is None else (bus.safety_figure.key,)
     safe = tuple(figures[key] for figures in derived for key in safety)
     if key == "models_agree":
@@ -165,10 +172,9 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     # The report fills in the values of changes, lists and sentences.
     if key in _OF_DOCUMENT:
         return found(None, _SENTENCES, (deciding["uncertainty_us"],))
-    decided = (deciding["verdict"], deciding["safe_nodes"])
     if key == "cheapest_change":
-        purpose = "carries more nodes" if verdict.all_well else "is shown to fit on a bus that is set safely"
+        purpose = "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"
         words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
-        return found(None, words, (*decided, *safe))
+        return found(None, words, (*judged, *safe))
     warned: tuple[Operand, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
-    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *decided, *safe, *warned))
+    return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *judged, *safe, *warned))

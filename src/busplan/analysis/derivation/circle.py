@@ -24,11 +24,15 @@ _GIVEN: Final = {
     "radius_mm": "circle.radius_mm",
     "step_us": "servo.step_us",
     "loop": "servo.loop",
-    "timing_model": "bus.timing_model",
     "servo_grade": "servo.grade",
 }
 """Figures that are keys of the profile."""
-_OF_BUS: Final = {"bus_fits": "fits", "required_us": "required_us", "available_us": "available_us"}
+_OF_BUS: Final = {
+    "bus_fits": "fits",
+    "verdict": "verdict",
+    "required_us": "required_us",
+    "available_us": "available_us",
+}
 """Figures that `capacity` has, too, with their key there."""
 _PATH: Final = ("duration_s", "setpoints", "steps")
 _LOOP: Final = ("stable", "phase_margin_deg", "gain_margin_db", "crossover_hz")
@@ -73,9 +77,10 @@ def circle_figures(
     """
     test = circle_test(profile, with_contributions=with_contributions, explain=False, progress=progress)
     (result,) = test.results
-    bus = capacity_figures(profile, model=profile.bus.timing_model)
+    bus = capacity_figures(profile, model=result.timing_model)
     derived = {
         **{key: traced(profile, given) for key, given in _GIVEN.items()},
+        "timing_model": found(result.timing_model, "the timing model that decides, whichever leads", ()),
         **{key: bus[own] for key, own in _OF_BUS.items()},
         "delay_us": _delay(profile, result, bus["required_us"]),
     }
@@ -107,10 +112,10 @@ def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Tra
         return found(value, _WAYS[key], tuple(_path_inputs(profile, key)))
     if not result.bus_fits:
         words = _WAYS[key] if key in _VERDICT else "not simulated: the cycle does not fit the bus"
-        return found(value, words, (bus["fits"],))
+        return found(value, words, (bus["fits"], bus["verdict"]) if key in _VERDICT else (bus["fits"],))
     parts = _loop_inputs(profile) if key in _LOOP else _simulation_inputs(profile)
     delay = (_delay(profile, result, bus["required_us"]),) if result.loop == "host" or key in _LOOP else ()
-    verdict = (bus["fits"], *_tolerances(profile)) if key in _VERDICT else ()
+    verdict = (bus["fits"], bus["verdict"], *_tolerances(profile)) if key in _VERDICT else ()
     return found(value, _WAYS.get(key, _SIMULATION), (*parts, *delay, *verdict))
 
 

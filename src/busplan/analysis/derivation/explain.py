@@ -160,15 +160,23 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
     """
     found: dict[str, Input] = {}
     for model in model_names(profile):
-        for one in inputs(capacity_figures(profile, model=model)["fits"]):
-            found.setdefault(one.name, one)
+        figures = capacity_figures(profile, model=model)
+        for key in ("fits", "verdict"):
+            for one in inputs(figures[key]) if key in figures else ():
+                found.setdefault(one.name, one)
     if profile.asks_for_circle:
         from busplan.analysis.derivation.circle import simulated_inputs  # loads the simulation, and numpy with it
 
         for one in simulated_inputs(profile):
             found.setdefault(one.name, one)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
-    known = (one for one in found.values() if one.grade != "given" or one.name.startswith("node.execution."))
+    choices = bus_of(profile).choosing_keys
+    known = (
+        one
+        for one in found.values()
+        if one.grade != "given"
+        or (one.name.startswith("node.execution.") and one.name not in choices and not one.source.startswith("default"))
+    )
     return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 
 

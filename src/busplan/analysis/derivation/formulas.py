@@ -94,7 +94,7 @@ def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[
     if operand.operation == CHOSEN:
         won = operand.parts[0]
         if isinstance(won, Sourced) and not in_numbers:
-            return _atom(won.meaning)
+            return _atom(won.symbol or won.meaning)
         return _written(won, in_numbers=in_numbers)
     return _joined(operand, [_written(part, in_numbers=in_numbers) for part in operand.parts], in_numbers=in_numbers)
 

@@ -62,10 +62,11 @@ def given(profile: Profile, key: str) -> Input:
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
-    # What is off by default is nobody's measurement.
-    grade = "given" if own_grade is None or (not is_set and not value) else own_grade
-    source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     bus = bus_of(profile)
+    # What is off by default is nobody's measurement, and a word that chooses is none.
+    is_no_measurement = (not is_set and not value) or key in bus.choosing_keys
+    grade = "given" if own_grade is None or is_no_measurement else own_grade
+    source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
     default = bus.key_sources.get(key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
@@ -82,13 +83,17 @@ def traced(profile: Profile, key: str) -> Traced:
 
 
 def traced_profile(profile: Profile) -> Profile:
-    """Return a copy with traced numbers in all keys that the cycle may depend on, unvalidated."""
+    """Return a copy with traced numbers in all keys that the cycle may depend on, unvalidated.
+
+    So are words that choose between numbers.
+    """
     found = profile
     for key in cycle_keys(profile.bus.kind):
         value: Any = profile
         for part in key.split("."):
             value = getattr(value, part, None)
-        if isinstance(value, int | float) and not isinstance(value, bool):
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number or (isinstance(value, str) and key in bus_of(profile).choosing_keys):
             found = with_unchecked(found, key, traced(profile, key))
     execution = profile.node.execution
     if isinstance(execution, TableExecution):

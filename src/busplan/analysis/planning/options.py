@@ -129,7 +129,7 @@ def plan(
     >>> from busplan.profile.shipped import load
     >>> found = plan(load("paper-1ms").profile, wanted={"bus.nodes": 4})
     >>> found.recommended.is_plan, round(found.recommended.deciding.margin_us, 1)
-    (True, 143.1)
+    (True, 106.1)
     """
     asked = dict(wanted or {})
     goal = override(profile, dict(asked))

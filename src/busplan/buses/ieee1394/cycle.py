@@ -134,7 +134,8 @@ class Ieee1394Cycle(BusCycle):
         for one in self.exchanges:
             by_term: dict[str, list[Number]] = {}
             for part in one.parts:
-                by_term.setdefault(part.term, []).append(part.us)
+                if not _is_nothing(part.us):
+                    by_term.setdefault(part.term, []).append(part.us)
             for term, parts_us in by_term.items():
                 own[term] = own[term] + one.nodes * _sum(parts_us)
         retries_us = 0.0 if self.model == "paper" else self.retries_us
@@ -149,13 +150,13 @@ class Ieee1394Cycle(BusCycle):
             starts_us = self.starts(total(one.us for one in others)) * self.cycle_start_us
         return (Term("cycle_starts_us", starts_us), *others)
 
-    def required_with(self, extra_us: Number) -> Number:
-        """What the cycle needs if its transactions take longer: then there are more cycle starts, too [us]."""
-        _, *others = self.terms
-        others_us = total(one.us for one in others)
+    def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
+        """What the cycle grows by if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
-            return others_us + extra_us
-        return others_us + extra_us + self.starts(others_us + extra_us) * self.cycle_start_us
+            return extra_us
+        before_us = total(one.us for one in self.terms[1:]) + after_us
+        more = self.starts(before_us + extra_us) - self.starts(before_us)
+        return extra_us + more * self.cycle_start_us
 
     def bias_us(self) -> Number | None:
         """What the transactions take beyond the model, on the mean [us]."""
@@ -252,6 +253,11 @@ class Ieee1394Cycle(BusCycle):
         if is_split and not profile.node.execution.worst_extra_us:
             found.append(LeftOut("the slowest execution", "node.execution.worst_extra_us"))
         return tuple(found)
+
+
+def _is_nothing(us: Number) -> bool:
+    """Whether a part is off, and no number that happens to be 0."""
+    return isinstance(us, float) and us == 0
 
 
 def _sum(parts_us: Sequence[Number]) -> Number:

@@ -22,7 +22,7 @@ from busplan.buses.ieee1394.table_1 import residual
 from busplan.buses.ieee1394.timing import Link
 from busplan.buses.ieee1394.transactions import PACKET_PARTS, Exchange
 from busplan.buses.network import Network
-from busplan.elementwise import Number, larger, named, total
+from busplan.elementwise import Number, choose, larger, named, total
 
 _RECTANGULAR = sqrt(3)
 """Half of a range over its standard uncertainty (JCGM 100, 4.3.7)."""
@@ -80,14 +80,16 @@ def of_cycle(
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
 
         def busy_at(steps: int) -> Number:
-            return busy_us(
+            found_us = busy_us(
                 answer,
                 gaps=gaps,
-                execution_us=bound_us + steps * execution_us,
-                host_us=own.host_us + steps * host_us,
+                execution_us=bound_us + steps * execution_us if steps else bound_us,
+                host_us=own.host_us + steps * host_us if steps else own.host_us,
             )
+            return named(found_us, "busy_us", f"busy{steps:+d}u" if steps else "busy")
 
-        return larger(busy_at(2) - busy_at(0), busy_at(0) - busy_at(-2)) / 2
+        above_us, own_us, below_us = busy_at(2), busy_at(0), busy_at(-2)
+        return larger(above_us - own_us, own_us - below_us) / 2
 
     return (
         Doubt("residual", "residual of Table I", halves * _spread_us(network)),
@@ -118,20 +120,20 @@ def _halves(exchanges: Sequence[Exchange], network: Network) -> Number:
 
 
 def _mean_us(network: Network) -> Number:
-    return 0.0 if _is_fitted(network) else residual().mean_us
+    return choose(_is_fitted(network), 0.0, residual().mean_us)
 
 
 def _spread_us(network: Network) -> Number:
-    return 0.0 if _is_fitted(network) else residual().uncertainty_us
+    return choose(_is_fitted(network), 0.0, residual().uncertainty_us)
 
 
-def _is_fitted(network: Network) -> bool:
-    """Whether the execution time holds the error of the model, because it was fitted against it."""
-    return bool(network.profile.node.execution.residual == "standard")
+def _is_fitted(network: Network) -> Number:
+    """Whether the execution time holds the error of the model, because it was fitted against it: a truth."""
+    return network.profile.node.execution.residual == "standard"
 
 
 def _gap_term_us(network: Network, gap_count: Number) -> Number:
     """Half of what the gap term changes from the gap count that was measured to the one in force: d [us]."""
-    measured = network.profile.node.execution.measured_gap_count if _is_fitted(network) else MAX_GAP_COUNT
+    measured = choose(_is_fitted(network), network.profile.node.execution.measured_gap_count, MAX_GAP_COUNT)
     ticks = ARBITRATION_GAP_TICKS / 2
     return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, "gap_term_us", "d")

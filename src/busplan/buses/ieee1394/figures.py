@@ -207,6 +207,13 @@ LATENCY: Final = (
     ),
     Figure("execution_us", "T_exec", "profile", "execution in the node, T3 of the bench", "execution T_exec = T3"),
     Figure(
+        "worst_extra_us",
+        "T_extra",
+        "profile",
+        "what the slowest execution takes beyond T_exec",
+        "slowest execution",
+    ),
+    Figure(
         "latency_us",
         "T_lant",
         by(eq.transaction_latency_us, eq.interval_latency_us),
@@ -236,13 +243,6 @@ LATENCY: Final = (
         by(eq.transaction_latency_us, eq.gaps_us),
         "the transaction and both gaps",
         "T_lant + T_sum",
-    ),
-    Figure(
-        "worst_extra_us",
-        "T_extra",
-        "profile",
-        "what the slowest execution takes beyond T_exec",
-        "slowest execution",
     ),
     Figure("idle_us", "idle", "idle", "idle bus of the gaps, beside execution", "idle bus"),
     Figure("host_us", "host", "profile", "the host's own time beyond the gaps", "host"),

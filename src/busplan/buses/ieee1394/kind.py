@@ -99,6 +99,7 @@ class Ieee1394(Bus):
         "cycle.sync.ping_us": "ping",
         "cycle.sync.ping_per_node_us": "ping_node",
     }
+    choosing_keys = ("node.execution.grade", "node.execution.residual")
     warning_keys = ("bus.cable_length_m",)
     warning_constants = (REFERENCE_CABLE_M,)
     structural_changes = ("speed", "wiring")

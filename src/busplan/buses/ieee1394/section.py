@@ -16,7 +16,7 @@ from busplan.buses.ieee1394.constants import (
     Speed,
 )
 from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.elementwise import Number
+from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection, SliceRatio
 from busplan.sections.execution import UNKNOWN_SHARE, LinearExecution, TableExecution
@@ -216,7 +216,10 @@ class Host(Section):
     @property
     def standard_uncertainty_us(self) -> Number:
         """Standard uncertainty u(host) [us]."""
-        return UNKNOWN_SHARE * self.transaction_us if self.uncertainty_us is None else self.uncertainty_us
+        if self.uncertainty_us is not None:
+            return self.uncertainty_us
+        # No time rests on no assumption.
+        return choose(self.transaction_us == 0, 0.0, UNKNOWN_SHARE * self.transaction_us)
 
 
 class Ieee1394Profile(Profile):
