@@ -137,7 +137,7 @@ def _section(one: Derivation, profile: str, at: str) -> Chapter:
 
 def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
     """The result in a sentence: one figure, or the keys that a change sets."""
-    if isinstance(one.value, dict):
+    if isinstance(one.value, dict) and "changes" in one.value:
         settings = (
             Sentence((Code(key), " = ", ShownValue(new, key, at=f"{at}/value/changes/{key}")))
             for key, new in one.value["changes"].items()
@@ -148,12 +148,13 @@ def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
 
 
 def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Words:
-    if value is None or value == []:
+    if value is None or value in ([], {}):
         return _NONE
     if isinstance(value, dict):
-        return Words(", ".join(f"{changed} = {new}" for changed, new in value["changes"].items()))
+        changes = value.get("changes", value)
+        return Words(", ".join(f"{changed} = {new}" for changed, new in changes.items()))
     if isinstance(value, list) and _has_names(value):
-        return Words(", ".join(str(one.get("name", one.get("source"))) for one in value))
+        return Words(", ".join(str(one.get("name", one.get("source", one.get("input")))) for one in value))
     return ShownValue(value, key, unit, digits=DIGITS, at=at)
 
 
