@@ -154,7 +154,7 @@ class Ieee1394Payload(PayloadSection):
     )
 
 
-class Residual(Section):
+class FittedExecution(Section):
     """What an execution time that was fitted against a timing model holds of that model's error."""
 
     residual: Literal["none", "paper", "standard"] = Field(
@@ -168,11 +168,11 @@ class Residual(Section):
     )
 
 
-class Ieee1394LinearExecution(LinearExecution, Residual):
+class Ieee1394LinearExecution(LinearExecution, FittedExecution):
     """Section [node.execution] of kind "linear": base_us + per_byte_us * payload."""
 
 
-class Ieee1394TableExecution(TableExecution, Residual):
+class Ieee1394TableExecution(TableExecution, FittedExecution):
     """Section [node.execution] of kind "table": measured times, linear between them, nothing beyond them."""
 
 
