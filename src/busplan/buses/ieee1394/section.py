@@ -125,10 +125,14 @@ class Sync(Section):
     """Section [cycle.sync]: the synchronous packet that opens a cycle, CTS of equation (2)."""
 
     ping_us: TimeUs = Field(
-        default=float(PING_US), description="Latency of a ping to one node, measured [us]", examples=[0.3]
+        default=float(PING_US),
+        description="Latency of a ping to one node, measured; of the paper model alone [us]",
+        examples=[0.3],
     )
     ping_per_node_us: TimeUs = Field(
-        default=float(PING_PER_NODE_US), description="What each further node adds, measured [us]", examples=[0.1]
+        default=float(PING_PER_NODE_US),
+        description="What each further node adds, measured; of the paper model alone [us]",
+        examples=[0.1],
     )
 
 
@@ -164,7 +168,9 @@ class FittedExecution(Section):
         examples=["standard"],
     )
     measured_gap_count: Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] = Field(
-        default=MAX_GAP_COUNT, description="Gap count of the bus that the latency was measured on", examples=[63]
+        default=MAX_GAP_COUNT,
+        description="Gap count of the bus that the latency was measured on; read with another residual than none",
+        examples=[63],
     )
 
 
@@ -196,7 +202,7 @@ class Ieee1394Node(NodeSection):
     response_us: Annotated[float, Field(ge=0, le=float(ARBITRATION_HOLD_US), allow_inf_nan=False)] = Field(
         default=float(ARBITRATION_HOLD_US),
         description="Time from the acknowledge to a concatenated response; hardware slower than MAX_BUS_HOLD, 1.63 us "
-        "(recalled), answers split [us]",
+        "(recalled), answers split. Other answers do not read it [us]",
         examples=[0.5],
     )
 
