@@ -119,14 +119,18 @@ def exact_safe_required_us(profile: Profile, nodes: int) -> Fraction:
     execution = node["execution"]
     hops, gap = _setup(bus, nodes)
     is_fitted = execution["residual"] == "standard"
-    mean_us, spread_us = 0.0, 0.0
-    if not is_fitted:
-        residuals_us = table_1_residuals_us()
-        mean_us, spread_us = fmean(residuals_us), stdev(residuals_us) * sqrt(1 + 1 / 8)
-    gap_term_us = 2 * ((execution["measured_gap_count"] if is_fitted else 63) - gap) / 98.304
+    residuals_us = table_1_residuals_us()
+    mean_us, spread_us = fmean(residuals_us), stdev(residuals_us) * sqrt(1 + 1 / 8)
+    gap_term_us = 2 * (63 - gap) / 98.304
+    # A fitted execution time holds the error of the transactions that have one, the split ones, and of no others.
+    split_mean_us, split_spread_us, split_gap_term_us = mean_us, spread_us, gap_term_us
+    if is_fitted:
+        split_mean_us, split_spread_us = 0.0, 0.0
+        split_gap_term_us = 2 * (execution["measured_gap_count"] - gap) / 98.304
     sub_us, reset_us = (29 + 16 * gap) / 98.304, (53 + 32 * gap) / 98.304
     answers = {kind: node[f"{kind}_response"] for kind in ("read", "write")}
-    halves = nodes * sum(1 if answer == "unified" else 2 for answer in answers.values()) + retries
+    split = nodes * sum(2 for answer in answers.values() if answer == "split")
+    others = nodes * sum({"split": 0, "unified": 1, "concatenated": 2}[answer] for answer in answers.values()) + retries
 
     def waits_us(answer: str, execution_us: float, host_us: float) -> float:
         if answer != "split":
@@ -159,13 +163,14 @@ def exact_safe_required_us(profile: Profile, nodes: int) -> Fraction:
     hop_delays = nodes * sum({"split": 6, "concatenated": 5, "unified": 3}[answer] for answer in answers.values())
     hop_delays += 2 + 3 * retries + 2 * _starts(profile, nodes)
     doubts_us = (
-        halves * spread_us,
-        halves * gap_term_us / sqrt(3),
+        split * split_spread_us + others * spread_us,
+        (split * split_gap_term_us + others * gap_term_us) / sqrt(3),
         nodes * sum(swing_us(kind, execution_us=execution_doubt_us(kind), host_us=0.0) for kind in answers),
         0.0 if bus["phy_delay_us"] is not None else hop_delays * hops * 0.020 / sqrt(3),
         nodes * sum(swing_us(kind, execution_us=0.0, host_us=host_doubt_us) for kind in answers),
     )
-    extra_us = halves * (mean_us + gap_term_us) + 2 * sqrt(sum(us**2 for us in doubts_us))
+    bias_us = split * (split_mean_us + split_gap_term_us) + others * (mean_us + gap_term_us)
+    extra_us = bias_us + 2 * sqrt(sum(us**2 for us in doubts_us))
     needed = exact_required_us(profile, "standard", nodes, extra_us=extra_us)
     return needed / (1 - Fraction(data["limits"]["reserve"]))
 

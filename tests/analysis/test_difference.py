@@ -22,7 +22,7 @@ Make = Callable[..., Profile]
 # Written down here a second time, on purpose: a direction that turns round lets regressions through.
 MORE = {
     "shown_to_fit", "gap_count_safe", "margin_corrected_us", "safe_nodes", "safe_axes", "fits", "margin_us",
-    "max_nodes", "max_axes", "passed", "stable", "phase_margin_deg", "gain_margin_db",
+    "max_nodes", "max_axes", "passed", "verdict", "stable", "phase_margin_deg", "gain_margin_db",
 }  # fmt: skip
 LESS = {
     "safe_min_period_us", "utilisation", "required_us", "min_period_us", "read_latency_us", "read_latency_with_gaps_us",
@@ -31,7 +31,7 @@ LESS = {
 }  # fmt: skip
 NEITHER = {
     "timing_model", "period_us", "nodes", "axes", "hops", "gap_count", "safe_gap_count", "available_us",
-    "time_slice_us", "limited_by", "binding_term", "servo_grade", "bias_us", "uncertainty_us", "verdict",
+    "time_slice_us", "limited_by", "binding_term", "servo_grade", "bias_us", "uncertainty_us",
     "safe_limited_by", "cycle_starts_us", "sync_us", "cycle_arbitration_us", "cycle_data_us", "cycle_acknowledge_us",
     "cycle_hold_us", "cycle_execution_us", "cycle_worst_extra_us", "cycle_idle_us", "cycle_host_us", "retries_us",
     "nonperiodic_us",
@@ -194,9 +194,9 @@ def test_only_the_models_asked_for_and_always_the_verdict(make: Make) -> None:
     shown = figure(found, "plan", "shown_to_fit")
     assert (shown.a, shown.b, shown.judgement) == (True, False, "worse")
     verdict = figure(found, "plan", "verdict")
-    assert (verdict.a, verdict.b, verdict.judgement) == ("fits", "not shown to fit", "neutral")
+    assert (verdict.a, verdict.b, verdict.judgement) == ("fits", "not shown to fit", "worse")
     assert figure(found, "paper", "fits").judgement == "same"
-    assert [one.figure.key for one in found.regressions(tolerance=1e9)] == ["shown_to_fit"]
+    assert [one.figure.key for one in found.regressions(tolerance=1e9)] == ["verdict", "shown_to_fit"]
 
 
 def test_a_model_that_cannot_express_both_is_not_compared(make: Make) -> None:

@@ -111,7 +111,15 @@ def test_the_registry_holds_every_key_of_the_results() -> None:
     (row,) = capacity_records(capacity(load("paper-4ms").profile, timing_models=["paper"]))
     assert tuple(row) == CAPACITY_KEYS
     assert set(FIGURES["capacity"]) == {
-        *(*CAPACITY_KEYS, "models_agree", "uncertainty_parts", "reserve", "not_in_it", "not_applicable"),
+        *(
+            *CAPACITY_KEYS,
+            "models_agree",
+            "verdict_after_reset",
+            "uncertainty_parts",
+            "reserve",
+            "not_in_it",
+            "not_applicable",
+        ),
         *("cheapest_change", "warnings", "text"),
     }
     assert set(FIGURES["circle-test"]) == set(CircleFigures._fields)
@@ -163,7 +171,8 @@ def test_an_execution_time_that_nobody_graded_comes_first(make: Make) -> None:
     first, *others = assumptions(make())
     assert (first.name, first.grade) == ("node.execution.base_us", "given")
     assert "given" not in {one.grade for one in others[1:]}
-    assert assumptions(make(node__execution__grade="measured"))[0].grade == "recalled"
+    first, second, *_ = assumptions(make(node__execution__grade="measured"))
+    assert (first.name, first.grade, second.grade) == ("PHY_DELAY_HALF_WIDTH_US", "assumed", "recalled")
 
 
 def test_a_warning_of_cables_rests_on_their_length(make: Make) -> None:
@@ -440,7 +449,7 @@ def test_assumptions_name_every_constant_of_both_models_and_of_the_circle() -> N
                 CONSTANTS[name].source,
             )
     order = [one.grade for one in assumptions(load("paper-4ms").profile)]
-    assert order[0] == "recalled"
+    assert order[:2] == ["assumed", "recalled"]
     assert "given" not in order
     assert found["cycle.sync.ping_us"].grade == "measured"
 
