@@ -22,6 +22,7 @@ from busplan.buses.figure import (
     VERDICT,
     Figure,
 )
+from busplan.elementwise import plain
 from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence, state_of
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
@@ -48,7 +49,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     yield _headline(verdict, profile, at=at)
     yield from not_in_it(profile)
     yield from _other_models(verdict, profile, places)
-    largest = max(figures.terms, key=lambda term: term.us)
+    largest = max(figures.terms, key=lambda term: plain(term.us))
     yield sentence(
         f"Largest term: {figures.binding_term}, {{}} of {{}}.",
         ShownValue(largest.us, largest.key, "us", 3, at=_place(places.get(figures.timing_model, ""), largest.key)),
@@ -117,7 +118,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     if limits:
         return said  # whatever the time is
     found = [said, _margin(figures, at=at)]
-    doubt = max(figures.doubts, key=lambda one: one.us, default=None)
+    doubt = max(figures.doubts, key=lambda one: plain(one.us), default=None)
     if doubt is not None and doubt.us:
         share = doubt.us**2 / sum(one.us**2 for one in figures.doubts)
         place = f"{at}/uncertainty_parts/0/share" if at else ""
@@ -258,7 +259,7 @@ def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     limit = bus.limit(figures.safe_limited_by or TIME)
     if limit is None or limit.is_safety:
         return sentence(f"No change of {listed(changeable(profile, structure=False), 'or')} alone carries more nodes.")
-    most = count_value(limit.most(network_of(profile)))
+    most = count_value(plain(limit.most(network_of(profile))))
     return sentence(f"No setting carries more nodes: {{}} {limit.key} are the {bus.limits_of}'s limit.", most)
 
 

@@ -129,7 +129,8 @@ def _spread_us(network: Network) -> Number:
 
 def _is_fitted(network: Network) -> Number:
     """Whether the execution time holds the error of the model, because it was fitted against it: a truth."""
-    return network.profile.node.execution.residual == "standard"
+    truth: Number = network.profile.node.execution.residual == "standard"
+    return truth
 
 
 def _gap_term_us(network: Network, gap_count: Number) -> Number:
