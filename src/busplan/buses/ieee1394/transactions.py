@@ -54,7 +54,7 @@ def link_of(network: Network) -> Link:
     )
 
 
-class Part(NamedTuple):
+class TransactionPart(NamedTuple):
     """A stretch of a transaction, as a `BusEvent` has it; the time may be of any sort."""
 
     kind: str
@@ -74,7 +74,7 @@ class Exchange(NamedTuple):
     execution_uncertainty_us: Number
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
-    parts: tuple[Part, ...]
+    parts: tuple[TransactionPart, ...]
     """What the transaction is made of, in the order of the wire; what the answer does not have is not there.
 
     The idle bus of the gaps is one part here; `events` divides it.
@@ -149,32 +149,34 @@ PACKET_PARTS: Final = ("cycle_arbitration_us", "cycle_data_us", "cycle_acknowled
 """Terms whose parts are one packet's way over the hops."""
 
 
-def _parts(phases: Phases, answer: "Answer") -> Iterator[Part]:
+def _parts(phases: Phases, answer: "Answer") -> Iterator[TransactionPart]:
     yield from _packet(phases, "request", "host", arbitrates=True)
     if answer == "split":
-        yield Part("execution", "cycle_execution_us", phases.execution_us, "node execution")
-        yield Part("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
+        yield TransactionPart("execution", "cycle_execution_us", phases.execution_us, "node execution")
+        yield TransactionPart("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
     if answer == "concatenated":
-        yield Part("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
+        yield TransactionPart("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
     if answer != "unified":
         yield from _packet(phases, "response", "node", arbitrates=answer == "split")
-    yield Part("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
-    yield Part("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
+    yield TransactionPart("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
+    yield TransactionPart("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
 
 
-def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[Part]:
+def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[TransactionPart]:
     receiver: Who = "node" if sender == "host" else "host"
     data_us = phases.request_data_us if packet == "request" else phases.response_data_us
     if arbitrates:
-        yield Part(
+        yield TransactionPart(
             "arbitration",
             "cycle_arbitration_us",
             phases.arbitration_us,
             f"{sender} arbitration",
             packet=packet,
         )
-    yield Part(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
-    yield Part("acknowledge", "cycle_acknowledge_us", phases.acknowledge_us, f"{receiver} acknowledge", packet=packet)
+    yield TransactionPart(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
+    yield TransactionPart(
+        "acknowledge", "cycle_acknowledge_us", phases.acknowledge_us, f"{receiver} acknowledge", packet=packet
+    )
 
 
 def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
