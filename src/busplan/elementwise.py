@@ -197,6 +197,17 @@ def is_one(number: Number) -> Number:
     return number.is_one() if isinstance(number, SpecialNumber) else number == 1
 
 
+def is_off(number: Number) -> bool:
+    """Whether a plain number is 0: what is off is left out of a computation.
+
+    Examples
+    --------
+    >>> is_off(0.0), is_off(0.5)
+    (True, False)
+    """
+    return isinstance(number, _PLAIN) and number == 0
+
+
 def choose(condition: Number, yes: Number, no: Number) -> Number:
     """`yes` where the condition holds, else `no`.
 

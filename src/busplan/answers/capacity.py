@@ -129,6 +129,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         "verdict": figures.verdict,
         "fits": figures.fits,
         "models_agree": verdict.models_agree,
+        "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),
         "available_us": figures.available_us,
         "required_us": figures.required_us,

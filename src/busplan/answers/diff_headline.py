@@ -74,7 +74,7 @@ def _loud(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
 
 
 def _counted(found: Difference, judgement: Judgement) -> Iterator[Sentence]:
-    told = {"shown_to_fit", "fits", *_loud_figures(found)}
+    told = {"shown_to_fit", "verdict", "fits", *_loud_figures(found)}
     names = named([one for one in found.judged(judgement) if one.figure.key not in told], found)
     if not names:
         return

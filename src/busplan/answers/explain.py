@@ -6,6 +6,7 @@ from typing import Final
 
 from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.derivation.capacity import OF_DOCUMENT
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
 from busplan.analysis.derivation.origin import DIGITS, short
 from busplan.answers.assumptions import INPUT_COLUMNS, input_cells
@@ -59,12 +60,8 @@ def _in_words(explanation: Explanation) -> Explanation:
     return explanation._replace(derivations=tuple(_with_words(one, explanation) for one in explanation.derivations))
 
 
-_OF_DOCUMENT: Final = ("uncertainty_parts", "not_in_it", "not_applicable")
-"""Values that the document of `capacity` makes."""
-
-
 def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
-    if one.figure.key not in (*_OF_DOCUMENT, "text", "warnings", "cheapest_change"):
+    if one.figure.key not in (*OF_DOCUMENT, "text", "warnings", "cheapest_change"):
         return one
     result = capacity(explanation.profile, periods_us=[one.period_us])
     value = capacity_document(result, verdicts(result))["verdicts"][0][one.figure.key]

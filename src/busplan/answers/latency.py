@@ -8,7 +8,7 @@ from busplan.analysis.latency import LatencyResult, Transaction, with_payload
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
-from busplan.answers.verdict import execution_sentence, warning_sentences
+from busplan.answers.verdict import execution_sentence, not_applicable, warning_sentences
 from busplan.buses.figure import REQUIRED
 from busplan.forms.blocks import Block, Code, JsonDocument, Record, Report, Sentence, Table, TableColumn
 from busplan.sections.profile import Profile
@@ -34,6 +34,7 @@ def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
             f": {bus_of(profile).latency_subject(network)}.",
         )
     )
+    yield from not_applicable(profile)
     yield from execution_sentence(profile)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
     yield from warning_sentences(profile, nodes=int(network.nodes), most=0)

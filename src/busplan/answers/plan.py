@@ -3,13 +3,14 @@
 from collections.abc import Iterator
 from functools import partial
 
+from busplan.analysis.capacity.verdict import after_reset
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.documents import document, with_profile
 from busplan.answers.key_values import NewValues, settings_sentence
 from busplan.answers.plan_options import option_margin, options_table
-from busplan.answers.verdict import warning_sentences
+from busplan.answers.verdict import reset_sentence, warning_sentences
 from busplan.buses.figure import AXES, NODES, UTILISATION
 from busplan.forms.blocks import (
     Block,
@@ -124,6 +125,8 @@ def _warnings(plan: Plan) -> Iterator[Sentence]:
     option = plan.recommended
     profile = plan.goal if option is None else option.profile
     yield from warning_sentences(profile, nodes=profile.bus.nodes, most=profile.bus.nodes)
+    if option is not None:
+        yield from reset_sentence(after_reset(option.profile, option.deciding), option.profile)
     limit = profile.limits.max_utilisation
     if option is not None and limit is not None and option.deciding.utilisation > limit:
         yield sentence(

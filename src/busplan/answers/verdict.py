@@ -21,7 +21,9 @@ from busplan.buses.figure import (
     UTILISATION,
     VERDICT,
     Figure,
+    by_key,
 )
+from busplan.buses.rule import contradicts
 from busplan.elementwise import plain
 from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence, state_of
 from busplan.forms.numbers import nouns, period_value
@@ -49,12 +51,15 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     yield _headline(verdict, profile, at=at)
     yield from not_in_it(profile)
     yield from _other_models(verdict, profile, places)
-    largest = max(figures.terms, key=lambda term: plain(term.us))
-    yield sentence(
-        f"Largest term: {figures.binding_term}, {{}} of {{}}.",
-        ShownValue(largest.us, largest.key, "us", 3, at=_place(places.get(figures.timing_model, ""), largest.key)),
-        figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
-    )
+    yield from reset_sentence(verdict.after_reset, profile)
+    if not _broken_limits(figures, profile):
+        largest = max(figures.terms, key=lambda term: plain(term.us))
+        label = by_key(bus_of(profile).term_figures)[largest.key].label
+        yield sentence(
+            f"Largest term: {label}, {{}} of {{}}.",
+            ShownValue(largest.us, largest.key, "us", 3, at=_place(places.get(figures.timing_model, ""), largest.key)),
+            figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
+        )
     yield _carries(figures, at=at)
     yield _advice(verdict, profile, places)
     yield from execution_sentence(profile)
@@ -165,18 +170,32 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
 
 def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:
     """Say where another timing model contradicts the verdict, and which cannot express the profile."""
-    figures, bus = verdict.deciding, bus_of(profile)
+    figures = verdict.deciding
     for other in verdict.others:
-        if other.fits != (figures.verdict == FITS) and not _broken_limits(figures, profile):
+        if contradicts(other.fits, figures):
             at = places.get(other.timing_model, "")
             needed = figure_value(REQUIRED, other.required_us, at=_place(at, REQUIRED.key))
             available = figure_value(AVAILABLE, other.available_us, at=_place(at, AVAILABLE.key))
             text = f"The {other.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
             yield sentence(text, needed, available, state="warns")
+    yield from not_applicable(profile)
+
+
+def not_applicable(profile: Profile) -> Iterator[Sentence]:
+    """Say which timing models cannot express a profile, and why."""
+    bus = bus_of(profile)
     for model in bus.timing_models:
         keys = bus.cannot_express(network_of(profile), model=model.name)
         if keys:
             yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
+
+
+def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[Sentence]:
+    """Say that a plan stops fitting at a bus reset; nothing if it does not."""
+    if after is not None:
+        keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).reset_changes.items())
+        text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
+        yield sentence(text, state="warns")
 
 
 def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[Part, ...]:
@@ -203,9 +222,10 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
 
 
 def _carries(figures: CapacityFigures, *, at: str) -> Sentence:
+    safely = "" if figures.safe else " on a bus that is set safely"
     return Sentence(
         (
-            *("Shown to fit: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0, at=at).parts),
+            *(f"Shown to fit{safely}: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0, at=at).parts),
             f", limited by {figures.safe_limited_by}.",
         )
     )

@@ -294,6 +294,8 @@ class Bus(ABC):
     """What else of the machine may be changed for it to fit, in words."""
     change_meanings: ClassVar[Mapping[str, str]] = {}
     """What a change of a key means on the machine, where the key does not say so."""
+    reset_changes: ClassVar[Mapping[str, Value]] = {}
+    """Keys as they are after a bus reset, until somebody sets them again."""
     change_words: ClassVar[Mapping[str, str]] = {}
     """How a table of plans writes a key with its value: a format of the value."""
     way_charged: ClassVar[str] = "every node alike"

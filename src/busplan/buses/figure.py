@@ -251,7 +251,13 @@ SAFE_MIN_PERIOD: Final = Figure(
     better="less",
 )
 VERDICT: Final = Figure(
-    "verdict", "verdict", _CERTAINTY, "fits, not shown to fit, or does not fit", "verdict", sort="word"
+    "verdict",
+    "verdict",
+    _CERTAINTY,
+    "fits, not shown to fit, or does not fit",
+    "verdict",
+    sort="word",
+    better="more",
 )
 CERTAINTY: Final = (
     *(BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_NODES, SAFE_AXES),
@@ -265,6 +271,13 @@ VERDICT_FIGURES: Final = (
         _CYCLE,
         "whether required <= available is the same under every timing model",
         sort="truth",
+    ),
+    Figure(
+        "verdict_after_reset",
+        "verdict after reset",
+        _CERTAINTY,
+        "verdict after a bus reset, where it is worse than fits",
+        sort="word",
     ),
     Figure("uncertainty_parts", "parts of U", _CERTAINTY, "what the uncertainty is made of, the largest first"),
     Figure("reserve", "reserve", "profile", "share of the slice that must be free for a plan to fit", sort="number"),

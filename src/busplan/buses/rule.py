@@ -110,6 +110,24 @@ class Rule(NamedTuple):
     """Looks at a profile that could be read; None for what is found in another way."""
 
 
+def contradicts(fits: bool, one: RuleFigures) -> bool:
+    """Tell whether a timing model that does not decide contradicts the verdict.
+
+    A plan that lacks its reserve alone contradicts nothing, and a broken limit is no question of timing.
+
+    Parameters
+    ----------
+    fits
+        Whether required <= available under that model.
+    one
+        Figures under the model that decides.
+    """
+    if set(one.exceeded) - {"time"}:
+        return False
+    is_shown = one.verdict == "fits" or (one.margin_corrected_us or 0) >= (one.uncertainty_us or 0)
+    return not is_shown if fits else one.verdict == "fits"
+
+
 def microseconds(value_us: float) -> str:
     """Write a time for a finding."""
     return f"{value_us:.3f} us"

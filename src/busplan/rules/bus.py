@@ -100,7 +100,7 @@ RULES: Final = (
         "error",
         "the cycle is not shown to fit its time slice",
         "The margin, less the bias of the timing model, is smaller than its uncertainty and limits.reserve together: "
-        "the plan may work, and nobody can say so. `busplan explain PROFILE margin_corrected_us` shows what the "
+        "the plan may work, and nobody can say so. `busplan explain PROFILE uncertainty_us` shows what the "
         "uncertainty is made of; measuring the execution time is the most frequent way to make it smaller.",
         not_shown_to_fit,
     ),

@@ -7,6 +7,7 @@ from busplan.analysis.capacity.figures import Capacity, CapacityFigures, figures
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import Change, change_for_more, change_to_fit
 from busplan.profile.toml import override
+from busplan.sections.profile import Profile
 
 
 class Verdict(NamedTuple):
@@ -17,14 +18,16 @@ class Verdict(NamedTuple):
     """Figures of the timing model that decides, whatever was asked for."""
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
+    after_reset: CapacityFigures | None
+    """Figures after a bus reset, where the cycle fits as it is set and is not shown to fit then."""
     change: Change | None
     """The cheapest change: one after which the cycle is shown to fit on a bus that is set safely; or, where all is well
     already, one that carries more safe nodes."""
 
     @property
-    def models_agree(self) -> bool:
-        """Whether required <= available is the same under every model."""
-        return all(other.fits == self.deciding.fits for other in self.others)
+    def models_agree(self) -> bool | None:
+        """Whether required <= available is the same under every model; None where there is no other."""
+        return all(other.fits == self.deciding.fits for other in self.others) if self.others else None
 
     @property
     def all_well(self) -> bool:
@@ -45,7 +48,28 @@ def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(one for one in results if one is not deciding),
+        after_reset=after_reset(profile, deciding),
         change=None,
     )
     change = change_for_more(profile, now=deciding) if verdict.all_well else change_to_fit(profile)
     return verdict._replace(change=change)
+
+
+def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
+    """Figures of a plan after a bus reset, where it fits as it is set and is not shown to fit then.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    deciding
+        Its figures under the model that decides.
+    """
+    changes = bus_of(profile).reset_changes
+    if deciding.verdict != FITS or not changes:
+        return None
+    reset = override(profile, dict(changes))
+    if reset == profile:
+        return None
+    found = figures(reset, model=deciding.timing_model)
+    return None if found.verdict == FITS else found

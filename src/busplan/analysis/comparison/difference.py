@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, TypeGuard
 
-from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.network import bus_of, model_names
@@ -285,6 +285,8 @@ def _rank(measure: Figure, values: _Figures) -> float | None:
     value = values.get(measure.key)
     if measure.key == "passed":
         return float(value is True)
+    if measure.key == known.VERDICT.key:
+        return None if value is None else -float(VERDICTS.index(value))
     stable = values.get("stable")
     if value is None and measure.key in _MARGINS and stable is not None:
         # A stable loop without a margin cannot become unstable; an unstable loop is beyond its limit.

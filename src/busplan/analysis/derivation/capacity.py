@@ -29,8 +29,9 @@ from busplan.elementwise import Number
 from busplan.sections.profile import Profile
 
 _SENTENCES: Final = "sentences on what the command computes"
-_OF_DOCUMENT: Final = ("uncertainty_parts", "not_in_it", "not_applicable")
-VERDICT_KEYS: Final = ("models_agree", "reserve", *_OF_DOCUMENT, "cheapest_change", "warnings", "text")
+OF_DOCUMENT: Final = ("verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
+"""Figures whose values the document of `capacity` has."""
+VERDICT_KEYS: Final = ("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text")
 
 
 def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
@@ -171,7 +172,7 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
         return traced(profile, "limits.reserve")
     (deciding,) = (figures for figures in derived if "uncertainty_us" in figures)
     # The report fills in the values of changes, lists and sentences.
-    if key in _OF_DOCUMENT:
+    if key in OF_DOCUMENT:
         return found(None, _SENTENCES, (deciding["uncertainty_us"],))
     if key == "cheapest_change":
         purpose = "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"

@@ -46,7 +46,9 @@ def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values
     if ":" in text:
         return _range(name, text)
     parts = map(str.strip, text.split(","))
-    return listed((part if part in words else _plain(_number(name, part)) for part in parts), name=name, words=words)
+    return listed(
+        (part if part in words else _plain(_number(name, part, words)) for part in parts), name=name, words=words
+    )
 
 
 def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) -> Listed:
@@ -70,7 +72,8 @@ def listed(values: Iterable[object], *, name: str, words: Collection[str] = ()) 
     for given in values:
         value = _TRUTHS.get(given, given) if isinstance(given, str) and given in words else given
         if not _is_value(value, words):
-            raise BusplanError(f"{name}: {value!r} is not a finite number")
+            known = f" and none of {', '.join(words)}" if words else ""
+            raise BusplanError(f"{name}: {value!r} is not a finite number{known}")
         if value in found:
             raise BusplanError(f"{name}: {value} is given twice")
         found[int(value) if isinstance(value, float) and _is_whole(value) else value] = None
@@ -160,9 +163,10 @@ def _even(name: str, first: Decimal, last: Decimal, count: str) -> Values:
     return Even(float(first), float(last), int(count))
 
 
-def _number(name: str, part: str) -> Decimal:
+def _number(name: str, part: str, words: Collection[str] = ()) -> Decimal:
     if not _NUMBER.fullmatch(part):
-        raise BusplanError(f"{name}: {part!r} is not a number; {_FORMS}")
+        known = f" and none of {', '.join(words)}" if words else ""
+        raise BusplanError(f"{name}: {part!r} is not a number{known}; {_FORMS}")
     return Decimal(part)
 
 

@@ -19,7 +19,7 @@ from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingM
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of
 from busplan.buses.network import TRANSACTION_KINDS, Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, is_one, larger, named, plain, rounded_down, total
+from busplan.elementwise import Number, is_off, is_one, larger, named, plain, rounded_down, total
 
 _OF_TRANSACTIONS: Final = (
     "cycle_arbitration_us",
@@ -95,7 +95,7 @@ class Ieee1394Cycle(BusCycle):
     def retries_us(self) -> Number:
         """Busy retries of the longest request, each with an arbitration reset gap [us]."""
         retries: Number = self.network.profile.cycle.retries
-        if isinstance(retries, int) and not retries:
+        if is_off(retries):
             return 0.0
         own = self._delays
         longest_us = reduce(larger, (one.phases.request_data_us for one in self.exchanges))
@@ -129,33 +129,43 @@ class Ieee1394Cycle(BusCycle):
     def _has_starts(self) -> bool:
         return self.model != "paper" and bool(self.network.profile.bus.cycle_master)
 
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire."""
+    @cached_property
+    def _others(self) -> tuple[Term, ...]:
+        """All terms but the cycle starts, whose number follows from them."""
         own: dict[str, Number] = dict.fromkeys(_OF_TRANSACTIONS, 0.0)
         for one in self.exchanges:
             by_term: dict[str, list[Number]] = {}
             for part in one.parts:
-                if not _is_nothing(part.us):
+                if not is_off(part.us):
                     by_term.setdefault(part.term, []).append(part.us)
             for term, parts_us in by_term.items():
                 own[term] = own[term] + one.nodes * _sum(parts_us)
         retries_us = 0.0 if self.model == "paper" else self.retries_us
-        others = (
+        return (
             Term("sync_us", self.sync_us),
             *(Term(key, us) for key, us in own.items()),
             Term("retries_us", retries_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),
         )
-        starts_us: Number = 0.0
-        if self._has_starts:
-            starts_us = self.starts(total(one.us for one in others)) * self.cycle_start_us
-        return (Term("cycle_starts_us", starts_us), *others)
+
+    @cached_property
+    def _others_us(self) -> Number:
+        return total(one.us for one in self._others)
+
+    @cached_property
+    def _number_of_starts(self) -> Number:
+        return self.starts(self._others_us) if self._has_starts else 0
+
+    def computed_terms(self) -> tuple[Term, ...]:
+        """The cycle in the order of the wire."""
+        starts_us = self._number_of_starts * self.cycle_start_us if self._has_starts else 0.0
+        return (Term("cycle_starts_us", starts_us), *self._others)
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """What the cycle grows by if its transactions take longer: there may be more cycle starts, too [us]."""
         if not self._has_starts:
             return extra_us
-        before_us = total(one.us for one in self.terms[1:]) + after_us
+        before_us = self._others_us + after_us
         more = self.starts(before_us + extra_us) - self.starts(before_us)
         return extra_us + more * self.cycle_start_us
 
@@ -169,9 +179,8 @@ class Ieee1394Cycle(BusCycle):
         """What is not known exactly."""
         if not self._is_known:
             return ()
-        starts = self.starts(total(one.us for one in self.terms[1:])) if self._has_starts else 0
         # The hops of the synchronous packet, of retries and of cycle starts; those of transactions come to them.
-        hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * starts
+        hop_delays = 2 + 3 * self.network.profile.cycle.retries + 2 * self._number_of_starts
         return doubts.of_cycle(
             self.exchanges, self.network, link=self.link, gaps=self._delays.gaps, hop_delays=hop_delays
         )
@@ -217,7 +226,7 @@ class Ieee1394Cycle(BusCycle):
 
     def events(self) -> Iterator[BusEvent]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
-        starts = self.starts(total(one.us for one in self.terms[1:])) if self._has_starts else 0
+        starts = self._number_of_starts
         sent, now_us = 0, 0.0
         start = BusEvent("cycle_start", "cycle_starts_us", plain(self.cycle_start_us) if starts else 0.0, "cycle start")
         for stretch in self._stretches():
@@ -255,11 +264,6 @@ class Ieee1394Cycle(BusCycle):
         if is_split and not profile.node.execution.worst_extra_us:
             found.append(LeftOut("the slowest execution", "node.execution.worst_extra_us"))
         return tuple(found)
-
-
-def _is_nothing(us: Number) -> bool:
-    """Whether a part is off, and no number that happens to be 0."""
-    return isinstance(us, float) and us == 0
 
 
 def _sum(parts_us: Sequence[Number]) -> Number:

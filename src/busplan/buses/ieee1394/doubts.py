@@ -22,7 +22,7 @@ from busplan.buses.ieee1394.table_1 import residual
 from busplan.buses.ieee1394.timing import Link
 from busplan.buses.ieee1394.transactions import PACKET_PARTS, Exchange
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, larger, named, total
+from busplan.elementwise import Number, alike, choose, is_off, larger, named, total
 
 _RECTANGULAR = sqrt(3)
 """Half of a range over its standard uncertainty (JCGM 100, 4.3.7)."""
@@ -32,7 +32,8 @@ def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Numbe
     """What a cycle takes beyond the model, on the mean [us].
 
     Half-count (b + d): b is the mean residual of Table I. d is the middle of two readings of it, which one gap count
-    cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4).
+    cannot tell apart: that the difference is constant, and that it stands in the gap term of equation (4). An execution
+    time that was fitted against the model holds the error of split transactions, and of no others.
 
     Parameters
     ----------
@@ -43,7 +44,10 @@ def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Numbe
     gap_count
         Gap count in force [1].
     """
-    return _halves(exchanges, network) * (_mean_us(network) + _gap_term_us(network, gap_count))
+    mean_us = residual().mean_us
+    of_split = choose(_is_fitted(network), 0.0, mean_us) + _gap_term_us(_measured_at(network), gap_count, "d_split")
+    of_others = mean_us + _gap_term_us(MAX_GAP_COUNT, gap_count, "d")
+    return _split_halves(exchanges) * of_split + _other_halves(exchanges, network) * of_others
 
 
 def of_cycle(
@@ -64,10 +68,14 @@ def of_cycle(
     hop_delays
         How often the delay of all hops stands in the cycle beside its transactions [1].
     """
-    halves, host = _halves(exchanges, network), network.profile.host
-    gap_term_us = _gap_term_us(network, link.gap_count)
+    host, split, others = network.profile.host, _split_halves(exchanges), _other_halves(exchanges, network)
+    spread_us = residual().uncertainty_us
+    # One reading is wrong by the same share in all: signs count.
+    gap_term_us = split * _gap_term_us(_measured_at(network), link.gap_count, "d_split") + others * _gap_term_us(
+        MAX_GAP_COUNT, link.gap_count, "d"
+    )
     of_packets = total(one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) for one in exchanges)
-    phy_us = PHY_DELAY_HALF_WIDTH_US / _RECTANGULAR if link.phy_delay_us is None else 0.0
+    half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
         """What one standard uncertainty changes, as the larger of two steps of two: up and down.
@@ -75,7 +83,7 @@ def of_cycle(
         The cycle never falls with either time and has kinks, at which a central difference covers too little.
         """
         own = one.responder
-        if _is_zero(execution_us if own.answer == "split" else 0.0) and _is_zero(host_us):
+        if is_off(execution_us if own.answer == "split" else 0.0) and is_off(host_us):
             return 0.0
         answer, bound_us = own.answer, own.execution_us + own.worst_extra_us
 
@@ -92,14 +100,18 @@ def of_cycle(
         return larger(above_us - own_us, own_us - below_us) / 2
 
     return (
-        Doubt("residual", "residual of Table I", halves * _spread_us(network)),
-        Doubt("gap_term", "gap term of eq (4)", halves * larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
+        Doubt(
+            "residual",
+            "residual of Table I",
+            split * choose(_is_fitted(network), 0.0, spread_us) + others * spread_us,
+        ),
+        Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
         Doubt(
             "node.execution",
             "execution time",
             total(one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0) for one in exchanges),
         ),
-        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays) * link.hops * phy_us),
+        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays) * link.hops * half_width_us / _RECTANGULAR),
         Doubt(
             "host.transaction_us",
             "host time",
@@ -108,23 +120,16 @@ def of_cycle(
     )
 
 
-def _is_zero(number: Number) -> bool:
-    """Whether a plain number is 0: what is off costs no time."""
-    return isinstance(number, (int, float)) and number == 0
+def _split_halves(exchanges: Sequence[Exchange]) -> Number:
+    """How often half a split transaction stands in the cycle: a packet that is acknowledged [1]."""
+    return named(total(2 * one.nodes for one in exchanges if one.responder.answer == "split"), "split_halves", "halves")
 
 
-def _halves(exchanges: Sequence[Exchange], network: Network) -> Number:
-    """How often half a transaction stands in the cycle: a packet that is acknowledged."""
-    halves = total(one.nodes * (1 if one.responder.answer == "unified" else 2) for one in exchanges)
-    return named(halves + network.profile.cycle.retries, "halves", "halves")
-
-
-def _mean_us(network: Network) -> Number:
-    return choose(_is_fitted(network), 0.0, residual().mean_us)
-
-
-def _spread_us(network: Network) -> Number:
-    return choose(_is_fitted(network), 0.0, residual().uncertainty_us)
+def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
+    """How often half of any other transaction stands in the cycle, and retries [1]."""
+    others = [one for one in exchanges if one.responder.answer != "split"]
+    halves = total(one.nodes * (1 if one.responder.answer == "unified" else 2) for one in others)
+    return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
 
 
 def _is_fitted(network: Network) -> Number:
@@ -133,8 +138,12 @@ def _is_fitted(network: Network) -> Number:
     return truth
 
 
-def _gap_term_us(network: Network, gap_count: Number) -> Number:
+def _measured_at(network: Network) -> Number:
+    """Gap count at which the error of split transactions is known [1]."""
+    return choose(_is_fitted(network), network.profile.node.execution.measured_gap_count, MAX_GAP_COUNT)
+
+
+def _gap_term_us(measured: Number, gap_count: Number, symbol: str) -> Number:
     """Half of what the gap term changes from the gap count that was measured to the one in force: d [us]."""
-    measured = choose(_is_fitted(network), network.profile.node.execution.measured_gap_count, MAX_GAP_COUNT)
-    ticks = ARBITRATION_GAP_TICKS / 2
-    return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, "gap_term_us", "d")
+    ticks = alike(ARBITRATION_GAP_TICKS, gap_count) / 2
+    return named(ticks * (measured - gap_count) / BASE_RATE_MBIT_S, f"gap_term_{symbol}_us", symbol)

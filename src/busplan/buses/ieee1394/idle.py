@@ -14,7 +14,7 @@ TI, TSB12LV01B data sheet, p. 7-6, and TSB12LV32-EP: both gaps are detected when
 
 from typing import Literal, NamedTuple
 
-from busplan.elementwise import Number, choose, larger, smaller
+from busplan.elementwise import Number, choose, is_off, larger, smaller
 
 Answer = Literal["split", "concatenated", "unified"]
 """How a node answers a request.
@@ -75,7 +75,7 @@ def gaps_as_thresholds(answer: Answer, *, gaps: Gaps, execution_us: Number, host
     """
     if answer == "split":
         alone_us = busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=0.0)
-        if isinstance(host_us, (int, float)) and not host_us:
+        if is_off(host_us):
             return IdleTime(alone_us - execution_us, 0.0)
         with_host_us = busy_us(answer, gaps=gaps, execution_us=execution_us, host_us=host_us)
         return IdleTime(alone_us - execution_us, with_host_us - alone_us)

@@ -8,6 +8,7 @@ from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
+    MAX_GAP_COUNT,
     MAX_HOPS,
     MAX_NODES,
     MAX_PAYLOAD_BYTES,
@@ -26,6 +27,7 @@ from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
+from busplan.errors import BusplanError
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -109,6 +111,7 @@ class Ieee1394(Bus):
         "bus.nodes": "the others on a second bus",
         "bus.speed": "if all nodes can",
     }
+    reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
@@ -151,7 +154,19 @@ class Ieee1394(Bus):
         return ", ".join((f"farthest of {nodes}", *self.setup_words(network)))
 
     def halves(self, network: Network, *, model: str, kind: str, payload_bytes: int) -> Halves:
-        """What the packets of a transaction with the farthest node take."""
+        """What the packets of a split transaction with the farthest node take.
+
+        Raises
+        ------
+        BusplanError
+            Nodes do not answer such a transaction split: then no execution time is on the bus.
+        """
+        answer = getattr(network.profile.node, f"{kind}_response")
+        if answer != "split":
+            raise BusplanError(
+                f'node.{kind}_response = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
+                f'be found from its latency; leave its lines out, or calibrate with node.{kind}_response = "split"'
+            )
         phases = transaction(
             kind,  # type: ignore[arg-type]
             model=TIMING_MODELS[model],  # type: ignore[index]

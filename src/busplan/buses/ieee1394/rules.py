@@ -12,7 +12,7 @@ from busplan.buses.ieee1394.constants import (
     REFERENCE_CABLE_M,
     padded_bytes,
 )
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject, microseconds, overrun
+from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, microseconds, overrun
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Bus
@@ -25,14 +25,11 @@ def _bus(subject: RuleSubject) -> "Ieee1394Bus":
 
 def paper_disagrees(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The paper's equations say otherwise."""
-    one = subject.deciding
-    # A plan that lacks its reserve alone contradicts nothing.
-    is_shown = one.verdict == "fits" or (one.margin_corrected_us or 0) >= (one.uncertainty_us or 0)
     for model, fits in subject.others_fit:
-        says_otherwise = not is_shown if fits else one.verdict == "fits"
-        if says_otherwise and not set(one.exceeded) - {"time"}:
+        if contradicts(fits, subject.deciding):
             story = "that it fits" if fits else "that it does not fit"
-            yield RuleProblem("cycle.period_us", f"the {model}'s equations say {story}; the verdict is: {one.verdict}")
+            verdict = subject.deciding.verdict
+            yield RuleProblem("cycle.period_us", f"the {model}'s equations say {story}; the verdict is: {verdict}")
 
 
 def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -110,6 +107,8 @@ def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
 def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count above the table."""
     one = subject.deciding
+    if "cycle starts" in one.exceeded:
+        return  # no time is left, so none can be saved
     if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
         after = subject.after({"bus.gap_count": "optimal"})
         won = (after.safe_nodes or 0) - (one.safe_nodes or 0)

@@ -125,10 +125,14 @@ class Sync(Section):
     """Section [cycle.sync]: the synchronous packet that opens a cycle, CTS of equation (2)."""
 
     ping_us: TimeUs = Field(
-        default=float(PING_US), description="Latency of a ping to one node, measured [us]", examples=[0.3]
+        default=float(PING_US),
+        description="Latency of a ping to one node, measured; of the paper model alone [us]",
+        examples=[0.3],
     )
     ping_per_node_us: TimeUs = Field(
-        default=float(PING_PER_NODE_US), description="What each further node adds, measured [us]", examples=[0.1]
+        default=float(PING_PER_NODE_US),
+        description="What each further node adds, measured; of the paper model alone [us]",
+        examples=[0.1],
     )
 
 
@@ -154,7 +158,7 @@ class Ieee1394Payload(PayloadSection):
     )
 
 
-class Residual(Section):
+class FittedExecution(Section):
     """What an execution time that was fitted against a timing model holds of that model's error."""
 
     residual: Literal["none", "paper", "standard"] = Field(
@@ -164,15 +168,17 @@ class Residual(Section):
         examples=["standard"],
     )
     measured_gap_count: Annotated[int, Field(ge=0, le=MAX_GAP_COUNT)] = Field(
-        default=MAX_GAP_COUNT, description="Gap count of the bus that the latency was measured on", examples=[63]
+        default=MAX_GAP_COUNT,
+        description="Gap count of the bus that the latency was measured on; read with another residual than none",
+        examples=[63],
     )
 
 
-class Ieee1394LinearExecution(LinearExecution, Residual):
+class Ieee1394LinearExecution(LinearExecution, FittedExecution):
     """Section [node.execution] of kind "linear": base_us + per_byte_us * payload."""
 
 
-class Ieee1394TableExecution(TableExecution, Residual):
+class Ieee1394TableExecution(TableExecution, FittedExecution):
     """Section [node.execution] of kind "table": measured times, linear between them, nothing beyond them."""
 
 
@@ -196,7 +202,7 @@ class Ieee1394Node(NodeSection):
     response_us: Annotated[float, Field(ge=0, le=float(ARBITRATION_HOLD_US), allow_inf_nan=False)] = Field(
         default=float(ARBITRATION_HOLD_US),
         description="Time from the acknowledge to a concatenated response; hardware slower than MAX_BUS_HOLD, 1.63 us "
-        "(recalled), answers split [us]",
+        "(recalled), answers split. Other answers do not read it [us]",
         examples=[0.5],
     )
 

@@ -44,7 +44,7 @@ BENCH: Final = Link(float(DATA_RATE_MBIT_S["S400"]), MAX_GAP_COUNT, 1, float(REF
 """The way of a packet on the bench."""
 
 
-class Residual(NamedTuple):
+class ModelResidual(NamedTuple):
     """What was measured less what a timing model gives, for one half of a transaction [us]."""
 
     mean_us: Sourced
@@ -53,7 +53,7 @@ class Residual(NamedTuple):
 
 
 @cache
-def residual(model: TimingModelName = "standard") -> Residual:
+def residual(model: TimingModelName = "standard") -> ModelResidual:
     """Residual of T1 + T2, equation (13), over the rows of the table.
 
     Parameters
@@ -68,7 +68,7 @@ def residual(model: TimingModelName = "standard") -> Residual:
     """
     differences = [row.request_and_acknowledge_us - _first_half_us(row.payload_bytes, model) for row in TABLE_1]
     number, source = len(differences), f"paper, Table I, less the {model} model at its {len(differences)} payloads"
-    return Residual(
+    return ModelResidual(
         Sourced(
             fmean(differences),
             unit="us",
