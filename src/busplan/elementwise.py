@@ -8,10 +8,17 @@ from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from math import ceil, floor
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias
 
-Number: TypeAlias = Any
-"""A plain number, an array, or a `SpecialNumber`."""
+if TYPE_CHECKING:
+    from typing import Any
+
+    from numpy.typing import NDArray
+
+    Number: TypeAlias = "float | NDArray[Any] | SpecialNumber"
+else:
+    Number: TypeAlias = object  # only type checkers ask what it is, and numpy stays unloaded
+"""A plain number, an array, or a `SpecialNumber`. Truths are numbers, too."""
 
 _PLAIN: Final = (int, float)
 
@@ -20,6 +27,61 @@ class SpecialNumber(ABC):
     """A number that is neither plain nor an array: it says itself what the functions of this module give."""
 
     __slots__ = ()
+
+    @abstractmethod
+    def __add__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __radd__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __sub__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __rsub__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __mul__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __rmul__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __truediv__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __rtruediv__(self, other: Number) -> Number: ...
+
+    @abstractmethod
+    def __pow__(self, other: Number) -> Number: ...
+
+    # With an array on the other side it is the array that compares.
+
+    @abstractmethod
+    def __lt__(self, other: "float | SpecialNumber") -> Number: ...
+
+    @abstractmethod
+    def __le__(self, other: "float | SpecialNumber") -> Number: ...
+
+    @abstractmethod
+    def __gt__(self, other: "float | SpecialNumber") -> Number: ...
+
+    @abstractmethod
+    def __ge__(self, other: "float | SpecialNumber") -> Number: ...
+
+    # What a sort may have.
+
+    def __floordiv__(self, _other: Number) -> Number:
+        raise TypeError(f"{type(self).__name__} has no //")
+
+    def __neg__(self) -> Number:
+        raise TypeError(f"{type(self).__name__} has no negative")
+
+    def __float__(self) -> float:
+        raise TypeError(f"{type(self).__name__} is no plain number")
+
+    def __int__(self) -> int:
+        raise TypeError(f"{type(self).__name__} is no plain number")
 
     @abstractmethod
     def larger_of(self, one: Number, other: Number) -> Number:
@@ -66,8 +128,22 @@ class SpecialNumber(ABC):
         return self
 
 
-def _special(*numbers: Number) -> SpecialNumber | None:
-    return next((one for one in numbers if isinstance(one, SpecialNumber)), None)
+def plain(number: Number) -> float:
+    """The very number, where it must be a plain one.
+
+    Raises
+    ------
+    TypeError
+        It is of another sort.
+
+    Examples
+    --------
+    >>> plain(3), plain(True)
+    (3, True)
+    """
+    if isinstance(number, _PLAIN):
+        return number
+    raise TypeError(f"expected a plain number, got {type(number).__name__}")
 
 
 def larger(one: Number, other: Number) -> Number:
@@ -80,12 +156,14 @@ def larger(one: Number, other: Number) -> Number:
     """
     if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
         return max(one, other)
-    own = _special(one, other)
-    if own is not None:
-        return own.larger_of(one, other)
+    if isinstance(one, SpecialNumber):
+        return one.larger_of(one, other)
+    if isinstance(other, SpecialNumber):
+        return other.larger_of(one, other)
     import numpy as np
 
-    return np.maximum(one, other)
+    found: Number = np.maximum(one, other)
+    return found
 
 
 def smaller(one: Number, other: Number) -> Number:
@@ -98,12 +176,14 @@ def smaller(one: Number, other: Number) -> Number:
     """
     if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
         return min(one, other)
-    own = _special(one, other)
-    if own is not None:
-        return own.smaller_of(one, other)
+    if isinstance(one, SpecialNumber):
+        return one.smaller_of(one, other)
+    if isinstance(other, SpecialNumber):
+        return other.smaller_of(one, other)
     import numpy as np
 
-    return np.minimum(one, other)
+    found: Number = np.minimum(one, other)
+    return found
 
 
 def is_one(number: Number) -> Number:
@@ -133,14 +213,17 @@ def choose(condition: Number, yes: Number, no: Number) -> Number:
 
     Examples
     --------
-    >>> choose(2 > 3, "yes", "no")
-    'no'
+    >>> choose(2 > 3, 5, 7)
+    7
     """
     if isinstance(condition, bool):
         return yes if condition else no
-    own = _special(condition, yes, no)
-    if own is not None:
-        return own.chosen(condition, yes, no)
+    if isinstance(condition, SpecialNumber):
+        return condition.chosen(condition, yes, no)
+    if isinstance(yes, SpecialNumber):
+        return yes.chosen(condition, yes, no)
+    if isinstance(no, SpecialNumber):
+        return no.chosen(condition, yes, no)
     import numpy as np
 
     return np.where(condition, yes, no)
@@ -269,7 +352,7 @@ def total(parts: Iterable[Number]) -> Number:
     >>> total([1.5, 2]), total([])
     (3.5, 0.0)
     """
-    found: Number = None
+    found: Number | None = None
     for one in parts:
         found = one if found is None else found + one
     return 0.0 if found is None else found

@@ -54,7 +54,10 @@ def of_execution(
         }
     )
     return written(
-        [(size, value + phases(plain, "write", model=model, payload_bytes=size).latency_us) for size, value in rows]
+        [
+            (size, value + float(phases(plain, "write", model=model, payload_bytes=size).latency_us))
+            for size, value in rows
+        ]
     )
 
 
@@ -115,7 +118,7 @@ def test_latencies_of_a_profile_give_its_own_execution_time(
     most = int(MAX_PAYLOAD_BYTES[profile.bus.speed])
     sizes = data.draw(st.lists(st.integers(1, most), min_size=2, max_size=8, unique=True))
     measurements = [
-        Measurement(line, kind, size, phases(profile, kind, model=model, payload_bytes=size).latency_us, None)
+        Measurement(line, kind, size, float(phases(profile, kind, model=model, payload_bytes=size).latency_us), None)
         for line, (size, kind) in enumerate(((size, kind) for size in sizes for kind in TRANSACTION_KINDS), start=2)
     ]
     own = profile.node.execution
@@ -195,7 +198,7 @@ def test_outliers_are_named_and_do_not_pull_a_robust_fit(make: Make, form: str) 
     for size in (4, 64, 256, 1024):
         assert robust.execution.execution_us(size) == pytest.approx(clean.execution.execution_us(size), abs=0.5)
         if form == "table" and size in (4, 64, 1024):
-            assert abs(plain.execution.execution_us(size) - clean.execution.execution_us(size)) > 5
+            assert abs(float(plain.execution.execution_us(size) - clean.execution.execution_us(size))) > 5
 
 
 @pytest.mark.parametrize("form", ["table", "linear"])
@@ -213,8 +216,9 @@ def test_a_latency_below_its_packets_is_refused_each_with_its_line(make: Make) -
     need = phases(
         make(node__execution__base_us=0.0, node__execution__per_byte_us=0.0), "write", model="standard", payload_bytes=4
     )
+    need_us = float(need.latency_us)
     with pytest.raises(BusplanError) as raised:
-        run(make(), written([(4, 50.0), (4, 0.05), (4, need.latency_us - 1e-6), (4, need.latency_us)]))
+        run(make(), written([(4, 50.0), (4, 0.05), (4, need_us - 1e-6), (4, need_us)]))
     needed = f"is below the {need.latency_us:.3f} us that the packets alone take in the standard model"
     assert raised.value.problems == (
         f"m.csv:3: latency 0.05 us at 4 bytes {needed}",

@@ -58,9 +58,9 @@ def test_an_array_of_nodes_gives_what_each_number_gives(
         together = bus_of(profile).cycle(network.with_nodes(nodes), model=model)
         alone = [{one.key: one.us for one in cycle_of(profile, model=model, nodes=int(count)).terms} for count in nodes]
         for term in together.terms:
-            assert np.broadcast_to(term.us, nodes.shape).tolist() == [one[term.key] for one in alone]
+            assert np.broadcast_to(np.asarray(term.us), nodes.shape).tolist() == [one[term.key] for one in alone]
         for limit in limits_with_time(network, model=model):
-            truths = np.broadcast_to(limit.is_broken(network.with_nodes(nodes)), nodes.shape)
+            truths = np.broadcast_to(np.asarray(limit.is_broken(network.with_nodes(nodes))), nodes.shape)
             assert truths.tolist() == [bool(limit.is_broken(network.with_nodes(int(one)))) for one in nodes]
             # Once broken, a limit stays broken: the search by halves rests on that.
             assert sorted(truths.tolist()) == truths.tolist()
@@ -97,6 +97,7 @@ def test_a_traced_number_and_a_polynomial_have_the_same_value(
         bus = bus_of(profile)
         plain = bus.cycle(network.with_nodes(nodes), model=model).required_us
         traced = bus.cycle(network.with_nodes(Traced(float(nodes))), model=model).required_us
+        assert isinstance(traced, Traced)
         assert traced.value == plain
         try:
             whole = bus.cycle(network.with_nodes(NODES), model=model).required_us

@@ -33,7 +33,7 @@ def test_arrays_of_bounds_and_coefficients_are_answered_one_by_one() -> None:
     c1, most = np.array([1.0, 2.0, 5.0])[:, None], np.array([0.0, 9.0, 1e6])
     found = Polynomial(3.0, c1, 0.5).largest_within(most)
     alone = [[Polynomial(3.0, float(one), 0.5).largest_within(float(two)) for two in most] for one in c1.ravel()]
-    assert found.tolist() == alone
+    assert np.asarray(found).tolist() == alone
 
 
 @given(a=WHOLE, b=WHOLE, c=st.integers(1, 50), nodes=st.integers(0, 1000))

@@ -158,7 +158,7 @@ def test_no_rounding_builds_up_over_many_events(make: Maker, nodes: int) -> None
     for one in (each.phases for each in Ieee1394Cycle(network_of(profile), "paper").exchanges):
         both = (one.arbitration_us, one.acknowledge_us) * 2
         single = (one.request_data_us, one.execution_us, one.response_data_us)
-        lengths += nodes * [*both, *single, one.subaction_gap_us, one.arbitration_reset_gap_us]
+        lengths += nodes * [*map(float, (*both, *single, one.subaction_gap_us, one.arbitration_reset_gap_us))]
     used_us = schedule(profile, model="paper").used_us
     assert abs(used_us - math.fsum(lengths)) <= math.ulp(used_us)
 

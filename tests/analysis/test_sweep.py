@@ -113,7 +113,7 @@ def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
 ) -> None:
     profile = data.draw(any_profile)
     ratio = profile.cycle.slice_ratio
-    exact_us = cycle_of(profile, model=model, nodes=nodes).required_us / ratio
+    exact_us = float(cycle_of(profile, model=model, nodes=nodes).required_us) / ratio
     around = (
         exact_us,
         exact_us * (1 + 1e-12),

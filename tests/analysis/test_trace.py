@@ -15,7 +15,7 @@ from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
-from busplan.elementwise import choose
+from busplan.elementwise import choose, plain
 from busplan.sourced import EQUATIONS
 
 # As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
@@ -115,12 +115,20 @@ def test_it_compares_as_its_value_does(one: float, other: float) -> None:
     assert list(map(bool, found)) == expected
 
 
+def test_it_is_no_plain_number() -> None:
+    for taken in (plain, float, int, lambda one: -one, lambda one: one // 2):
+        with pytest.raises(TypeError):
+            taken(number(2.0))
+
+
 def test_a_choice_is_written_as_what_was_chosen_and_rests_on_what_decided() -> None:
     x, y = number(3.0, "x"), number(2.0, "y")
     for chosen in (choose(y > 1, x, 9.0), choose(y > 2, 9.0, x)):
+        assert isinstance(chosen, Traced)
         assert (formula_text(chosen, in_numbers=False), chosen.value) == ("x", 3.0)
         assert [one.symbol for one in inputs(chosen)] == ["x", "y"]
     plain = choose(x > 2, 9.0, x)
+    assert isinstance(plain, Traced)
     assert (formula_text(plain, in_numbers=False), plain.value) == ("9", 9.0)
     assert [one.symbol for one in inputs(plain)] == ["x"]
 

@@ -37,7 +37,7 @@ from busplan.buses.bus import (
 from busplan.buses.figure import NONPERIODIC, Figure, capacity_figures
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
-from busplan.elementwise import Number, rounded_up, total
+from busplan.elementwise import Number, plain, rounded_up, total
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.base import Section
@@ -101,7 +101,8 @@ class RingCycle(BusCycle):
     @cached_property
     def round_us(self) -> Number:
         profile = self.network.profile
-        return profile.bus.token_us + profile.guard.guard_us + profile.delivery.late_us
+        round_us: Number = profile.bus.token_us + profile.guard.guard_us + profile.delivery.late_us
+        return round_us
 
     def computed_terms(self) -> tuple[Term, ...]:
         bus = self.network.profile.bus
@@ -114,12 +115,12 @@ class RingCycle(BusCycle):
 
     def events(self) -> Iterator[BusEvent]:
         bus, (group,) = self.network.profile.bus, self.network.groups
-        for node in range(1, group.nodes + 1):
+        for node in range(1, int(group.nodes) + 1):
             if node % SHARED == 1:
-                yield BusEvent("token", "cycle_token_us", self.round_us, "token")
+                yield BusEvent("token", "cycle_token_us", plain(self.round_us), "token")
             for kind, size in (("in", group.read_bytes), ("out", group.write_bytes)):
-                yield BusEvent(kind, "cycle_data_us", 8 * size / bus.rate_mbit_s, f"data {kind}", node, "turn")
-        yield BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "window")
+                yield BusEvent(kind, "cycle_data_us", 8 * plain(size) / bus.rate_mbit_s, f"data {kind}", node, "turn")
+        yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "window")
 
     def figures(self) -> Mapping[str, Number]:
         return {"rounds": self.rounds}

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses.bus import BusLatency
-from busplan.elementwise import Number
+from busplan.elementwise import Number, plain
 from busplan.errors import BusplanError
 from busplan.sections.base import with_unchecked
 from busplan.sections.execution import TableExecution
@@ -82,9 +82,9 @@ def latency(
     )
 
 
-def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, Number]:
+def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float]:
     """Phases with the sizes of packets as whole numbers."""
-    return {key: int(value) if key.endswith("_bytes") else value for key, value in phases.items()}
+    return {key: int(value) if key.endswith("_bytes") else plain(value) for key, value in phases.items()}
 
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:

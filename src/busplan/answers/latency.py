@@ -37,7 +37,7 @@ def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
     yield from not_applicable(profile)
     yield from execution_sentence(profile)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
-    yield from warning_sentences(profile, nodes=network.nodes, most=0)
+    yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
 
 
 def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:

@@ -24,6 +24,7 @@ from busplan.buses.figure import (
     by_key,
 )
 from busplan.buses.rule import contradicts
+from busplan.elementwise import plain
 from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence, state_of
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
@@ -52,7 +53,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     yield from _other_models(verdict, profile, places)
     yield from reset_sentence(verdict.after_reset, profile)
     if not _broken_limits(figures, profile):
-        largest = max(figures.terms, key=lambda term: term.us)
+        largest = max(figures.terms, key=lambda term: plain(term.us))
         label = by_key(bus_of(profile).term_figures)[largest.key].label
         yield sentence(
             f"Largest term: {label}, {{}} of {{}}.",
@@ -122,7 +123,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     if limits:
         return said  # whatever the time is
     found = [said, _margin(figures, at=at)]
-    doubt = max(figures.doubts, key=lambda one: one.us, default=None)
+    doubt = max(figures.doubts, key=lambda one: plain(one.us), default=None)
     if doubt is not None and doubt.us:
         share = doubt.us**2 / sum(one.us**2 for one in figures.doubts)
         place = f"{at}/uncertainty_parts/0/share" if at else ""
@@ -278,7 +279,7 @@ def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     limit = bus.limit(figures.safe_limited_by or TIME)
     if limit is None or limit.is_safety:
         return sentence(f"No change of {listed(changeable(profile, structure=False), 'or')} alone carries more nodes.")
-    most = count_value(limit.most(network_of(profile)))
+    most = count_value(plain(limit.most(network_of(profile))))
     return sentence(f"No setting carries more nodes: {{}} {limit.key} are the {bus.limits_of}'s limit.", most)
 
 

@@ -17,7 +17,7 @@ TABLE_1_THEORY = {4: 3.19, 16: 3.44, 32: 3.76, 64: 4.41, 128: 5.71, 256: 8.32, 5
 
 @pytest.mark.parametrize(("payload_bytes", "printed_us"), TABLE_1_THEORY.items())
 def test_equation_15_gives_table_1_theory_to_its_two_decimals(payload_bytes: int, printed_us: float) -> None:
-    assert round(eq.published_request_and_acknowledge_us(payload_bytes), 2) == printed_us
+    assert round(float(eq.published_request_and_acknowledge_us(payload_bytes)), 2) == printed_us
 
 
 def test_equations_4_to_6_fall_6_4_ns_short_of_equation_15() -> None:
@@ -36,7 +36,7 @@ def test_equations_4_to_6_fall_6_4_ns_short_of_equation_15() -> None:
 
 @pytest.mark.parametrize(("clock", "printed_us"), [(PAPER_CLOCK, 7.90), (BASE_CLOCK, 31.60)])
 def test_equation_10_at_gap_count_63_under_either_clock(clock: float, printed_us: float) -> None:
-    assert round(eq.gaps_us(63, gap_clock_mbit_s=clock), 2) == printed_us
+    assert round(float(eq.gaps_us(63, gap_clock_mbit_s=clock)), 2) == printed_us
 
 
 @given(gap_count=st.integers(0, 63), clock=st.floats(1, 1e4))

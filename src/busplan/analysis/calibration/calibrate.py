@@ -16,6 +16,7 @@ from busplan.analysis.calibration.execution_fit import (
 )
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Halves, Value
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement
 from busplan.sections.execution import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
@@ -274,7 +275,7 @@ def _more(source: str, hidden: int) -> list[str]:
 
 
 def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> tuple[Residual, ...]:
-    fitted_us = {size: fit.execution_us(size) for size in {one.payload_bytes for one, _ in raw}}
+    fitted_us = {size: plain(fit.execution_us(size)) for size in {one.payload_bytes for one, _ in raw}}
     found = []
     for one, packets_us in raw:
         execution_us = round(one.latency_us - packets_us, _EXACT_DECIMALS)
@@ -333,6 +334,7 @@ def _payload_fits(
             kind: [one.execution_us for one, _ in group if one.transaction == kind] for kind in ("read", "write")
         }
         measured_us = [one.request_and_acknowledge_us for _, one in group if one.request_and_acknowledge_us is not None]
+        fitted_us = plain(fit.execution_us(size))
         half_us = middle(measured_us) if measured_us else None
         model_us = middle([halves[one.transaction, size].request_and_acknowledge_us for one, _ in group])
         return PayloadFit(
@@ -343,8 +345,8 @@ def _payload_fits(
             execution_us=middle(times_us),
             deviation_us=stdev(times_us) if len(group) > 1 else None,
             range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),
-            fitted_us=fit.execution_us(size),
-            residual_us=round(middle(times_us) - fit.execution_us(size), _EXACT_DECIMALS),
+            fitted_us=fitted_us,
+            residual_us=round(middle(times_us) - fitted_us, _EXACT_DECIMALS),
             read_less_write_us=middle(by_kind["read"]) - middle(by_kind["write"]) if all(by_kind.values()) else None,
             request_and_acknowledge_us=half_us,
             model_request_and_acknowledge_us=model_us,

@@ -80,7 +80,9 @@ def verdict_code(found: Certainty, network: Network, *, is_broken: Number) -> Nu
     """
     given_us = available_us(network)
     is_shown = fits_in(found.safe_required_us, available_us=given_us)
-    is_out = found.margin_corrected_us + found.uncertainty_us < -FIT_ROUNDING * given_us
+    best_us: Number = found.margin_corrected_us + found.uncertainty_us
+    least_us: Number = -FIT_ROUNDING * given_us
+    is_out = best_us < least_us
     return choose(is_broken, 2, choose(is_shown, 0, choose(is_out, 2, 1)))
 
 

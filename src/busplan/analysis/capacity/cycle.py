@@ -45,7 +45,8 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
     >>> fits_in(0.1 + 0.2, available_us=0.3)
     True
     """
-    return required_us <= available_us * (1 + FIT_ROUNDING)
+    most_us: Number = available_us * (1 + FIT_ROUNDING)
+    return required_us <= most_us
 
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:

@@ -13,7 +13,7 @@ from busplan.buses import kind_named
 from busplan.buses.bus import BusCycle, Doubt, Term
 from busplan.buses.figure import CERTAINTY
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose
+from busplan.elementwise import Number, choose, plain
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -141,7 +141,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
-    numbers, own = numeric_figures(cycle), FigureValues(cycle.figures())
+    numbers: dict[str, Any] = {key: plain(number) for key, number in numeric_figures(cycle).items()}
+    own = FigureValues({key: plain(number) for key, number in cycle.figures().items()})
     max_nodes, limited_by = largest_nodes(profile, model=model)
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     broken = broken_limits(profile)
@@ -152,7 +153,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
         timing_model=model,
         **numbers,
         terms=cycle.terms,
-        binding_term=max(cycle.terms, key=lambda term: term.us).name,
+        binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name,
         max_nodes=max_nodes,
         max_axes=profile.node.axes * max_nodes,
         limited_by=limited_by,
@@ -175,12 +176,12 @@ def _certainty_figures(profile: Profile, cycle: BusCycle, *, is_broken: bool) ->
         "safe_nodes": nodes,
         "safe_axes": profile.node.axes * nodes,
         "safe_limited_by": limit,
-        "verdict": VERDICTS[verdict_code(found, cycle.network, is_broken=is_broken)],
+        "verdict": VERDICTS[int(verdict_code(found, cycle.network, is_broken=is_broken))],
         "doubts": found.doubts,
     }
 
 
-def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number]:
+def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | None]:
     """Figures of how sure the verdict is that follow by operators alone.
 
     Parameters

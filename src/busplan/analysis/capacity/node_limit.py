@@ -86,15 +86,14 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
     """
     closed = [_in_closed_form(limit, network) for limit in limits]
     ceiling = int(min([ceiling, *(_greatest(one) for one in closed if one is not None)]))
-    nodes: Number = None
+    nodes, *others = (
+        _searched(limit, network, ceiling) if found is None else found
+        for limit, found in zip(limits, closed, strict=True)
+    )
     place: Number = 0
-    for index, (limit, found) in enumerate(zip(limits, closed, strict=True)):
-        most = _searched(limit, network, ceiling) if found is None else found
-        if nodes is None:
-            nodes = most
-        else:
-            less = most < nodes
-            nodes, place = choose(less, most, nodes), choose(less, index, place)
+    for index, most in enumerate(others, start=1):
+        less = most < nodes
+        nodes, place = choose(less, most, nodes), choose(less, index, place)
     return MostNodes(nodes, place)
 
 

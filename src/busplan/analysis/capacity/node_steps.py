@@ -7,6 +7,7 @@ from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import FIT_ROUNDING, cycle_of
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.network import bus_of
+from busplan.elementwise import plain
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
@@ -52,7 +53,7 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     longest, is_safe = override(profile, {"cycle.period_us": MAX_TIME_US}), model == bus_of(profile).deciding_model
     most, limit = safe_nodes(longest) if is_safe else largest_nodes(longest, model=model)
     cycles = (cycle_of(profile, model=model, nodes=nodes) for nodes in range(1, most + 1))
-    needed_us = (certainty(one).safe_required_us if is_safe else one.required_us for one in cycles)
+    needed_us = (plain(certainty(one).safe_required_us if is_safe else one.required_us) for one in cycles)
     return NodeSteps(
         model, profile.node.axes, tuple(us / profile.cycle.slice_ratio for us in needed_us), limit, is_safe
     )

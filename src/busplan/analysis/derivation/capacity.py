@@ -19,12 +19,13 @@ from busplan.analysis.derivation.formulas import against
 from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import chosen, remembered
 from busplan.analysis.derivation.origin import short
-from busplan.analysis.derivation.trace import Operand, Traced, found, value_of
+from busplan.analysis.derivation.trace import Traced, found, value_of
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.buses.bus import Bus, BusCycle, Term
 from busplan.buses.figure import CERTAINTY, by_key
 from busplan.buses.network import Network
+from busplan.elementwise import Number
 from busplan.sections.profile import Profile
 
 _SENTENCES: Final = "sentences on what the command computes"
@@ -51,7 +52,7 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     bus, plain = bus_of(profile), figures(profile, model=model)
     network = network_of(traced_profile(profile))
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Operand] = {
+    numbers: dict[str, Number] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         **{term.key: term.us for term in cycle.terms},
         **cycle.figures(),
@@ -120,7 +121,7 @@ def _limit_names(bus: Bus) -> str:
     return " and ".join(limit.key for limit in bus.limits if not limit.is_safety)
 
 
-def _limits(bus: Bus, network: Network, *, with_safety: bool = False) -> tuple[Operand, ...]:
+def _limits(bus: Bus, network: Network, *, with_safety: bool = False) -> tuple[Number, ...]:
     """Values and bounds of the limits of the bus."""
     limits = (limit for limit in bus.limits if with_safety or not limit.is_safety)
     pairs = ((limit.value(network), limit.most(network)) for limit in limits)
@@ -128,7 +129,7 @@ def _limits(bus: Bus, network: Network, *, with_safety: bool = False) -> tuple[O
 
 
 def _words(
-    named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Operand, ...]
+    named: dict[str, Traced], plain: CapacityFigures, terms: tuple[Term, ...], limits: tuple[Number, ...]
 ) -> dict[str, Traced]:
     """Figures that are words or truth values."""
     required, available = named["required_us"], named["available_us"]
@@ -177,5 +178,5 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
         purpose = "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"
         words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
         return found(None, words, (*judged, *safe))
-    warned: tuple[Operand, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
+    warned: tuple[Number, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
     return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *judged, *safe, *warned))

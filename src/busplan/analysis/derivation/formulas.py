@@ -4,7 +4,8 @@ from inspect import signature
 from typing import Final
 
 from busplan.analysis.derivation.origin import DIGITS, Input, short
-from busplan.analysis.derivation.trace import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Operand, Traced, value_of
+from busplan.analysis.derivation.trace import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Traced, value_of
+from busplan.elementwise import Number
 from busplan.sourced import SYMBOLS, Equation, Sourced
 
 _ATOM: Final = 4
@@ -45,7 +46,7 @@ def less(left: float, right: float) -> str:
     return f"{left:.{digits}g} - {right:.{digits}g}"
 
 
-def formula_text(operand: Operand, *, in_numbers: bool) -> str:
+def formula_text(operand: Number, *, in_numbers: bool) -> str:
     """Write the expression of a number in terms of named numbers.
 
     Parameters
@@ -74,7 +75,7 @@ def formula_text(operand: Operand, *, in_numbers: bool) -> str:
     return _written(operand, in_numbers=in_numbers, top=True)[0]
 
 
-def _unwrapped(operand: Operand) -> Operand:
+def _unwrapped(operand: Number) -> Number:
     """Replace a choice by the chosen operand, if that is an expression without a name."""
     while isinstance(operand, Traced) and operand.operation == CHOSEN:
         won = operand.parts[0]
@@ -84,7 +85,7 @@ def _unwrapped(operand: Operand) -> Operand:
     return operand
 
 
-def _written(operand: Operand, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
+def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[str, int]:
     """Text of an operand, and its operator precedence."""
     if not isinstance(operand, Traced):
         symbol = operand.symbol if isinstance(operand, Sourced) and not in_numbers else ""
@@ -114,7 +115,7 @@ def _joined(operand: Traced, parts: list[tuple[str, int]], *, in_numbers: bool) 
     return f"{left} {operation.sign} {right}", operation.rank
 
 
-def _is_atom(operand: Operand) -> bool:
+def _is_atom(operand: Number) -> bool:
     return not isinstance(operand, Traced) or bool(operand.symbol) or not operand.operation
 
 

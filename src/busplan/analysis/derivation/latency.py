@@ -2,8 +2,9 @@
 
 from busplan.analysis.derivation.inputs import traced_profile
 from busplan.analysis.derivation.origin import Input, short
-from busplan.analysis.derivation.trace import Operand, Traced
+from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of, network_of
+from busplan.elementwise import Number
 from busplan.sections.profile import Profile
 from busplan.sourced import Sourced
 
@@ -34,7 +35,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
     """
     bus, network = bus_of(profile), network_of(traced_profile(profile))
     (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.name == kind)
-    found: dict[str, Operand | None] = {
+    found: dict[str, Number | None] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         "transaction": chosen(kind, "transaction", "transaction asked for"),
         "payload_bytes": one.payload_bytes,
@@ -49,7 +50,7 @@ def chosen(word: object, key: str, meaning: str) -> Traced:
     return Traced(word, given=Input(key, key, str(word), "", "given", "asked for", meaning))
 
 
-def remembered(number: "Operand | None", key: str, symbol: str) -> Traced:
+def remembered(number: Number | None, key: str, symbol: str) -> Traced:
     """Name a traced figure; a constant becomes a line of its own."""
     if isinstance(number, Traced):
         return number.named(key, symbol)

@@ -9,10 +9,10 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from math import ceil, floor
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple
 
 from busplan.analysis.derivation.origin import GivenTable, Input, constant, short
-from busplan.elementwise import SpecialNumber
+from busplan.elementwise import Number, SpecialNumber
 from busplan.sourced import Sourced
 
 
@@ -45,8 +45,6 @@ OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
 )
 CHOSEN: Final = "chosen"
 """An operation whose value is its first part; the other parts are the conditions."""
-Operand: TypeAlias = "Traced | float"
-"""A `Traced` number, a `Sourced` one, or a plain one."""
 
 
 class Traced(SpecialNumber):
@@ -73,7 +71,7 @@ class Traced(SpecialNumber):
         value: Any,
         *,
         operation: str = "",
-        parts: tuple[Operand, ...] = (),
+        parts: tuple[Number, ...] = (),
         formula: str = "",
         numbers: str = "",
         given: Input | None = None,
@@ -93,31 +91,31 @@ class Traced(SpecialNumber):
             self.key, self.symbol = key, symbol
         return self
 
-    def __add__(self, other: Operand) -> "Traced":
+    def __add__(self, other: Number) -> "Traced":
         return _computed("add", self, other)
 
-    def __radd__(self, other: Operand) -> "Traced":
+    def __radd__(self, other: Number) -> "Traced":
         return _computed("add", other, self)
 
-    def __sub__(self, other: Operand) -> "Traced":
+    def __sub__(self, other: Number) -> "Traced":
         return _computed("sub", self, other)
 
-    def __rsub__(self, other: Operand) -> "Traced":
+    def __rsub__(self, other: Number) -> "Traced":
         return _computed("sub", other, self)
 
-    def __mul__(self, other: Operand) -> "Traced":
+    def __mul__(self, other: Number) -> "Traced":
         return _computed("mul", self, other)
 
-    def __rmul__(self, other: Operand) -> "Traced":
+    def __rmul__(self, other: Number) -> "Traced":
         return _computed("mul", other, self)
 
-    def __truediv__(self, other: Operand) -> "Traced":
+    def __truediv__(self, other: Number) -> "Traced":
         return _computed("truediv", self, other)
 
-    def __rtruediv__(self, other: Operand) -> "Traced":
+    def __rtruediv__(self, other: Number) -> "Traced":
         return _computed("truediv", other, self)
 
-    def __pow__(self, other: Operand) -> "Traced":
+    def __pow__(self, other: Number) -> "Traced":
         return _computed("pow", self, other)
 
     # == gives a traced truth value, so that the hash is the identity.
@@ -126,30 +124,30 @@ class Traced(SpecialNumber):
     def __eq__(self, other: object) -> Any:
         return _computed("eq", self, other)
 
-    def __lt__(self, other: Operand) -> "Traced":
+    def __lt__(self, other: float | SpecialNumber) -> "Traced":
         return _computed("lt", self, other)
 
-    def __le__(self, other: Operand) -> "Traced":
+    def __le__(self, other: float | SpecialNumber) -> "Traced":
         return _computed("le", self, other)
 
-    def __gt__(self, other: Operand) -> "Traced":
+    def __gt__(self, other: float | SpecialNumber) -> "Traced":
         return _computed("gt", self, other)
 
-    def __ge__(self, other: Operand) -> "Traced":
+    def __ge__(self, other: float | SpecialNumber) -> "Traced":
         return _computed("ge", self, other)
 
     def __bool__(self) -> bool:
         return bool(self.value)
 
-    def larger_of(self, one: Operand, other: Operand) -> "Traced":
+    def larger_of(self, one: Number, other: Number) -> "Traced":
         """The larger of two numbers."""
         return Traced(max(value_of(one), value_of(other)), operation="larger", parts=(one, other))
 
-    def smaller_of(self, one: Operand, other: Operand) -> "Traced":
+    def smaller_of(self, one: Number, other: Number) -> "Traced":
         """The smaller of two numbers."""
         return Traced(min(value_of(one), value_of(other)), operation="smaller", parts=(one, other))
 
-    def chosen(self, condition: Operand, yes: Operand, no: Operand) -> "Traced":
+    def chosen(self, condition: Number, yes: Number, no: Number) -> "Traced":
         """`yes` where the condition holds, else `no`."""
         won = yes if value_of(condition) else no
         return Traced(value_of(won), operation=CHOSEN, parts=(won, condition))
@@ -166,7 +164,7 @@ class Traced(SpecialNumber):
         """The whole number before it, or itself."""
         return Traced(floor(self.value), operation="rounded_down", parts=(self,))
 
-    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Operand, ...]) -> "Traced":
+    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Number, ...]) -> "Traced":
         """The entry of a table at this place."""
         index = min(int(self.value), len(table) - 1)
         return Traced(table[index], formula=words, numbers=f"entry {index + 1} of {len(table)}", parts=(self, *sources))
@@ -182,7 +180,7 @@ class Traced(SpecialNumber):
         found = y0 + (y1 - y0) * (self - x0) / (x1 - x0)
         return Traced(found.value, operation=CHOSEN, parts=(found, *sources))
 
-    def constant(self, number: Operand) -> Operand:
+    def constant(self, number: Number) -> Number:
         """Make an input from a constant."""
         return Traced(float(number), given=constant(number)) if isinstance(number, Sourced) else number
 
@@ -191,7 +189,7 @@ class Traced(SpecialNumber):
         return Traced(self.value, formula=words, numbers=short(self.value), parts=(self,))
 
 
-def found(value: object, words: str, parts: Iterable[Operand]) -> Traced:
+def found(value: object, words: str, parts: Iterable[Number]) -> Traced:
     """A result without an equation, as of a search or a simulation: it has no steps, but all inputs of its parts.
 
     Parameters
@@ -207,10 +205,11 @@ def found(value: object, words: str, parts: Iterable[Operand]) -> Traced:
     return Traced(value, formula=words, parts=tuple(Traced(leaf.value, given=leaf) for leaf in leaves))
 
 
-def value_of(operand: Operand) -> float:
-    """Plain number of any operand."""
-    found: float = operand.value if isinstance(operand, Traced) else operand
-    return float(found) if isinstance(found, Sourced) else found
+def value_of(operand: Number) -> float:
+    """Plain number of any operand; a word, which `==` compares, too, stays one."""
+    value: Any = operand.value if isinstance(operand, Traced) else operand
+    found: float = float(value) if isinstance(value, Sourced) else value
+    return found
 
 
 def _computed(name: str, left: Any, right: Any) -> Traced:
@@ -226,7 +225,7 @@ def _computed(name: str, left: Any, right: Any) -> Traced:
 _NEUTRAL: Final = MappingProxyType({"add": 0, "sub": 0, "mul": 1, "truediv": 1})
 
 
-def _is_switch(operand: Operand, value: int) -> bool:
+def _is_switch(operand: Number, value: int) -> bool:
     return not isinstance(operand, (Traced, Sourced)) and operand == value
 
 

@@ -48,7 +48,7 @@ def smallest_ratio(profile: Profile) -> float:
     needed_us, period_us = safe_required_us(profile), profile.cycle.period_us
     steps = _smallest(
         needed_us / period_us * RATIO_STEPS,
-        fits=lambda number: fits_in(needed_us, available_us=number / RATIO_STEPS * period_us),
+        fits=lambda number: bool(fits_in(needed_us, available_us=number / RATIO_STEPS * period_us)),
     )
     return steps / RATIO_STEPS
 
@@ -75,7 +75,7 @@ def smallest_period(
     step_us = 1.0 if circle is None else profile.servo.step_us
     first = _smallest(
         needed_us / ratio / step_us,
-        fits=lambda number: fits_in(needed_us, available_us=ratio * _times(number, step_us)),
+        fits=lambda number: bool(fits_in(needed_us, available_us=ratio * _times(number, step_us))),
     )
     if _times(first, step_us) > MAX_TIME_US:
         return PeriodSearch(None, "time", proven=True)

@@ -156,10 +156,10 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     cycle = bus.cycle(network, model=model)
     numbers = {**numeric_figures(cycle), **cycle.figures(), **{term.key: term.us for term in cycle.terms}}
     limits = limits_with_time(network, model=model)
-    late = np.logical_not(fits_in(numbers["required_us"], available_us=numbers["available_us"]))
-    flags = [late if limit.key == TIME else limit.is_broken(network) for limit in limits]
+    late = np.logical_not(np.asarray(fits_in(numbers["required_us"], available_us=numbers["available_us"])))
+    flags = [late if limit.key == TIME else np.asarray(limit.is_broken(network)) for limit in limits]
     bits = np.min_scalar_type((1 << len(flags)) - 1)
-    exceeded: Number = sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags))
+    exceeded: Array = np.asarray(sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags)))
     most = most_nodes(network, limits)
     numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)
@@ -189,11 +189,11 @@ def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:
     network, bus = cycle.network, bus_of(cycle.network.profile)
     found, limits = certainty(cycle), limits_to_be_safe(network)
     # No more nodes are shown to fit than fit.
-    safe = most_nodes(network, limits, ceiling=int(np.max(most.nodes)) + 1)
-    broken: Number = False
+    safe = most_nodes(network, limits, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
+    broken: Array = np.asarray(False)
     for limit in bus.limits:
         if not limit.is_safety:
-            broken = np.logical_or(broken, limit.is_broken(network))
+            broken = np.logical_or(broken, np.asarray(limit.is_broken(network)))
     sorts = {figure.key: figure.sort for figure in CERTAINTY}
     numbers = {
         **certainty_numbers(found, cycle),
@@ -225,11 +225,11 @@ def _with_axes(values: Number, axes: int) -> Array:
     return found.reshape((1,) * axes) if found.ndim == 0 else found
 
 
-def _largest(terms: list[Number]) -> Number:
+def _largest(terms: list[Number]) -> Array:
     """Index of the largest term; the first one among equals."""
-    best: Number = terms[0]
-    place: Number = np.uint8(0)
-    for index, term in enumerate(terms[1:], start=1):
+    best, *others = map(np.asarray, terms)
+    place = np.zeros((), np.uint8)
+    for index, term in enumerate(others, start=1):
         place = np.where(np.greater(term, best), np.uint8(index), place)
         best = np.maximum(term, best)
     return place

@@ -19,7 +19,7 @@ from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingM
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of
 from busplan.buses.network import TRANSACTION_KINDS, Network
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number, is_off, is_one, larger, named, rounded_down, total
+from busplan.elementwise import Number, is_off, is_one, larger, named, plain, rounded_down, total
 
 _OF_TRANSACTIONS: Final = (
     "cycle_arbitration_us",
@@ -83,7 +83,8 @@ class Ieee1394Cycle(BusCycle):
         """
         if self.model == "paper":
             sync = self.network.profile.cycle.sync
-            return sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
+            ping_us: Number = sync.ping_us + sync.ping_per_node_us * (self.network.nodes - 1)
+            return ping_us
         own, link = self._delays, self.link
         data_us = equations.data_phase_us(
             link.hops, hop_us=own.hop_us, packet_bytes=SYNC_PACKET_BYTES, data_rate_mbit_s=link.data_rate_mbit_s
@@ -93,7 +94,7 @@ class Ieee1394Cycle(BusCycle):
     @cached_property
     def retries_us(self) -> Number:
         """Busy retries of the longest request, each with an arbitration reset gap [us]."""
-        retries = self.network.profile.cycle.retries
+        retries: Number = self.network.profile.cycle.retries
         if is_off(retries):
             return 0.0
         own = self._delays
@@ -107,7 +108,7 @@ class Ieee1394Cycle(BusCycle):
         data_us = equations.data_phase_us(
             link.hops, hop_us=own.hop_us, packet_bytes=CYCLE_START_BYTES, data_rate_mbit_s=DATA_RATE_MBIT_S["S100"]
         )
-        isochronous_us = self.network.profile.bus.isochronous_us
+        isochronous_us: Number = self.network.profile.bus.isochronous_us
         return own.gaps.arbitration_reset_us + own.arbitration_us + data_us + isochronous_us
 
     def starts(self, others_us: Number) -> Number:
@@ -227,7 +228,7 @@ class Ieee1394Cycle(BusCycle):
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
         starts = self._number_of_starts
         sent, now_us = 0, 0.0
-        start = BusEvent("cycle_start", "cycle_starts_us", self.cycle_start_us if starts else 0.0, "cycle start")
+        start = BusEvent("cycle_start", "cycle_starts_us", plain(self.cycle_start_us) if starts else 0.0, "cycle start")
         for stretch in self._stretches():
             while sent < starts and now_us >= sent * CYCLE_US:
                 yield start
@@ -240,17 +241,18 @@ class Ieee1394Cycle(BusCycle):
 
     def _stretches(self) -> Iterator[list[BusEvent]]:
         """What no cycle start interrupts."""
-        yield [BusEvent("sync", "sync_us", self.sync_us, "synchronous packet")]
+        yield [BusEvent("sync", "sync_us", plain(self.sync_us), "synchronous packet")]
         for kind in TRANSACTION_KINDS:
             node = 0
             for one in self.exchanges:
-                for _ in range(one.nodes if one.kind == kind else 0):
+                for _ in range(int(one.nodes) if one.kind == kind else 0):
                     node += 1
                     yield [part._replace(node=node, transaction=kind) for part in events(one, model=self.model)]
         retries = 0 if self.model == "paper" else self.network.profile.cycle.retries
         for _ in range(retries):
-            yield [BusEvent("retry", "retries_us", self.retries_us / retries, "busy retry of the longest request")]
-        yield [BusEvent("nonperiodic", "nonperiodic_us", self.network.nonperiodic_us, "non-periodic window")]
+            retry_us = plain(self.retries_us) / retries
+            yield [BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request")]
+        yield [BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")]
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """What the cycle could have and does not say."""

@@ -134,7 +134,8 @@ def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
 
 def _is_fitted(network: Network) -> Number:
     """Whether the execution time holds the error of the model, because it was fitted against it: a truth."""
-    return network.profile.node.execution.residual == "standard"
+    truth: Number = network.profile.node.execution.residual == "standard"
+    return truth
 
 
 def _measured_at(network: Network) -> Number:

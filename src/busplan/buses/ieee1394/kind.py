@@ -26,6 +26,7 @@ from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.sourced import Sourced
 
@@ -174,7 +175,8 @@ class Ieee1394(Bus):
             overhead_bytes=network.profile.payload.overhead_bytes,
             responder=Responder(0.0),
         )
-        return Halves(phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
+        parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
+        return Halves(*map(plain, parts_us))
 
     def fit_keys(self, network: Network, *, model: str | None) -> dict[str, Value]:
         """The timing model and the gap count."""
@@ -186,7 +188,7 @@ class Ieee1394(Bus):
         if not network.profile.bus.cable_is_standard:
             reason = f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m"
             return (Setting(key, label, None, (), "gap table", reason),)
-        safe = safe_gap_count(hops_of(network))
+        safe = plain(safe_gap_count(hops_of(network)))
         values = () if gap_count_of(network) == safe else (safe,)
         return (Setting(key, label, safe, values, "gap table", follows="optimal"),)
 
@@ -202,7 +204,7 @@ class Ieee1394(Bus):
         if "hops" in broken:
             found["bus.max_hops"] = hops = int(MAX_HOPS)
         if bus.cable_is_standard and gap_count_of(network) < safe_gap_count(hops):
-            found["bus.gap_count"] = safe_gap_count(hops)
+            found["bus.gap_count"] = plain(safe_gap_count(hops))
         return found
 
     def payloads(self, network: Network) -> PayloadRange:

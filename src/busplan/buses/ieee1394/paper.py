@@ -17,6 +17,7 @@ from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases
 from busplan.buses.ieee1394.transactions import exchange, link_of
 from busplan.buses.network import Network
 from busplan.buses.published import Comparison, PaperSection
+from busplan.elementwise import plain
 
 Published = Mapping[str, Any]
 """The published figures, as the package's data file holds them."""
@@ -69,7 +70,7 @@ def _theory() -> PaperSection:
                 "us",
                 row.theory_us,
                 "eq (15)",
-                equations.published_request_and_acknowledge_us(row.payload_bytes),
+                plain(equations.published_request_and_acknowledge_us(row.payload_bytes)),
             )
             for row in TABLE_1
         ),
@@ -88,7 +89,7 @@ def _first_half(bench: Network) -> PaperSection:
                 "us",
                 row.request_and_acknowledge_us,
                 method,
-                one.request_and_acknowledge_us,
+                plain(one.request_and_acknowledge_us),
             )
             for row in TABLE_1
             for method, one in _write_phases(bench, row.payload_bytes)
@@ -103,7 +104,7 @@ def _latency(bench: Network) -> PaperSection:
         "Equation (3). T_exec is derived from the same table, T_lant less both halves as measured, the second without "
         "a payload: the residual is that of the halves alone, and no test of T_exec.",
         tuple(
-            Comparison(title, f"{row.payload_bytes} bytes", "us", row.latency_us, method, one.latency_us)
+            Comparison(title, f"{row.payload_bytes} bytes", "us", row.latency_us, method, plain(one.latency_us))
             for row in TABLE_1
             for method, one in _write_phases(bench, row.payload_bytes)
         ),
@@ -154,7 +155,7 @@ def _can(bench: Network, published: Published) -> PaperSection:
         title,
         f"{can_us} us by CAN, which over the printed {can['latency_us']} us is {can_us / can['latency_us']:.1f}. "
         f"T_exec at {size} bytes lies between two rows of Table I.",
-        tuple(one for method, half in _write_phases(bench, size) for one in compared(method, half.latency_us)),
+        tuple(one for method, half in _write_phases(bench, size) for one in compared(method, plain(half.latency_us))),
     )
 
 
@@ -189,7 +190,7 @@ def _equation_10(bench: Network) -> PaperSection:
     title = "Equation (10): the clock of the gaps"
     link = link_of(bench)
     gaps_us = {
-        name: equations.gaps_us(link.gap_count, gap_clock_mbit_s=model.gap_clock_mbit_s(link.data_rate_mbit_s))
+        name: plain(equations.gaps_us(link.gap_count, gap_clock_mbit_s=model.gap_clock_mbit_s(link.data_rate_mbit_s)))
         for name, model in TIMING_MODELS.items()
     }
     quantity = f"T_sum, gap count {link.gap_count:g}"
@@ -208,7 +209,7 @@ def _equation_10(bench: Network) -> PaperSection:
             *(Comparison(title, quantity, "us", None, f"{name} model", value) for name, value in gaps_us.items()),
             Comparison(title, "standard / paper", "1", None, "standard model", gaps_us["standard"] / gaps_us["paper"]),
             *(
-                Comparison(title, f"idle bus of a write, {size} bytes", "us", None, f"{name} model", one.idle_us)
+                Comparison(title, f"idle bus of a write, {size} bytes", "us", None, f"{name} model", plain(one.idle_us))
                 for name, one in own.items()
             ),
         ),

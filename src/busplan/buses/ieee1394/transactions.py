@@ -16,7 +16,7 @@ from busplan.buses.ieee1394.timing import (
     transaction,
 )
 from busplan.buses.network import Group, Network, TransactionKind
-from busplan.elementwise import Number, SpecialNumber, alike, is_one, named, worded
+from busplan.elementwise import Number, SpecialNumber, alike, is_one, named, plain, worded
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.idle import Answer
@@ -30,13 +30,13 @@ def hops_of(network: Network) -> Number:
     In a chain they lie between the host and the farthest node. In a tree they are `max_hops`, which the host's own way
     to a node never exceeds.
     """
-    most = network.profile.bus.max_hops
+    most: Number | None = network.profile.bus.max_hops
     return worded(network.nodes, "N: a chain with the host at its end") if most is None else most
 
 
 def gap_count_of(network: Network) -> Number:
     """Gap count in force [1]."""
-    given = network.profile.bus.gap_count
+    given: Number | str = network.profile.bus.gap_count
     if not isinstance(given, str):
         return given
     return worded(safe_gap_count(hops_of(network)), 'g_safe, for bus.gap_count is "optimal"')
@@ -54,6 +54,16 @@ def link_of(network: Network) -> Link:
     )
 
 
+class TransactionPart(NamedTuple):
+    """A stretch of a transaction, as a `BusEvent` has it; the time may be of any sort."""
+
+    kind: str
+    term: str
+    us: Number
+    label: str
+    packet: str | None = None
+
+
 class Exchange(NamedTuple):
     """The same transaction with each node of a group."""
 
@@ -64,7 +74,7 @@ class Exchange(NamedTuple):
     execution_uncertainty_us: Number
     """Standard uncertainty of the execution time [us]."""
     phases: Phases
-    parts: tuple[BusEvent, ...]
+    parts: tuple[TransactionPart, ...]
     """What the transaction is made of, in the order of the wire; what the answer does not have is not there.
 
     The idle bus of the gaps is one part here; `events` divides it.
@@ -139,32 +149,32 @@ PACKET_PARTS: Final = ("cycle_arbitration_us", "cycle_data_us", "cycle_acknowled
 """Terms whose parts are one packet's way over the hops."""
 
 
-def _parts(phases: Phases, answer: "Answer") -> Iterator[BusEvent]:
+def _parts(phases: Phases, answer: "Answer") -> Iterator[TransactionPart]:
     yield from _packet(phases, "request", "host", arbitrates=True)
     if answer == "split":
-        yield BusEvent("execution", "cycle_execution_us", phases.execution_us, "node execution")
-        yield BusEvent("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
+        yield TransactionPart("execution", "cycle_execution_us", phases.execution_us, "node execution")
+        yield TransactionPart("worst_extra", "cycle_worst_extra_us", phases.worst_extra_us, "slowest execution")
     if answer == "concatenated":
-        yield BusEvent("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
+        yield TransactionPart("hold", "cycle_hold_us", phases.hold_us, "node holds the bus")
     if answer != "unified":
         yield from _packet(phases, "response", "node", arbitrates=answer == "split")
-    yield BusEvent("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
-    yield BusEvent("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
+    yield TransactionPart("idle", "cycle_idle_us", phases.idle_us, "idle bus of the gaps")
+    yield TransactionPart("host", "cycle_host_us", phases.host_us, "host's own time beyond the gaps")
 
 
-def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[BusEvent]:
+def _packet(phases: Phases, packet: str, sender: Who, *, arbitrates: bool) -> Iterator[TransactionPart]:
     receiver: Who = "node" if sender == "host" else "host"
     data_us = phases.request_data_us if packet == "request" else phases.response_data_us
     if arbitrates:
-        yield BusEvent(
+        yield TransactionPart(
             "arbitration",
             "cycle_arbitration_us",
             phases.arbitration_us,
             f"{sender} arbitration",
             packet=packet,
         )
-    yield BusEvent(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
-    yield BusEvent(
+    yield TransactionPart(f"{packet}_data", "cycle_data_us", data_us, f"{sender} data", packet=packet)
+    yield TransactionPart(
         "acknowledge", "cycle_acknowledge_us", phases.acknowledge_us, f"{receiver} acknowledge", packet=packet
     )
 
@@ -176,7 +186,7 @@ def events(one: Exchange, *, model: TimingModelName) -> Iterator[BusEvent]:
         if part.kind == "idle":
             yield from behind
         else:
-            yield part
+            yield BusEvent(part.kind, part.term, plain(part.us), part.label, packet=part.packet)
             if part.kind == "worst_extra":
                 yield from before
 
@@ -191,19 +201,21 @@ def _gap(kind: str, us: float, label: str) -> BusEvent:
 
 def _added_up(phases: Phases) -> _Divided:
     """Both gaps behind the transaction."""
-    subaction = _gap("subaction_gap", phases.subaction_gap_us, "subaction gap")
-    return (), (subaction, _gap("arbitration_reset_gap", phases.arbitration_reset_gap_us, "arbitration reset gap"))
+    sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
+    subaction = _gap("subaction_gap", sub_us, "subaction gap")
+    return (), (subaction, _gap("arbitration_reset_gap", reset_us, "arbitration reset gap"))
 
 
 def _by_idle_period(one: Exchange) -> _Divided:
     """The gap that each idle period waits for, and what a faster node would take beyond."""
     phases = one.phases
-    sub_us, reset_us = phases.subaction_gap_us, phases.arbitration_reset_gap_us
+    sub_us, reset_us = plain(phases.subaction_gap_us), plain(phases.arbitration_reset_gap_us)
+    idle_us = plain(phases.idle_us)
     if one.responder.answer != "split":
-        return (), (_gap("arbitration_reset_gap", phases.idle_us, "arbitration reset gap behind the transaction"),)
-    execution_us = phases.execution_us + phases.worst_extra_us
+        return (), (_gap("arbitration_reset_gap", idle_us, "arbitration reset gap behind the transaction"),)
+    execution_us = plain(phases.execution_us) + plain(phases.worst_extra_us)
     before_us = max(sub_us - execution_us, 0.0)
-    behind_us = phases.idle_us - before_us
+    behind_us = idle_us - before_us
     has_run = execution_us > reset_us
     allowance_us = behind_us - (sub_us if has_run else reset_us)
     allowance_us = allowance_us if allowance_us > _ROUNDING_US else 0.0
