@@ -7,7 +7,7 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Iterable, Sequence
-from math import ceil, floor
+from math import ceil, floor, sqrt
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 if TYPE_CHECKING:
@@ -227,6 +227,23 @@ def choose(condition: Number, yes: Number, no: Number) -> Number:
     import numpy as np
 
     return np.where(condition, yes, no)
+
+
+def square_root(number: Number) -> Number:
+    """The square root of a number that is 0 or more, rounded alike for numbers of any sort.
+
+    Examples
+    --------
+    >>> square_root(2.25)
+    1.5
+    """
+    if isinstance(number, _PLAIN):
+        return sqrt(number)
+    if isinstance(number, SpecialNumber):
+        return number**0.5
+    import numpy as np
+
+    return np.sqrt(number)
 
 
 def rounded_up(number: Number) -> Number:

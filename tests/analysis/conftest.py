@@ -222,7 +222,7 @@ def profiles(draw: st.DrawFn) -> Profile:
     master = draw(st.booleans())
     own: dict[str, Any] = {
         "bus__cycle_master": master,
-        "bus__isochronous_us": draw(st.floats(0.0, 125.0)) if master else 0.0,
+        "bus__isochronous_us": draw(st.floats(0.0, 40.0)) if master else 0.0,
         "bus__phy_delay_us": draw(st.one_of(st.none(), st.floats(0.01, 0.2))),
         "cycle__retries": draw(st.integers(0, 5)),
         "host": {"transaction_us": draw(st.one_of(st.just(0.0), st.floats(0.0, 60.0)))},

@@ -320,6 +320,6 @@ def test_a_tolerance_allows_a_share_of_the_figure_of_a(make: Make) -> None:
 def test_what_is_no_number_is_never_tolerated(make: Make) -> None:
     a, b = make(cycle__period_us=1000.0), make(cycle__period_us=200.0)
     worse = {(one.part, one.figure.key) for one in difference(a, b).regressions(tolerance=1e9)}
-    assert worse == {("plan", "shown_to_fit"), ("paper", "fits"), ("standard", "fits")}
+    assert worse == {("plan", "verdict"), ("plan", "shown_to_fit"), ("paper", "fits"), ("standard", "fits")}
     unstable = circles(make, circle_of(), circle_of(stable=False, phase_margin_deg=None))
     assert {one.figure.key for one in unstable.regressions(tolerance=1e9)} == {"stable", "phase_margin_deg"}

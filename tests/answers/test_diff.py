@@ -228,8 +228,8 @@ def test_why_a_circle_has_no_figures_is_said() -> None:
 def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> None:
     found = difference(paper, override(paper, {"cycle.nonperiodic_us": 250}))
     assert regression_words(found, found.regressions(tolerance=0.8), tolerance=80) == (
-        "regression: B is worse by more than 80 % in 9 figures: verdict, shown to fit, corrected margin, smallest safe period, "
-        "margin, utilisation, required N T_cs, smallest period, required <= available (standard)"
+        "regression: B is worse by more than 80 % in 9 figures: verdict, shown to fit, corrected margin, "
+        "smallest safe period, margin, utilisation, required N T_cs, smallest period, required <= available (standard)"
     )
     assert regression_words(found, found.regressions(), tolerance=0).startswith("regression: B is worse in ")
 

@@ -12,7 +12,7 @@ from busplan.analysis.network import bus_of
 from busplan.buses.bus import BusCycle, Doubt, Limit
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, named, total
+from busplan.elementwise import Number, choose, named, square_root, total
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"
@@ -51,7 +51,7 @@ def certainty(cycle: BusCycle) -> Certainty:
     """
     network, bias_us, doubts = cycle.network, cycle.bias_us(), cycle.doubts()
     extra_us: Number = 0.0 if bias_us is None else bias_us
-    combined_us = total(one.us * one.us for one in doubts) ** 0.5
+    combined_us = square_root(total(one.us * one.us for one in doubts))
     expanded_us = COVERAGE * named(combined_us, "combined_uncertainty_us", "u_c")
     longer_us = cycle.added_us(extra_us)
     uncertain_us = cycle.added_us(expanded_us, after_us=extra_us)

@@ -7,7 +7,7 @@ of a derivation therefore shows what was executed.
 import operator
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from math import ceil, floor
+from math import ceil, floor, sqrt
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -23,6 +23,11 @@ class _Operation(NamedTuple):
     compute: Callable[..., float]
 
 
+def _power(base: float, exponent: float) -> float:
+    """A power; a root is rounded as that of a plain number."""
+    return sqrt(base) if exponent == 0.5 else operator.pow(base, exponent)  # noqa: PLR2004 - the exponent of a root
+
+
 COMPARISON: Final = 0
 FUNCTION: Final = 4
 OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
@@ -31,7 +36,7 @@ OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
         "sub": _Operation("-", 1, operator.sub),
         "mul": _Operation("*", 2, operator.mul),
         "truediv": _Operation("/", 2, operator.truediv),
-        "pow": _Operation("^", 3, operator.pow),
+        "pow": _Operation("^", 3, _power),
         "lt": _Operation("<", COMPARISON, operator.lt),
         "le": _Operation("<=", COMPARISON, operator.le),
         "gt": _Operation(">", COMPARISON, operator.gt),
