@@ -79,6 +79,16 @@ def test_a_verdict_that_is_not_shown_says_so_with_its_reserve(profile: Profile) 
     assert "15% of the slice must stay free (limits.reserve)." in text
 
 
+def test_an_execution_that_no_answer_puts_on_the_bus_is_not_spoken_of(profile: Profile) -> None:
+    off = override(profile, {"node.read_response": "concatenated", "node.write_response": "unified"})
+    for text in (words(off), render(latency_report(latency(off), off), "table")):
+        assert "The execution time behind these figures" not in text
+    assert "slowest execution" not in words(off)
+    assert "The execution time behind these figures is derived." in words(
+        override(off, {"node.read_response": "split"})
+    )
+
+
 def test_what_the_paper_cannot_express_is_not_applicable(profile: Profile) -> None:
     own = override(profile, {"cycle.retries": 1, "host.transaction_us": 5.0})
     text = words(own)

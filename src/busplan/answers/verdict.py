@@ -87,9 +87,9 @@ def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Se
 
 
 def execution_sentence(profile: Profile) -> Iterator[Sentence]:
-    """Say how the execution time behind the figures is known; nothing if the profile has no grade."""
+    """Say how the execution time behind the figures is known; nothing if there is no grade or none on the bus."""
     grade = profile.node.execution.grade
-    if grade is not None:
+    if grade is not None and bus_of(profile).has_execution(network_of(profile)):
         text = f"The execution time behind these figures is {grade}."
         yield sentence(text, state="warns" if grade == "assumed" else "neutral")
 

@@ -344,6 +344,10 @@ class Bus(ABC):
         """Keys of a profile that a timing model has no term for: its figures are not applicable then."""
         return ()
 
+    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - most have
+        """Whether the cycle holds an execution time of the nodes."""
+        return True
+
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn, with the values that are safe for this very network."""
         return ()

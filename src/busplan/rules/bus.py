@@ -74,7 +74,8 @@ def _room(subject: RuleSubject, nodes: int) -> str:
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The execution time is an assumption."""
-    if subject.profile.node.execution.grade == "assumed":
+    profile = subject.profile
+    if profile.node.execution.grade == "assumed" and bus_of(profile).has_execution(network_of(profile)):
         yield RuleProblem(
             "node.execution.grade",
             "the execution time is an assumption, and the largest terms rest on it; measure it on the node",

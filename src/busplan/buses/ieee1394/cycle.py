@@ -257,7 +257,7 @@ class Ieee1394Cycle(BusCycle):
     def left_out(self) -> tuple[LeftOut, ...]:
         """What the cycle could have and does not say."""
         profile = self.network.profile
-        is_split = "split" in (profile.node.read_response, profile.node.write_response)
+        is_split = any(one.responder.answer == "split" for one in self.exchanges)
         found = []
         if not profile.host.transaction_us:
             found.append(LeftOut("host time", "host.transaction_us"))

@@ -182,6 +182,10 @@ class Ieee1394(Bus):
         """The timing model and the gap count."""
         return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
 
+    def has_execution(self, network: Network) -> bool:
+        """Whether a transaction is split: other answers keep the execution off the bus."""
+        return "split" in (network.profile.node.read_response, network.profile.node.write_response)
+
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count: one register in each node."""
         key, label = "bus.gap_count", "gap count"
