@@ -9,7 +9,7 @@ from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, leading_model, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
-from busplan.answers.verdict import places_of, verdict_sentences, warnings
+from busplan.answers.verdict import places_of, uncertainty_parts, verdict_sentences, warnings
 from busplan.buses import figure
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
@@ -157,20 +157,6 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
 def certainty_record(figures: CapacityFigures) -> Record:
     """Figures of how sure the verdict is, without its word."""
     return {one.key: getattr(figures, one.key) for one in figure.CERTAINTY if one is not figure.VERDICT}
-
-
-def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
-    """What the uncertainty is made of, the largest first."""
-    whole = sum(float(one.us) ** 2 for one in figures.doubts)
-    return [
-        {
-            "input": one.key,
-            "label": one.label,
-            "standard_uncertainty_us": float(one.us),
-            "share": float(one.us) ** 2 / whole if whole else 0.0,
-        }
-        for one in sorted(figures.doubts, key=lambda one: -float(one.us))
-    ]
 
 
 def safety_record(figures: CapacityFigures, profile: Profile) -> Record:

@@ -8,6 +8,7 @@ from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, D
 from busplan.answers.changes import change_document, change_table
 from busplan.answers.diff_headline import STATES, headline, named
 from busplan.answers.documents import document
+from busplan.answers.verdict import not_applicable
 from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
@@ -23,6 +24,7 @@ from busplan.forms.blocks import (
     Words,
     count_value,
     figure_value,
+    joined,
     sentence,
 )
 from busplan.forms.columns import sentence_text
@@ -148,6 +150,8 @@ def _sides(found: Difference, arguments: Arguments) -> Table:
 
 def _notes(found: Difference) -> Iterator[Sentence]:
     """Say why a circle fails or has no figures, and how well the inputs of the figures are known."""
+    for side, profile in zip("AB", (found.a, found.b), strict=True):
+        yield from (joined(sentence(f"{side}:"), one) for one in not_applicable(profile))
     executions = (found.a.node.execution.grade, found.b.node.execution.grade)
     yield from _graded("execution time behind these figures is", *executions)
     if found.circles is None:

@@ -25,7 +25,18 @@ from busplan.buses.figure import (
 )
 from busplan.buses.rule import contradicts
 from busplan.elementwise import plain
-from busplan.forms.blocks import Code, Part, Sentence, ShownValue, count_value, figure_value, joined, sentence, state_of
+from busplan.forms.blocks import (
+    Code,
+    Part,
+    Record,
+    Sentence,
+    ShownValue,
+    count_value,
+    figure_value,
+    joined,
+    sentence,
+    state_of,
+)
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
 
@@ -123,17 +134,29 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     if limits:
         return said  # whatever the time is
     found = [said, _margin(figures, at=at)]
-    doubt = max(figures.doubts, key=lambda one: plain(one.us), default=None)
-    if doubt is not None and doubt.us:
-        share = doubt.us**2 / sum(one.us**2 for one in figures.doubts)
+    largest = next(iter(uncertainty_parts(figures)), None)
+    if largest is not None and largest["share"]:
         place = f"{at}/uncertainty_parts/0/share" if at else ""
-        found.append(
-            sentence(f"Largest doubt: {doubt.label}, {{}} of U squared.", ShownValue(share, "share", "%", 0, at=place))
-        )
+        share = ShownValue(largest["share"], "share", "%", 0, at=place)
+        found.append(sentence(f"Largest doubt: {largest['label']}, {{}} of U squared.", share))
     if profile.limits.reserve:
         reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0, at=_place(at, "reserve"))
         found.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
     return joined(*found)
+
+
+def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
+    """What the uncertainty is made of, the largest first."""
+    whole = sum(float(one.us) ** 2 for one in figures.doubts)
+    return [
+        {
+            "input": one.key,
+            "label": one.label,
+            "standard_uncertainty_us": float(one.us),
+            "share": float(one.us) ** 2 / whole if whole else 0.0,
+        }
+        for one in sorted(figures.doubts, key=lambda one: -float(one.us))
+    ]
 
 
 def _margin(figures: CapacityFigures, *, at: str) -> Sentence:

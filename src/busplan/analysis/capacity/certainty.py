@@ -7,7 +7,7 @@ JCGM 100 (GUM): the combined standard uncertainty of independent inputs (5.1), a
 
 from typing import Final, Literal, NamedTuple
 
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME, available_us, fits_in
+from busplan.analysis.capacity.cycle import FIT_ROUNDING, available_us, fits_in, time_limit
 from busplan.analysis.network import bus_of
 from busplan.buses.bus import BusCycle, Doubt, Limit
 from busplan.buses.figure import BIAS, UNCERTAINTY
@@ -89,10 +89,5 @@ def verdict_code(found: Certainty, network: Network, *, is_broken: Number) -> Nu
 def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
     """Every limit that a network must keep to be shown to fit on a bus that is set safely; time is the last."""
     bus = bus_of(network.profile)
-    time = Limit(
-        TIME,
-        "{value:.3f} us needed of {most:.3f} us",
-        lambda one: certainty(bus.cycle(one, model=bus.deciding_model)).safe_required_us,
-        lambda one: available_us(one) * (1 + FIT_ROUNDING),
-    )
+    time = time_limit(lambda one: certainty(bus.cycle(one, model=bus.deciding_model)).safe_required_us)
     return (*bus.limits, time)

@@ -1,5 +1,6 @@
 """What a cycle needs, what its slice gives it, and the limits that it may break, for any kind of bus."""
 
+from collections.abc import Callable
 from typing import Final
 
 from busplan.analysis.network import bus_of, network_of
@@ -52,14 +53,19 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of a network's kind of bus in the order of reports, time the last; without those of safety."""
     bus = bus_of(network.profile)
-    time = Limit(
+    time = time_limit(lambda one: bus.cycle(one, model=model).required_us)
+    return (*(limit for limit in bus.limits if not limit.is_safety), time)
+
+
+def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
+    """The limit of time: what a network needs [us] against its share of the period."""
+    return Limit(
         TIME,
         "{value:.3f} us needed of {most:.3f} us",
-        lambda one: bus.cycle(one, model=model).required_us,
+        needed_us,
         lambda one: available_us(one) * (1 + FIT_ROUNDING),
         failure="required_us",
     )
-    return (*(limit for limit in bus.limits if not limit.is_safety), time)
 
 
 def broken_limits(profile: Profile) -> tuple[str, ...]:

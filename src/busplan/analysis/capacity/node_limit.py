@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import limits_to_be_safe
 from busplan.analysis.capacity.cycle import limits_with_time
-from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial
+from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial, least
 from busplan.analysis.network import network_of
 from busplan.buses.bus import Limit
 from busplan.buses.network import Network
@@ -113,7 +113,7 @@ def _in_closed_form(limit: Limit, network: Network) -> Number | None:
 
 def _with_one_node(nodes: Number, limit: Limit, network: Network) -> Number:
     """The most nodes, where a polynomial gave them: it is the cycle of two nodes or more, so one is asked alone."""
-    if _least(nodes) > 1:
+    if least(nodes) > 1:
         return nodes
     return choose(nodes > 1, nodes, choose(limit.is_broken(network.with_nodes(1)), 0.0, 1.0))
 
@@ -152,10 +152,6 @@ def _by_halves(limit: Limit, network: Network, ceiling: int) -> Number:
         over = limit.is_broken(network.with_nodes(middle))
         low, high = choose(over, low, middle), choose(over, middle - 1, high)
     return low
-
-
-def _least(number: Number) -> float:
-    return float(number.min()) if hasattr(number, "min") else float(number)
 
 
 def _greatest(number: Number) -> float:

@@ -68,7 +68,7 @@ class Polynomial(SpecialNumber):
         if len(self.coefficients) > _QUADRATIC:
             raise NoPolynomialError
         c0, c1, c2 = (*self.coefficients, 0.0, 0.0)[:_QUADRATIC]
-        if not (_least(c1) > 0 and _least(c2) >= 0):
+        if not (least(c1) > 0 and least(c2) >= 0):
             raise NoPolynomialError
         return c0, c1, c2
 
@@ -120,5 +120,6 @@ NODES: Final = Polynomial(0, 1)
 """N itself."""
 
 
-def _least(number: Number) -> float:
+def least(number: Number) -> float:
+    """The least element of an array, or a plain number itself."""
     return float(number.min()) if hasattr(number, "min") else float(number)

@@ -14,7 +14,7 @@ from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.analysis.network import bus_of, leading_model, model_names
 from busplan.analysis.register import CommandName, figure_named, figures_of
-from busplan.buses.figure import CERTAINTY, Figure
+from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress
@@ -22,6 +22,10 @@ from busplan.sections.profile import Profile
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest; "given" values are choices, not knowledge."""
+
+
+_BESIDE: Final = {MARGIN_CORRECTED.key: (UNCERTAINTY,)}
+"""Figures that are derived beside another: a margin says nothing without its uncertainty."""
 
 
 class Step(NamedTuple):
@@ -112,7 +116,8 @@ def explain(
     Returns
     -------
     Explanation
-        One derivation for each period, transaction and model, nested in this order.
+        One derivation for each period, transaction and model, nested in this order; behind that of the corrected margin
+        stands that of its uncertainty.
 
     Raises
     ------
@@ -136,11 +141,12 @@ def explain(
         where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": "period"})
         for kind in kinds:
             for model in models:
-                traced = _traced(where, command, one.key, model=model, kind=kind, progress=progress)
-                steps = tuple(_steps(where, traced, command, one))
-                found.append(
-                    Derivation(command, one, model, kind, period_us, traced.value, steps, tuple(inputs(traced)))
-                )
+                for each in (one, *_BESIDE.get(one.key, ())):
+                    traced = _traced(where, command, each.key, model=model, kind=kind, progress=progress)
+                    steps = tuple(_steps(where, traced, command, each))
+                    found.append(
+                        Derivation(command, each, model, kind, period_us, traced.value, steps, tuple(inputs(traced)))
+                    )
     return Explanation(profile, tuple(found))
 
 
