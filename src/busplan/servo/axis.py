@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from busplan.progress import Progress
 from busplan.servo.checks import Refused, refuse
 from busplan.servo.delivery import Arrivals
-from busplan.servo.engine import Engine, compiled, is_compiled
+from busplan.servo.engine import Engine, compiled_kernel
 from busplan.servo.kernel import ROUND, Constants, run_rows
 from busplan.servo.parameters import Axis, LoopTiming
 from busplan.servo.rows import KernelRows, kernel_rows, stored_targets_mm
@@ -25,10 +25,6 @@ _US_PER_S = 1e6
 _LARGEST_COUNT = 2.0**51
 """Largest number that `busplan.servo.kernel.ROUND` rounds exactly."""
 
-_SIGNATURE = (
-    "int64(float64[::1], UniTuple(float64, 13), float64[::1], int64[::1], float64[::1], float64[::1], float64[::1], "
-    "int64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])"
-)
 _CHUNK_STEPS = {False: 30_000, True: 250_000}
 """Steps between two progress reports: about 40 ms in plain Python, about 6 ms compiled."""
 
@@ -59,7 +55,7 @@ def simulate_axis(
     progress
         Called from time to time with the steps done and the total.
     engine
-        "auto" (numba if it is installed), "numba" or "python"; the result is the same.
+        "auto" (compiled if possible), "compiled" or "python"; the result is the same.
 
     Returns
     -------
@@ -70,7 +66,7 @@ def simulate_axis(
     Raises
     ------
     BusplanError
-        Too many steps, an encoder too fine for the travel, or "numba" without numba.
+        Too many steps, an encoder too fine for the travel, or "compiled" without a compiled kernel.
 
     Notes
     -----
@@ -104,13 +100,13 @@ def simulate_axis(
     cycles = len(setpoints_mm) - 1
     arrivals = Arrivals.punctual(cycles) if arrivals is None else arrivals
     position_mm = np.empty(checked_steps(setpoints_mm, axis=axis, timing=timing))
-    run = compiled(run_rows, _SIGNATURE) if is_compiled(engine) else None
-    chunk_steps = _CHUNK_STEPS[run is not None]
+    compiled = compiled_kernel(engine)
+    chunk_steps = _CHUNK_STEPS[compiled is not None]
     state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
     for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
         out = position_mm[done:]
         # Plain Python is twice as fast with Python floats as with numpy floats.
-        done += run(state, constants, out, *rows) if run else _run_plain(state, constants, rows, out)
+        done += compiled.run_rows(state, constants, out, *rows) if compiled else _run_plain(state, constants, rows, out)
         if progress is not None:
             progress(done, len(position_mm))
     return position_mm

@@ -153,7 +153,7 @@ def simulate_circle(
     progress
         Called from time to time with the steps done and the total of both axes.
     engine
-        "auto" (numba if it is installed), "numba" or "python"; the result is the same.
+        "auto" (compiled if possible), "compiled" or "python"; the result is the same.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def simulate_circle(
     ------
     BusplanError
         The periods differ, a drive cannot reach the feed, jitter and skew are too large for the period, there are
-        too many steps, or "numba" is not installed.
+        too many steps, or "compiled" without a compiled kernel.
 
     Notes
     -----
@@ -234,7 +234,7 @@ def check_circle(
     Raises
     ------
     BusplanError
-        As `simulate_circle`, except for "numba".
+        As `simulate_circle`, except for "compiled".
 
     Examples
     --------

@@ -1,72 +1,50 @@
-"""Compile functions with numba, if it is available."""
+"""Choose the kernel: compiled when the package was built, or plain Python."""
 
-from collections.abc import Callable
 from functools import cache
-from importlib.util import find_spec
-from typing import Any, Literal
+from importlib import import_module
+from types import ModuleType
+from typing import Literal
 
 from busplan.errors import BusplanError
 
-Engine = Literal["auto", "python", "numba"]
+Engine = Literal["auto", "python", "compiled"]
 
 
-def is_compiled(engine: Engine) -> bool:
-    """Whether an engine runs compiled code.
+def compiled_kernel(engine: Engine) -> ModuleType | None:
+    """Find the compiled form of `busplan.servo.kernel`.
 
     Parameters
     ----------
     engine
-        "auto" uses numba if it is installed.
+        "auto" uses the compiled kernel if there is one; "python" does not.
 
     Returns
     -------
-    bool
-        True for numba.
+    module or None
+        It has the functions of `busplan.servo.kernel`, for arrays. None: use that file itself.
 
     Raises
     ------
     BusplanError
-        "numba" is requested and not installed.
+        "compiled" is requested, and this installation has no compiled kernel.
 
     Examples
     --------
-    >>> is_compiled("python")
-    False
+    >>> compiled_kernel("python") is None
+    True
     """
-    installed = find_spec("numba") is not None
-    if engine == "numba" and not installed:
-        raise BusplanError("engine 'numba': numba is not installed; install busplan[fast] or use 'python'")
-    return installed and engine != "python"
+    found = None if engine == "python" else _compiled()
+    if engine == "compiled" and found is None:
+        raise BusplanError(
+            "engine 'compiled': busplan was installed without a C compiler; install one and busplan again, "
+            "or use 'python'"
+        )
+    return found
 
 
 @cache
-def compiled(function: Callable[..., Any], signature: str) -> Callable[..., Any] | None:
-    """Compile a function with numba; the machine code is cached on disk.
-
-    Parameters
-    ----------
-    function
-        A module-level function that numba can compile.
-    signature
-        Its numba signature, so that all errors of compilation occur here.
-
-    Returns
-    -------
-    callable or None
-        The compiled function; None if numba does not work, or no cache can be read or written: compiling at each start
-        would take as long as a circle in plain Python.
-
-    Examples
-    --------
-    >>> double = compiled(lambda x: 2 * x, "float64(float64)")  # no file, so no cache
-    >>> double is None
-    True
-    """
+def _compiled() -> ModuleType | None:
     try:
-        import numba  # noqa: PLC0415 - an optional extra that takes a fifth of a second to load
-    except Exception:  # noqa: BLE001 - a broken installation fails in many ways, and numba is optional
-        return None
-    try:
-        return numba.njit(signature, cache=True)(function)
-    except Exception:  # noqa: BLE001 - unpickling a damaged cache may raise anything
+        return import_module("busplan.servo._kernel")
+    except ImportError:  # also if it was built for another Python
         return None

@@ -1,14 +1,16 @@
-"""The fixed-step kernel: one function for plain Python and numba.
+"""The fixed-step kernel: plain Python, compiled by Cython when the package is built (types: `_kernel.pxd`).
 
-It runs over the rows of a move (see `busplan.servo.rows`). A row is a number of sub-steps of equal length; its action
-says what happens in each: sample and control, let the command take effect, store the position.
+`run_rows` runs over the rows of a move (see `busplan.servo.rows`). A row is a number of sub-steps of equal length; its
+action says what happens in each: sample and control, let the command take effect, store the position.
 
 For speed, `x + ROUND - ROUND` replaces `round(x)`: adding 1.5 * 2^52 leaves no bits for the fraction, so the float unit
-rounds (half to even, exact below 2^51). The order of all operations is fixed, so both engines give the same floats.
+rounds (half to even, exact below 2^51). The order of all operations is fixed, and compiled code may not fuse them, so
+both engines give the same floats.
 """
 
-from collections.abc import Iterable, MutableSequence
-from math import tanh
+# Called as math.tanh, so that compiled code calls the one of C.
+import math
+from collections.abc import MutableSequence, Sequence
 
 CONTROL = 1
 SWITCH = 2
@@ -16,8 +18,6 @@ STORE = 4
 
 ROUND = 6755399441055744.0
 """1.5 * 2^52."""
-ALL_BUT_ONE = 20.0
-"""For larger arguments, tanh is exactly 1."""
 
 INTEGRAL = 5
 LAST_ERROR = 6
@@ -34,16 +34,16 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     state: MutableSequence[float],
     constants: Constants,
     out: MutableSequence[float],
-    substeps: Iterable[int],
-    target: Iterable[float],
-    increment: Iterable[float],
-    forward: Iterable[float],
-    action: Iterable[int],
-    length: Iterable[float],
-    drive_keep: Iterable[float],
-    drive_shift: Iterable[float],
-    friction_keep: Iterable[float],
-    friction_shift: Iterable[float],
+    substeps: Sequence[int],
+    target: Sequence[float],
+    increment: Sequence[float],
+    forward: Sequence[float],
+    action: Sequence[int],
+    length: Sequence[float],
+    drive_keep: Sequence[float],
+    drive_shift: Sequence[float],
+    friction_keep: Sequence[float],
+    friction_shift: Sequence[float],
 ) -> int:
     """Run one axis over a chunk of rows.
 
@@ -65,37 +65,35 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
         Number of positions stored.
     """
     kp, ki, kd, period, counts, resolution, lowest, highest, levels, level, offset, friction, sharpness = constants
-    position, velocity, disturbance, sign, command, _, _ = state
+    position, velocity, disturbance, sign, command = state[0], state[1], state[2], state[3], state[4]
     # Every chunk begins with a control, so no command is pending between chunks.
     pending = command
+    remembers = ki > 0.0 or kd > 0.0
     stored = 0
-    for n, start, move, feed, act, dt, keep, shift, fade, fade_shift in zip(  # noqa: B905 - numba knows no strict
-        substeps,
-        target,
-        increment,
-        forward,
-        action,
-        length,
-        drive_keep,
-        drive_shift,
-        friction_keep,
-        friction_shift,
-    ):
+    for row in range(len(substeps)):
+        act = action[row]
         control = act & CONTROL
         switch = act & SWITCH
         store = act & STORE
-        aim = start
-        for _ in range(n):
+        aim = target[row]
+        move = increment[row]
+        feed = forward[row]
+        dt = length[row]
+        keep = drive_keep[row]
+        shift = drive_shift[row]
+        fade = friction_keep[row]
+        fade_shift = friction_shift[row]
+        for _ in range(substeps[row]):
             if control:
-                error = aim - position
                 if counts > 0.0:
                     error = aim - (position * counts + ROUND - ROUND) * resolution
+                else:
+                    error = aim - position
                 pending = kp * error + feed
-                # Rarely used values stay in `state`, so that compiled code does not compute them for all loops.
-                if ki > 0.0:
+                if remembers:
+                    # Rarely used values stay in `state`, so that compiled code does not keep them for all loops.
                     state[INTEGRAL] += error * period
                     pending += ki * state[INTEGRAL]
-                if kd > 0.0:
                     pending += kd * (error - state[LAST_ERROR])
                     state[LAST_ERROR] = error
                 # Anti-windup: a clipped command does not integrate further into the limit.
@@ -113,13 +111,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
             if switch:
                 command = pending
             if friction > 0.0:
-                turned = velocity * sharpness
-                if turned > ALL_BUT_ONE:
-                    turned = 1.0
-                elif turned < -ALL_BUT_ONE:
-                    turned = -1.0
-                else:
-                    turned = tanh(turned)
+                turned = math.tanh(velocity * sharpness)
                 disturbance += friction * (sign - turned)
                 sign = turned
             wanted = command + offset
@@ -136,3 +128,23 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
     state[3] = sign
     state[4] = command
     return stored
+
+
+def drag(position: MutableSequence[float], half: float) -> None:
+    """Run the play operator in place.
+
+    Parameters
+    ----------
+    position
+        Positions in order of time [mm]: of the motor before, of the table after the call.
+    half
+        Half the gap [mm].
+    """
+    table = position[0]
+    for i in range(len(position)):
+        motor = position[i]
+        if motor - half > table:
+            table = motor - half
+        elif motor + half < table:
+            table = motor + half
+        position[i] = table

@@ -9,13 +9,13 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.servo.engine import Engine, compiled, is_compiled
+from busplan.servo.engine import Engine, compiled_kernel
+from busplan.servo.kernel import drag
 from busplan.servo.parameters import Mechanics
 
 Floats = NDArray[np.float64]
 
 _PER_MILLION = 1e-6
-_SIGNATURE = "void(float64[::1], float64)"
 
 
 def move_to_table(x_mm: Floats, *, y_mm: Floats, mechanics: Mechanics, engine: Engine = "auto") -> None:
@@ -78,28 +78,8 @@ def add_backlash(position_mm: Floats, *, backlash_mm: float, engine: Engine = "a
     >>> position.tolist()
     [0.0, 2.0, 2.0, 1.0]
     """
-    run = compiled(drag, _SIGNATURE) if is_compiled(engine) else None
-    if run is not None:
-        run(position_mm, backlash_mm / 2)
+    compiled = compiled_kernel(engine)
+    if compiled is not None:
+        compiled.drag(position_mm, backlash_mm / 2)
     else:
         drag(cast("MutableSequence[float]", position_mm.data), backlash_mm / 2)
-
-
-def drag(position: MutableSequence[float], half: float) -> None:
-    """Run the play operator in place, in plain Python or numba.
-
-    Parameters
-    ----------
-    position
-        Positions in order of time [mm]: of the motor before, of the table after the call.
-    half
-        Half the gap [mm].
-    """
-    table = position[0]
-    for i in range(len(position)):
-        motor = position[i]
-        if motor - half > table:
-            table = motor - half
-        elif motor + half < table:
-            table = motor + half
-        position[i] = table
