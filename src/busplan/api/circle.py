@@ -36,8 +36,8 @@ class CircleTestAnswer(Answer):
     with_contributions: bool
 
     @property
-    def passed(self) -> bool:
-        """Whether every period holds every tolerance."""
+    def passed(self) -> bool | None:
+        """Whether every period holds every tolerance; None if none fails, and the profile has no contour tolerance."""
         return self._found.passed
 
     def _report(self) -> Report:

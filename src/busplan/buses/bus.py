@@ -276,6 +276,9 @@ class Bus(ABC):
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
+    command_events: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Transaction and kind of the events after which a node has its command, the last of them; without them the whole
+    cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """What several events make together."""
     constants: ClassVar[Mapping[str, "Sourced"]] = {}

@@ -114,7 +114,7 @@ def circle_test_command(
                 _draw(test, plot_file, file_format=file_format)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
         give(circle_report(test, with_contributions=contributions))
-    if not test.passed:
+    if test.passed is False:
         raise PlanFailsError
 
 

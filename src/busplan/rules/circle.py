@@ -19,7 +19,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
 
     A cycle that does not fit breaks another rule, and has no circle.
     """
-    from busplan.analysis.circle.failures import CONTOUR_MEASURES
+    from busplan.analysis.circle.failures import CONTOUR_MEASURES, STABILITY
     from busplan.analysis.circle.roundness import circle_test, to_attack
 
     if not subject.profile.asks_for_circle or not subject.deciding.fits:
@@ -35,13 +35,12 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         "; no single error source of the profile explains it" if first is None else f"; attack {first[0].source} first"
     )
     for failure in result.failures:
-        stability = failure.name in ("stability", "min_phase_margin_deg", "min_gain_margin_db")
+        stability = failure.name in STABILITY
         # A finding needs a key in the file: a default limit has none.
-        name = "circular_deviation_mm" if failure.name == "constant_speed_deg" else failure.name
-        said = name in subject.profile.tolerance.model_fields_set
-        key = f"tolerance.{name}" if said else "servo.position_gain_per_s"
+        said = failure.name in subject.profile.tolerance.model_fields_set
+        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
         cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else ""
-        if failure.name in CONTOUR_MEASURES:
+        if failure.name in CONTOUR_MEASURES and failure.value is not None:
             cure = attack
         yield "BP202" if stability else "BP201", RuleProblem(key, f"{failure.text}{cure}")
 

@@ -4,7 +4,7 @@ All are optional. Zero in a resolution, a lag or `dac_bits` means ideal. Keys th
 take their names, defaults, ranges and descriptions from there.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, create_model
 
@@ -21,6 +21,9 @@ from busplan.servo.parameters import (
     Mechanics,
 )
 
+SERVO_GRADES: Final = ("published", "measured", "calibrated", "assumed")
+"""The strongest first."""
+ServoGrade = Literal["published", "measured", "calibrated", "assumed"]
 LengthMm = Annotated[float, Field(ge=0, le=MAX_LENGTH_MM, allow_inf_nan=False)]
 
 
@@ -107,16 +110,45 @@ else:
     )
 
 
+_GRADED_TIMING: Final = ("interpolation", "step_us")
+"""What can be measured of the timing of the loop."""
+
+if TYPE_CHECKING:
+
+    class ServoGrades(Section):
+        """Section [servo.grades]."""
+
+else:
+    ServoGrades = create_model(
+        "ServoGrades",
+        __base__=Section,
+        __doc__="Section [servo.grades]: how single values of [servo] are known.",
+        **{
+            name: (ServoGrade | None, Field(default=None, description=f"How servo.{name} is known"))
+            for name in (*AxisKeys.model_fields, *_GRADED_TIMING)
+        },
+    )
+
+
 class ServoSection(AxisKeys):
     """Section [servo]: position loop and drive of both axes; [servo.x] and [servo.y] override keys for one."""
 
     loop: LoopPlace = _key(LoopTiming, "loop")
+    update: Literal["next_sync", "on_arrival"] = Field(
+        default="next_sync",
+        description="When a node applies a command of a loop on the host: with the next synchronous packet (the "
+        "paper, III-C), so that one period lies inside the loop, or when it arrives",
+        examples=["next_sync"],
+    )
     interpolation: Interpolation = _key(LoopTiming, "interpolation")
     step_us: float = _key(LoopTiming, "step_us")
-    grade: Literal["measured", "calibrated", "assumed"] = Field(
+    grade: ServoGrade = Field(
         default="assumed",
         description="How these values are known; reports say so beside every figure that rests on them",
         examples=["measured"],
+    )
+    grades: ServoGrades = Field(
+        default_factory=ServoGrades, description="How single values are known, where not as servo.grade says"
     )
     x: AxisOverride = Field(default_factory=AxisOverride, description="What the x axis has otherwise")
     y: AxisOverride = Field(default_factory=AxisOverride, description="What the y axis has otherwise")
@@ -126,10 +158,35 @@ class ServoSection(AxisKeys):
         own: AxisOverride = getattr(self, axis)
         return self.model_dump(include=set(AxisKeys.model_fields)) | own.model_dump(exclude_none=True)
 
+    def grade_of(self, key: str) -> ServoGrade:
+        """How the value of a key is known.
+
+        Parameters
+        ----------
+        key
+            Its name in [servo], [servo.x] and [servo.y].
+        """
+        own: ServoGrade | None = getattr(self.grades, key, None)
+        return own or self.grade
+
+    @property
+    def weakest_grade(self) -> ServoGrade:
+        """The weakest grade of all values that the profile gives or grades."""
+        given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set | self.grades.model_fields_set
+        graded = {self.grade_of(key) for key in given & set(ServoGrades.model_fields)} or {self.grade}
+        return max(graded, key=SERVO_GRADES.index)
+
 
 class CircleSection(Section):
     """Section [circle]: the circle of the test."""
 
+    path: Literal["trapezoid", "iso230-4"] = Field(
+        default="trapezoid",
+        description="The move: one circle with both ramps on it, as the paper has it, or a lead-in until the loops "
+        "have settled and then one whole turn that is measured, as ISO 230-4 has it; only the latter has a circular "
+        "deviation G",
+        examples=["iso230-4"],
+    )
     radius_mm: Annotated[float, Field(ge=1e-3, le=MAX_LENGTH_MM, allow_inf_nan=False)] = Field(
         default=100.0, description="Radius [mm]", examples=[320]
     )
@@ -148,13 +205,13 @@ class ToleranceSection(Section):
     """Section [tolerance]: what the circle test must hold. A contour tolerance that is left out is not checked."""
 
     mean_contour_error_mm: LengthMm | None = Field(
-        default=None, description="Largest mean contour error of the whole move [mm]", examples=[0.005]
+        default=None, description="Largest mean contour error of the turn, or of the whole trapezoid [mm]", examples=[0.005]
     )
     max_contour_error_mm: LengthMm | None = Field(
-        default=None, description="Largest contour error of the whole move [mm]", examples=[0.025]
+        default=None, description="Largest contour error of the turn, or of the whole trapezoid [mm]", examples=[0.025]
     )
     circular_deviation_mm: LengthMm | None = Field(
-        default=None, description="Largest circular deviation G [mm]", examples=[0.03]
+        default=None, description="Largest circular deviation G, which needs circle.path = \"iso230-4\" [mm]", examples=[0.03]
     )
     min_phase_margin_deg: Annotated[float, Field(ge=0, le=180, allow_inf_nan=False)] = Field(
         default=30.0, description="Smallest phase margin of the position loop [deg]", examples=[30]

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,12 @@ FULL_TURN_DEG = 360.0
 _FOLLOWING_DEG = 36.0
 """Largest deviation from a full turn that counts as a following error: a tenth of it."""
 _SETTLING_SHARE = 0.2
-"""Largest share of the constant speed that the measures leave out for settling: at least 270 degrees remain."""
+"""Largest share of a trapezoid's constant speed that the measures leave out for settling."""
+REST_MM = 1e-4
+"""What may be left of the lag where nothing says how round the circle must be."""
+LONGEST_SETTLING_US = 60e6
+_ROUNDING_STEPS = 1e-9
+_S_PER_MIN = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,12 +62,13 @@ class CircleRun:
         Position of the table at the end of every step, shape (steps,) [mm].
     contour
         Measures; finite even if the loop is unstable.
+    measured
+        Steps at constant speed that are measured: a whole turn, or the settled arc of a trapezoid.
     covered_deg
-        Angle of the whole move about the centre, positive in the direction of the path [deg].
-    constant_speed
-        Steps of the measures at constant speed.
+        Angle of the table about the centre on that turn, or on the whole trapezoid, positive in the direction of the
+        path [deg].
     constant_speed_deg
-        Angle of these steps about the centre [deg].
+        Angle of the measured steps about the centre: 360 for a turn [deg].
     margins_x, margins_y
         Stability of both position loops.
     """
@@ -75,8 +82,8 @@ class CircleRun:
     x_mm: Floats
     y_mm: Floats
     contour: Contour
+    measured: slice
     covered_deg: float
-    constant_speed: slice
     constant_speed_deg: float
     margins_x: LoopMargins
     margins_y: LoopMargins
@@ -168,8 +175,10 @@ def simulate_circle(
 
     Notes
     -----
-    The measures at constant speed begin one period after the set-points have reached the feed, when the loops have
-    settled to a thousandth, at the latest after a fifth of the constant speed. They end when the set-points slow down.
+    On a path with a whole turn, everything is measured on that turn. On a trapezoid, mean and largest contour error are
+    those of the whole move. The other measures begin one period after the set-points have reached the feed, when the
+    loops have settled to a thousandth, at the latest after a fifth of the constant speed, and end when the set-points
+    slow down; there is no circular deviation G.
 
     References
     ----------
@@ -180,11 +189,14 @@ def simulate_circle(
     Two P loops lag behind and cut the circle by r (1 / sqrt(1 + (w / kp)^2) - 1), w = feed / r:
 
     >>> from busplan.servo.path import circle_path
-    >>> path = circle_path(50.0, feed_mm_per_min=6000.0, period_us=1000.0)
-    >>> axis = Axis(position_gain_per_s=50.0, velocity_feedforward=0.0)
-    >>> run = simulate_circle(path, x=axis, y=axis, timing=LoopTiming(period_us=1000.0))
+    >>> axis, timing = Axis(position_gain_per_s=50.0, velocity_feedforward=0.0), LoopTiming(period_us=1000.0)
+    >>> settling_us = settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0)
+    >>> path = circle_path(50.0, feed_mm_per_min=6000.0, period_us=1000.0, settling_us=settling_us)
+    >>> run = simulate_circle(path, x=axis, y=axis, timing=timing)
     >>> round(run.contour.radius_deviation_mm, 3), round(50 * (1 / (1 + (2 / 50) ** 2) ** 0.5 - 1), 3)
     (-0.04, -0.04)
+    >>> abs(run.contour.circular_deviation_mm) < 1e-4
+    True
     """
     check_circle(path, x=x, y=y, timing=timing, delivery=delivery)
     received = partial(arrivals, delivery, cycles=path.setpoints, period_us=path.period_us)
@@ -200,7 +212,8 @@ def simulate_circle(
     y_mm = run(path.y_mm, axis=y, arrivals=arrivals_y, progress=partial(report, total // 2))
     move_to_table(x_mm, y_mm=y_mm, mechanics=mechanics, engine=engine)
     margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
-    constant_speed = _constant_speed(path, timing=timing, margins=(margins_x, margins_y))
+    measured = _turn(path, timing) if path.turn_from_us is not None else None
+    part = measured or _settled_arc(path, timing=timing, margins=(margins_x, margins_y))
     # The direction of the path counts as positive.
     forward = 1.0 if path.direction == "ccw" else -1.0
     return CircleRun(
@@ -212,10 +225,12 @@ def simulate_circle(
         arrivals_y=arrivals_y,
         x_mm=x_mm,
         y_mm=y_mm,
-        contour=measure_contour(x_mm, y_mm=y_mm, radius_mm=path.radius_mm, constant_speed=constant_speed),
-        covered_deg=forward * covered_deg(x_mm, y_mm=y_mm),
-        constant_speed=constant_speed,
-        constant_speed_deg=forward * covered_deg(x_mm, y_mm=y_mm, part=constant_speed),
+        contour=measure_contour(x_mm, y_mm=y_mm, radius_mm=path.radius_mm, part=part.steps, turn_share=part.turn_share),
+        measured=part.steps,
+        covered_deg=forward * covered_deg(x_mm, y_mm=y_mm, part=None if measured is None else part.steps),
+        constant_speed_deg=(
+            forward * covered_deg(x_mm, y_mm=y_mm, part=part.steps) if measured is None else FULL_TURN_DEG
+        ),
         margins_x=margins_x,
         margins_y=margins_y,
     )
@@ -275,12 +290,66 @@ def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refuse
         )
 
 
-def _constant_speed(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> slice:
+def settling_time_us(
+    x: Axis, y: Axis, *, timing: LoopTiming, feed_mm_per_min: float, rest_mm: float = REST_MM
+) -> float | None:
+    """Time at constant speed in which both loops settle.
+
+    Parameters
+    ----------
+    x, y, timing
+        As for `simulate_circle`.
+    feed_mm_per_min
+        Speed along the path [mm/min].
+    rest_mm
+        What may be left of the lag behind the path, above 0 [mm].
+
+    Returns
+    -------
+    float or None
+        The time [us]; None if a loop is unstable, or takes more than `LONGEST_SETTLING_US`.
+
+    Notes
+    -----
+    A loop that starts to move is off by its following error, at most v / kp. With the spectral radius rho of the linear
+    loop, about rho^n of it is left after n control periods; `LoopMargins.time_to_us` allows for a double pole.
+
+    Examples
+    --------
+    >>> axis, timing = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0), LoopTiming(period_us=1000.0)
+    >>> round(settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0) / 1e3)
+    118
+    """
+    each = []
+    for axis in (x, y):
+        lag_mm = feed_mm_per_min / _S_PER_MIN / axis.position_gain_per_s if axis.position_gain_per_s else math.inf
+        margins = loop_margins(axis, timing=timing)
+        each.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
+    settling_us = max(each) + timing.period_us
+    return settling_us if settling_us <= LONGEST_SETTLING_US else None
+
+
+class _Part(NamedTuple):
+    """Steps that are measured; a position is that at the end of its step."""
+
+    steps: slice
+    turn_share: float | None
+    """Share of the last step that belongs to a turn; None for an arc."""
+
+
+def _turn(path: CirclePath, timing: LoopTiming) -> _Part:
+    """Steps of the whole turn at constant speed."""
+    first = round((path.turn_from_us or 0.0) / timing.step_us)
+    turn = path.turn_us / timing.step_us
+    count = max(1, math.ceil(turn - _ROUNDING_STEPS))
+    return _Part(slice(first, first + count), min(1.0, turn - (count - 1)))
+
+
+def _settled_arc(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> _Part:
     """Steps at constant speed without settling; at least one."""
     start, stop = path.constant_from_us + path.period_us, path.constant_until_us
     settling = max(0.0 if margin.settling_us is None else margin.settling_us for margin in margins)
     start += min(settling, _SETTLING_SHARE * max(stop - start, 0.0))
-    # Position n is that at the end of step n + 1.
     first = math.ceil(start / timing.step_us) - 1
     last = max(math.floor(stop / timing.step_us), first + 1)
-    return slice(first, last)
+    return _Part(slice(first, last), None)

@@ -1,7 +1,8 @@
 """Contour error of a move, and the measures of circular tests in ISO 230-4."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,27 +18,28 @@ _DEG_PER_TURN = 360.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contour:
-    """Measures of a circular test.
+    """Measures of a circular test. "The part" is the one at constant speed: on a whole turn, that turn.
 
     Parameters
     ----------
     mean_contour_error_mm, max_contour_error_mm
-        Mean and maximum of the absolute contour error over the whole move [mm].
+        Mean and maximum of the absolute contour error: of a whole turn, or of the whole move [mm].
     radial_deviation_min_mm, radial_deviation_max_mm
-        Smallest and largest contour error, signed, over the part at constant speed: F_min and F_max [mm].
+        Smallest and largest contour error, signed, over the part: F_min and F_max [mm].
     circular_deviation_mm
-        Circular deviation G over that part: largest minus smallest distance from the least-squares centre [mm].
+        Circular deviation G: largest minus smallest distance from the least-squares centre of a whole turn [mm]. None
+        without a whole turn: the least-squares centre of an arc is not that of the circle.
     centre_offset_mm
-        Least-squares centre of that part, x and y [mm].
+        Least-squares centre of the part, x and y [mm].
     radius_deviation_mm
-        Least-squares radius of that part minus the nominal radius [mm].
+        Least-squares radius of the part minus the nominal radius [mm].
     """
 
     mean_contour_error_mm: float
     max_contour_error_mm: float
     radial_deviation_min_mm: float
     radial_deviation_max_mm: float
-    circular_deviation_mm: float
+    circular_deviation_mm: float | None
     centre_offset_mm: tuple[float, float]
     radius_deviation_mm: float
 
@@ -69,8 +71,10 @@ def contour_error(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> Floats:
     return np.hypot(x_mm, y_mm) - radius_mm
 
 
-def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_speed: slice) -> Contour:
-    """Measure a whole move.
+def measure_contour(
+    x_mm: Floats, *, y_mm: Floats, radius_mm: float, part: slice, turn_share: float | None = None
+) -> Contour:
+    """Measure a move.
 
     Parameters
     ----------
@@ -78,8 +82,11 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
         Positions of the table about the centre of the nominal circle, in equal steps of time, shape (n,) each [mm].
     radius_mm
         Nominal radius [mm].
-    constant_speed
+    part
         Points at constant speed, at least one; a slice with start and stop.
+    turn_share
+        None: the part is an arc, and mean and maximum are those of the whole move. A number: the part is exactly one
+        turn, everything is measured on it, and its last step counts by this share [1].
 
     Returns
     -------
@@ -96,30 +103,31 @@ def measure_contour(x_mm: Floats, *, y_mm: Floats, radius_mm: float, constant_sp
 
     >>> angle = np.linspace(0.0, 2.0 * np.pi, 1000, endpoint=False)
     >>> x, y = 100.002 * np.cos(angle) + 0.001, 100.002 * np.sin(angle)
-    >>> found = measure_contour(x, y_mm=y, radius_mm=100.0, constant_speed=slice(0, 1000))
+    >>> found = measure_contour(x, y_mm=y, radius_mm=100.0, part=slice(0, 1000), turn_share=1.0)
     >>> round(found.circular_deviation_mm, 9), round(found.radius_deviation_mm, 9)
     (0.0, 0.002)
     >>> round(found.radial_deviation_min_mm, 9), round(found.radial_deviation_max_mm, 9)
     (0.001, 0.003)
     """
+    whole = slice(0, len(x_mm)) if turn_share is None else part
+    missing = 0.0 if turn_share is None else 1.0 - turn_share
     total, largest = 0.0, 0.0
-    for block in blocks(slice(0, len(x_mm))):
+    for block in blocks(whole):
         error = np.abs(contour_error(x_mm[block], y_mm=y_mm[block], radius_mm=radius_mm))
         total += float(error.sum())
         largest = max(largest, float(error.max()))
-    nominal = _range_about((0.0, 0.0), x_mm, y_mm, radius_mm, constant_speed)
-    centre_mm, radius_deviation_mm = least_squares_circle(
-        x_mm[constant_speed], y_mm=y_mm[constant_speed], radius_mm=radius_mm
-    )
-    lowest, highest = _range_about(centre_mm, x_mm, y_mm, radius_mm, constant_speed)
+    total -= missing * float(error[-1])
+    x_mm, y_mm = x_mm[part], y_mm[part]
+    nominal = _Fit.about((0.0, 0.0), x_mm, y_mm, radius_mm, missing)
+    fitted = nominal.best(x_mm, y_mm)
     return Contour(
-        mean_contour_error_mm=total / len(x_mm),
+        mean_contour_error_mm=total / (whole.stop - whole.start - missing),
         max_contour_error_mm=largest,
-        radial_deviation_min_mm=nominal[0],
-        radial_deviation_max_mm=nominal[1],
-        circular_deviation_mm=highest - lowest,
-        centre_offset_mm=centre_mm,
-        radius_deviation_mm=radius_deviation_mm,
+        radial_deviation_min_mm=nominal.lowest_mm,
+        radial_deviation_max_mm=nominal.highest_mm,
+        circular_deviation_mm=None if turn_share is None else fitted.highest_mm - fitted.lowest_mm,
+        centre_offset_mm=fitted.centre_mm,
+        radius_deviation_mm=fitted.deviation_mm,
     )
 
 
@@ -190,36 +198,62 @@ def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tup
     >>> round(a, 9), round(b, 9), abs(deviation) < 1e-9
     (-2e-06, 1e-06, True)
     """
-    fitted = np.zeros(3)
-    for _ in range(_ITERATIONS):
-        step = _gauss_newton_step(fitted, x_mm, y_mm, radius_mm)
-        fitted += step
-        if np.abs(step).max() <= _CONVERGED_MM:
-            break
-    return (float(fitted[0]), float(fitted[1])), float(fitted[2])
+    fitted = _Fit.about((0.0, 0.0), x_mm, y_mm, radius_mm, 0.0).best(x_mm, y_mm)
+    return fitted.centre_mm, fitted.deviation_mm
 
 
-def _gauss_newton_step(fitted: Floats, x_mm: Floats, y_mm: Floats, radius_mm: float) -> Floats:
-    normal, right = np.zeros((3, 3)), np.zeros(3)
-    for block in blocks(slice(0, len(x_mm))):
-        x, y = x_mm[block] - fitted[0], y_mm[block] - fitted[1]
-        distance = np.hypot(x, y)
-        away = np.maximum(distance, np.finfo(float).tiny)
-        directions = np.stack([x / away, y / away, np.ones_like(x)])
-        normal += directions @ directions.T
-        right += directions @ (distance - radius_mm - fitted[2])
-    return np.asarray(np.linalg.lstsq(normal, right, rcond=None)[0])
+class _Fit(NamedTuple):
+    """One pass over the points: their distances from a centre, and the best circle as seen from there."""
+
+    centre_mm: tuple[float, float]
+    radius_mm: float
+    missing: float
+    """Share of the last point that does not count."""
+    lowest_mm: float
+    highest_mm: float
+    """Smallest and largest distance from the centre, minus the nominal radius."""
+    step_mm: tuple[float, float]
+    """How far the best centre lies from this one, to first order."""
+    deviation_mm: float
+    """Radius of the best circle minus the nominal one, to first order."""
+
+    @classmethod
+    def about(
+        cls, centre_mm: tuple[float, float], x_mm: Floats, y_mm: Floats, radius_mm: float, missing: float
+    ) -> "_Fit":
+        lowest, highest = np.inf, -np.inf
+        normal, right = np.zeros((3, 3)), np.zeros(3)
+        for block in blocks(slice(0, len(x_mm))):
+            x, y = x_mm[block] - centre_mm[0], y_mm[block] - centre_mm[1]
+            distance = np.hypot(x, y)
+            error = distance - radius_mm
+            lowest, highest = min(lowest, float(error.min())), max(highest, float(error.max()))
+            np.maximum(distance, np.finfo(float).tiny, out=distance)
+            directions = (np.divide(x, distance, out=x), np.divide(y, distance, out=y), np.ones_like(x))
+            _add(normal, right, directions, error)
+        last = [one[-1:] for one in directions]
+        _add(normal, right, last, -missing * error[-1:], weight=-missing)
+        a, b, deviation = np.linalg.lstsq(normal, right, rcond=None)[0].tolist()
+        return cls(centre_mm, radius_mm, missing, lowest, highest, (a, b), deviation)
+
+    def best(self, x_mm: Floats, y_mm: Floats) -> "_Fit":
+        """Step to the best centre."""
+        fit = self
+        for _ in range(_ITERATIONS):
+            if max(map(abs, fit.step_mm)) <= _CONVERGED_MM:
+                break
+            centre_mm = fit.centre_mm[0] + fit.step_mm[0], fit.centre_mm[1] + fit.step_mm[1]
+            fit = _Fit.about(centre_mm, x_mm, y_mm, self.radius_mm, self.missing)
+        return fit
 
 
-def _range_about(
-    centre_mm: tuple[float, float], x_mm: Floats, y_mm: Floats, radius_mm: float, part: slice
-) -> tuple[float, float]:
-    """Smallest and largest distance from a centre, minus the nominal radius [mm]."""
-    extremes = []
-    for block in blocks(part):
-        error = contour_error(x_mm[block] - centre_mm[0], y_mm=y_mm[block] - centre_mm[1], radius_mm=radius_mm)
-        extremes += [float(error.min()), float(error.max())]
-    return min(extremes), max(extremes)
+def _add(normal: Floats, right: Floats, directions: Sequence[Floats], error: Floats, *, weight: float = 1.0) -> None:
+    """Add points to the normal equations of the best circle."""
+    for row, direction in enumerate(directions):
+        right[row] += direction @ error
+        for column in range(row, 3):
+            normal[row, column] += weight * (direction @ directions[column])
+            normal[column, row] = normal[row, column]
 
 
 def blocks(part: slice) -> Iterator[slice]:

@@ -7,6 +7,7 @@ half of their digits.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ _SETTLED = 1e-3
 """Rest of a disturbance at which the loop counts as settled."""
 _GRID = 4000
 _BISECTIONS = 60
+_DOUBLE_POLE_STEPS = 5
+"""Each step of this fixed point is ten times closer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,16 +50,42 @@ class LoopMargins:
     crossover_hz: float | None = None
     settling_us: float | None = None
 
+    def time_to_us(self, share: float) -> float:
+        """Time after which no more than a share of a disturbance is left, also of a double pole [us].
 
+        Parameters
+        ----------
+        share
+            The share, above 0 [1].
+
+        Returns
+        -------
+        float
+            Infinite if the loop is unstable.
+
+        Notes
+        -----
+        A pole of time constant T leaves exp(-t / T), a double pole (1 + t / T) exp(-t / T).
+        """
+        if self.settling_us is None:
+            return math.inf
+        constants = least = max(-math.log(share), 0.0)
+        for _ in range(_DOUBLE_POLE_STEPS):
+            constants = least + math.log1p(constants)
+        return self.settling_us * constants / -math.log(_SETTLED)
+
+
+@lru_cache(maxsize=64)
 def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
     """Compute the stability margins of the discrete position loop.
 
     Parameters
     ----------
     axis
-        Gains and drive lag; feed-forward, resolution and friction are not part of the linear loop.
+        Gains, drive lag and, for a loop on the host, delay; feed-forward, resolution and friction are not part of the
+        linear loop.
     timing
-        Timing of the loop; `delay_us` applies to a loop on the host.
+        Timing of the loop.
 
     Returns
     -------
@@ -84,11 +113,11 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
 
     Examples
     --------
-    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
-    >>> margins = loop_margins(axis, timing=LoopTiming(period_us=1000.0, loop="host", delay_us=1000.0))
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0, delay_us=1000.0)
+    >>> margins = loop_margins(axis, timing=LoopTiming(period_us=1000.0, loop="host"))
     >>> round(margins.phase_margin_deg, 2), round(margins.gain_margin_db, 2), round(margins.crossover_hz, 2)
     (81.4, 20.0, 15.92)
-    >>> loop_margins(axis, timing=LoopTiming(period_us=20000.0, loop="host", delay_us=10000.0)).stable
+    >>> loop_margins(axis, timing=LoopTiming(period_us=30000.0, loop="host")).stable
     False
     """
     numerator, denominator = _loop(axis, timing)
@@ -144,7 +173,7 @@ def loop_gain(frequency_hz: Floats, *, axis: Axis, timing: LoopTiming) -> NDArra
 def _loop(axis: Axis, timing: LoopTiming) -> tuple[Floats, Floats]:
     """Numerator and denominator of the open loop in w = z - 1, highest power first."""
     period = timing.control_period_us / _US_PER_S
-    delay = timing.delay_us / _US_PER_S if timing.loop == "host" else 0.0
+    delay = min(axis.delay_us, timing.period_us) / _US_PER_S if timing.loop == "host" else 0.0
     lag = axis.drive_lag_us / _US_PER_S
     z, integrator, derivative = np.array([1.0, 1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0])
     proportional = axis.position_gain_per_s * z

@@ -12,6 +12,7 @@ from busplan.servo.checks import (
     LARGEST,
     SHORTEST_STEP_US,
     Refused,
+    negative,
     no_multiple,
     not_positive,
     out_of_range,
@@ -34,6 +35,11 @@ FINEST_ENCODER_MM = 1e-9
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axis:
     """One axis: its position controller, its drive, its encoder.
+
+    Parameters
+    ----------
+    delay_us
+        Time Td from a sample until its command takes effect, at most one period; used only by a loop on the host [us].
 
     Raises
     ------
@@ -106,10 +112,11 @@ class Axis:
         least=_MIN_SPEED_MM_S,
         most=MAX_SPEED_MM_S,
     )
+    delay_us: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse invalid values, all in one error."""
-        refuse(*out_of_range(self), *self._too_fine())
+        refuse(*out_of_range(self), *self._too_fine(), *negative(delay_us=self.delay_us))
 
     @property
     def level_mm_s(self) -> float:
@@ -138,8 +145,6 @@ class LoopTiming:
     ----------
     period_us
         Communication period T_s, with one set-point each [us].
-    delay_us
-        Time Td from a sample until its command takes effect, 0 to one period; used only by a loop on the host [us].
 
     Raises
     ------
@@ -171,16 +176,11 @@ class LoopTiming:
         least=SHORTEST_STEP_US,
         most=LARGEST,
     )
-    delay_us: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse invalid values, all in one error."""
         refuse(*not_positive(period_us=self.period_us), *out_of_range(self))
-        refuse(*no_multiple(period_us=self.period_us, step_us=self.step_us), *self._late())
-
-    def _late(self) -> Iterator[Refused]:
-        if not 0 <= self.delay_us <= self.period_us:
-            yield Refused("delay_us", self.delay_us, f"must be between 0 and the period of {self.period_us:g} us")
+        refuse(*no_multiple(period_us=self.period_us, step_us=self.step_us))
 
     @property
     def steps_per_period(self) -> int:

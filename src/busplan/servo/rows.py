@@ -64,7 +64,7 @@ def kernel_rows(
     setpoints_mm
         Set-points as sent, after the start at rest, shape (cycles + 1,) [mm].
     axis
-        The axis; feed-forward, lag and recovery are used.
+        The axis; feed-forward, lag, recovery and delay are used.
     timing
         Timing of the loop.
     arrivals
@@ -193,7 +193,7 @@ def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
     times = edges * timing.steps_per_period + arrivals.offsets_us[edges] / timing.step_us
     sampled, following = times[:-1], times[1:]
     # A command takes effect with the next SP at the latest.
-    switched = np.minimum(sampled + timing.delay_us / timing.step_us, following)
+    switched = np.minimum(sampled + axis.delay_us / timing.step_us, following)
     once, nothing = np.ones_like(cycles), np.zeros_like(sampled)
     pieces = [
         (once, nothing, CONTROL * once),

@@ -1,7 +1,7 @@
 """The circle test for a search: the failures of many variants of one profile."""
 
 from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.circle.setup import bus
+from busplan.analysis.circle.setup import loop_delays_us
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -24,7 +24,7 @@ class CircleCheck:
     def __init__(self, *, progress: Progress | None = None, expected: int = 1) -> None:
         self._progress = progress
         self._expected = expected
-        self._known: dict[tuple[float, float], tuple[str, ...]] = {}
+        self._known: dict[tuple[float, tuple[float, float]], tuple[str, ...]] = {}
 
     def __call__(self, profile: Profile) -> tuple[str, ...]:
         """Run the circle test and list its failures, or why it cannot be run; empty if it passes.
@@ -34,10 +34,8 @@ class CircleCheck:
         profile
             A variant that fits its bus.
         """
-        # A loop on the node depends on the period only; a loop on the host contains the cycle, too.
-        on_host = profile.servo.loop == "host"
-        delay_us = bus(profile).required_us if on_host else 0.0
-        key = (profile.cycle.period_us, delay_us)
+        # The cycle itself matters only where it lies inside a loop on the host.
+        key = (profile.cycle.period_us, loop_delays_us(profile))
         if key not in self._known:
             self._known[key] = self._run(profile)
         return self._known[key]

@@ -37,7 +37,7 @@ class ContourProfile(NamedTuple):
 
 
 def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> ContourProfile:
-    """Condense the constant-speed part of a circle test.
+    """Condense the measured part of a circle test.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> Contou
         Sector 0 begins on the positive x axis; sectors follow counter-clockwise.
     """
     low, high = np.full(sectors, np.inf), np.full(sectors, -np.inf)
-    for block in blocks(run.constant_speed):
+    for block in blocks(run.measured):
         x_mm, y_mm = run.x_mm[block], run.y_mm[block]
         error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
         turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0

@@ -18,6 +18,8 @@ class Setup(NamedTuple):
     timing: LoopTiming
     delivery: Delivery
     mechanics: Mechanics
+    settled: bool = True
+    """Whether the loops settle before the measured turn; a trapezoid has none."""
 
     @property
     def steps(self) -> int:
@@ -39,8 +41,8 @@ class Contribution(NamedTuple):
     """Decrease of the largest contour error by its removal [mm]; negative if it hides another source."""
     mean_contour_error_mm: float
     """Mean contour error when this source is removed [mm]."""
-    circular_deviation_mm: float
-    """Circular deviation G when this source is removed [mm]."""
+    circular_deviation_mm: float | None
+    """Circular deviation G when this source is removed [mm]; None on a trapezoid."""
 
 
 Removal = Callable[[Setup], Setup]
@@ -60,6 +62,7 @@ def _with_setpoints_every_step(one: Setup) -> Setup:
             period_us=timing.step_us,
             ramp_periods=round(path.constant_from_us / timing.step_us),
             direction=path.direction,
+            settling_us=path.settling_us,
         ),
         timing=replace(timing, period_us=timing.step_us),
     )
@@ -73,10 +76,10 @@ _REMOVALS: Mapping[str, Removal] = {
     "dac_resolution": lambda one: one.with_axes(dac_bits=0),
     "encoder_resolution": lambda one: one.with_axes(encoder_resolution_mm=0.0),
     "reversal": lambda one: one.with_axes(reversal_mm_s=0.0),
-    "axis_mismatch": lambda one: one._replace(y=one.x),
+    "axis_mismatch": lambda one: one._replace(y=replace(one.x, delay_us=one.y.delay_us)),
     "hold": lambda one: one._replace(timing=replace(one.timing, interpolation="linear")),
     "period": _with_setpoints_every_step,
-    "bus_delay": lambda one: one._replace(timing=replace(one.timing, delay_us=0.0)),
+    "bus_delay": lambda one: one.with_axes(delay_us=0.0),
     "jitter": lambda one: one._replace(delivery=replace(one.delivery, jitter_us=0.0)),
     "skew": lambda one: one._replace(delivery=replace(one.delivery, skew_us=0.0)),
     "loss": lambda one: one._replace(delivery=replace(one.delivery, loss_probability=0.0)),

@@ -10,12 +10,19 @@ from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.network import bus_of, network_of
 from busplan.sections.profile import Profile
-from busplan.servo.circle import FULL_TURN_DEG, CircleRun
+from busplan.servo.circle import FULL_TURN_DEG, LONGEST_SETTLING_US, CircleRun
 
 CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 """Measures of roundness that have a tolerance, in the order of the checks."""
-LEAST_ARC_DEG: Final = 270.0
-"""Shortest arc for the circular deviation G: the least-squares centre of a shorter one is not reliable."""
+MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
+"""Least margins of the loop by key, with their unit; they have defaults, so that they are always asked for."""
+STABILITY: Final = ("stability", *MARGINS)
+"""Failures of the loop itself."""
+_WITHOUT_TURN: Final = "circular_deviation_without_turn"
+_NEXT_SYNC: Final = (
+    '; with servo.update = "next_sync" one period lies inside the loop ("on_arrival" is for nodes that apply a command '
+    "when it comes)"
+)
 
 
 class Stated(NamedTuple):
@@ -46,6 +53,8 @@ class _Saying(NamedTuple):
     limit_key: str = ""
     """Key of the limit, if it is not the name of the failure."""
     limit_decimals: int | None = None
+    limit_unit: str = ""
+    """Unit of the limit, if it is not that of the figure."""
 
 
 _FAILURES: Final[dict[str, _Saying]] = {
@@ -84,13 +93,13 @@ _FAILURES: Final[dict[str, _Saying]] = {
     "max_contour_error_mm": _Saying(
         "the largest contour error of {value} is {beyond} over its {limit}", "max_contour_error_mm", "um"
     ),
-    "constant_speed_deg": _Saying(
-        "the circular deviation G cannot be told: its least-squares centre needs {limit} of the circle at constant "
-        "speed, not {value}; shorten circle.ramp_periods or lower circle.feed_mm_per_min",
-        "constant_speed_deg",
-        "deg",
-        0,
-        limit_decimals=0,
+    "not_settled": _Saying(
+        "the loops take more than {limit} to settle, so that the turn is not measured", "", "s", 0, limit_decimals=0
+    ),
+    _WITHOUT_TURN: _Saying(
+        "the circular deviation G is measured on a whole turn, and the path is a trapezoid: "
+        'set circle.path = "iso230-4", or take out tolerance.circular_deviation_mm = {limit}',
+        limit_unit="mm",
     ),
     "circular_deviation_mm": _Saying(
         "the circular deviation G of {value} is {beyond} over its {limit}", "circular_deviation_mm", "um"
@@ -106,10 +115,14 @@ class Failure(NamedTuple):
     limit: float | None
     said: str = ""
     """Message of a broken limit of the bus; empty for other failures."""
+    is_default: bool = False
+    """Whether the limit is the default of its key: the profile does not say it."""
+    more: str = ""
+    """What the message goes on to say."""
 
     def document(self) -> dict[str, Any]:
         """Return it as in the JSON document."""
-        return {"name": self.name, "value": self.value, "limit": self.limit}
+        return {"name": self.name, "value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
 
     @property
     def text(self) -> str:
@@ -121,17 +134,21 @@ class Failure(NamedTuple):
         if self.said:
             yield self.said
             return
-        saying, value, limit = _FAILURES[self.name], self.value or 0.0, self.limit or 0.0
+        known = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
+        saying, value, limit = _FAILURES[known], self.value or 0.0, self.limit or 0.0
         limit_key = saying.limit_key or self.name
         numbers = {
             "value": Stated(value, saying.key, saying.unit, saying.decimals),
-            "limit": Stated(limit, limit_key, saying.unit, saying.limit_decimals),
+            "limit": Stated(limit, limit_key, saying.limit_unit or saying.unit, saying.limit_decimals),
             "beyond": Stated(abs(value - limit), limit_key, saying.unit, saying.decimals),
         }
         for words, field, _, _ in Formatter().parse(saying.words):
             yield words
             if field is not None:
                 yield numbers[field]
+            if field == "limit" and self.is_default:
+                yield " (default)"
+        yield self.more
 
 
 def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float | None]:
@@ -173,8 +190,8 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
     )
 
 
-def circle_failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
-    """List the failures of a simulated circle: stability first, then the turn, the margins and the contour.
+def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple[Failure, ...]:
+    """List the failures of a simulated circle: stability first, then settling, the turn, the margins and the contour.
 
     Parameters
     ----------
@@ -182,34 +199,40 @@ def circle_failures(profile: Profile, run: CircleRun) -> tuple[Failure, ...]:
         The network and its tolerances.
     run
         The simulation.
+    settled
+        Whether the loops had settled when the measured turn began.
     """
-    contour, tolerance = run.contour, profile.tolerance
+    tolerance = profile.tolerance
+    late = _NEXT_SYNC if profile.servo.loop == "host" and profile.servo.update == "next_sync" else ""
     if not (run.margins_x.stable and run.margins_y.stable):
-        return (Failure("stability", None, None),)
-    phase_deg, gain_db, _ = tightest_margins(run)
-    low = (
-        ("min_phase_margin_deg", inf if phase_deg is None else phase_deg, tolerance.min_phase_margin_deg),
-        ("min_gain_margin_db", inf if gain_db is None else gain_db, tolerance.min_gain_margin_db),
+        return (Failure("stability", None, None, more=late),)
+    margins = zip(MARGINS, tightest_margins(run)[:2], strict=True)
+    return (
+        *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
+        # Radial errors do not show this: a table that stands still on the circle has none.
+        *(() if run.follows else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
+        *(
+            Failure(name, value, limit, is_default=name not in tolerance.model_fields_set, more=late)
+            for name, value in margins
+            if value is not None and value < (limit := getattr(tolerance, name))
+        ),
+        *(_contour_failures(profile, run) if settled else ()),
     )
-    # Radial errors do not show this: a table that stands still on the circle has none.
-    strayed = () if run.follows else (("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)
-    high = (
-        ("mean_contour_error_mm", contour.mean_contour_error_mm, tolerance.mean_contour_error_mm),
-        ("max_contour_error_mm", contour.max_contour_error_mm, tolerance.max_contour_error_mm),
-        ("circular_deviation_mm", contour.circular_deviation_mm, tolerance.circular_deviation_mm),
-    )
-    arc_deg = run.constant_speed_deg
-    blind = arc_deg < LEAST_ARC_DEG and tolerance.circular_deviation_mm is not None
-    return tuple(
-        Failure(name, value, limit)
-        for name, value, limit in (
-            *strayed,
-            *((name, value, limit) for name, value, limit in low if value < limit),
-            *(
-                (name, value, limit)
-                for name, value, limit in high
-                if limit is not None and value > limit and not (blind and name == "circular_deviation_mm")
-            ),
-            *((("constant_speed_deg", arc_deg, LEAST_ARC_DEG),) if blind else ()),
-        )
-    )
+
+
+def _contour_failures(profile: Profile, run: CircleRun) -> Iterator[Failure]:
+    for name in CONTOUR_MEASURES:
+        limit, value = getattr(profile.tolerance, name), getattr(run.contour, name)
+        if limit is not None and (value is None or value > limit):
+            yield Failure(name, value, limit)
+
+
+def is_judged(profile: Profile) -> bool:
+    """Whether the profile says how round its circle must be.
+
+    Parameters
+    ----------
+    profile
+        The network and its tolerances.
+    """
+    return any(getattr(profile.tolerance, name) is not None for name in CONTOUR_MEASURES)

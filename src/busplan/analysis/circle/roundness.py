@@ -5,25 +5,29 @@ delay of a host loop can make the circle rounder while it reduces the margins, s
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from math import inf
+from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.circle.contributions import Contribution, Setup, contributions, sources
 from busplan.analysis.circle.failures import (
     CONTOUR_MEASURES,
-    LEAST_ARC_DEG,
     Failure,
     bus_failures,
     circle_failures,
+    is_judged,
     tightest_margins,
 )
-from busplan.analysis.circle.setup import bus, loop_timing, setup
+from busplan.analysis.circle.setup import bus, loop_delays_us, loop_timing, path_settling_us, setup
 from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import LoopTiming
 from busplan.servo.path import circle_setpoints
+
+_LEAST_ARC_DEG: Final = 270.0
+"""Shortest arc of a trapezoid for a least-squares centre and radius."""
 
 
 class CircleFigures(NamedTuple):
@@ -32,13 +36,19 @@ class CircleFigures(NamedTuple):
     period_us: float
     feed_mm_per_min: float
     radius_mm: float
+    path: str
+    """trapezoid or iso230-4."""
     duration_s: float
     setpoints: int
     steps: int
     step_us: float
     loop: str
+    update: str
+    """When a node applies a command of a loop on the host."""
     delay_us: float
-    """Bus delay inside the loop: the capacity result's required_us when the loop is on the host, otherwise 0."""
+    """Bus delay inside the loop, the longer one of both axes; 0 for a loop on the node."""
+    delay_x_us: float
+    delay_y_us: float
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
@@ -48,7 +58,9 @@ class CircleFigures(NamedTuple):
     required_us: float
     available_us: float
     servo_grade: str
-    """How the servo values are known: measured, calibrated or assumed."""
+    """The weakest grade of the profile's servo values: published, measured, calibrated or assumed."""
+    ideal_drive: bool
+    """Whether the profile has no [servo], so that an ideal drive was simulated."""
     stable: bool | None
     phase_margin_deg: float | None
     """The smaller one of both axes; None also if no loop gain reaches one."""
@@ -56,17 +68,20 @@ class CircleFigures(NamedTuple):
     """The smaller one of both axes; None also if no gain makes a loop unstable."""
     crossover_hz: float | None
     """Of the axis with the smaller phase margin."""
+    settled: bool | None
+    """Whether the loops had settled before the measured turn; None on a trapezoid. Without it no measure is given."""
     mean_contour_error_mm: float | None
     max_contour_error_mm: float | None
     radial_deviation_min_mm: float | None
     radial_deviation_max_mm: float | None
     circular_deviation_mm: float | None
-    """About the least-squares centre; None, like radius and centre, if `constant_speed_deg` is too short."""
+    """About the least-squares centre of a whole turn; None on a trapezoid."""
     radius_deviation_mm: float | None
     centre_offset_mm: tuple[float, float] | None
     constant_speed_deg: float | None
-    """Arc at constant speed, with the loops settled, from which F, G, radius and centre are taken."""
-    passed: bool
+    """Arc at constant speed from which F, G, radius and centre are taken: 360 on a turn."""
+    passed: bool | None
+    """None if the profile has no contour tolerance, and nothing else fails: it is not judged."""
     failures: tuple[Failure, ...]
     contributions: tuple[Contribution, ...] | None
     """Largest first; None if they were not requested and no contour measure failed."""
@@ -80,7 +95,8 @@ def failed_measure(result: CircleFigures) -> str | None:
     result
         The circle test at one period.
     """
-    return next((failure.name for failure in result.failures if failure.name in CONTOUR_MEASURES), None)
+    failed = (failure for failure in result.failures if failure.name in CONTOUR_MEASURES)
+    return next((failure.name for failure in failed if failure.value is not None), None)
 
 
 def to_attack(result: CircleFigures) -> tuple[Contribution, float] | None:
@@ -112,9 +128,10 @@ class CircleTest(NamedTuple):
     runs: tuple[CircleRun | None, ...]
 
     @property
-    def passed(self) -> bool:
-        """Whether every period holds every tolerance."""
-        return all(result.passed for result in self.results)
+    def passed(self) -> bool | None:
+        """Whether every period holds every tolerance; None if none fails, and one is not judged."""
+        verdicts = [result.passed for result in self.results]
+        return False if False in verdicts else None if None in verdicts else True
 
 
 def circle_test(
@@ -210,9 +227,9 @@ def _test(
 ) -> tuple[CircleFigures, CircleRun | None]:
     capacity = bus(profile)
     if isinstance(one, LoopTiming):
-        return _figures(profile, one, capacity, None), None
+        return _figures(profile, one, capacity, None, settled=True), None
     run = counter.run(one)
-    result = _figures(profile, one.timing, capacity, run)
+    result = _figures(profile, one.timing, capacity, run, settled=one.settled)
     if with_contributions or (explain and failed_measure(result)):
         if not with_contributions:
             counter.expect(*sources(one).values())
@@ -222,52 +239,60 @@ def _test(
 
 
 def _figures(
-    profile: Profile,
-    timing: LoopTiming,
-    capacity: CapacityFigures,
-    run: CircleRun | None,
+    profile: Profile, timing: LoopTiming, capacity: CapacityFigures, run: CircleRun | None, *, settled: bool
 ) -> CircleFigures:
     phase_deg, gain_db, crossover_hz = tightest_margins(run) if run else (None, None, None)
-    contour = run.contour if run else None
+    contour = run.contour if run and settled else None
+    is_turn = profile.circle.path != "trapezoid"
     # The least-squares centre of a short arc is meaningless.
-    round_ = contour if run and run.constant_speed_deg >= LEAST_ARC_DEG else None
+    round_ = contour if run and run.constant_speed_deg >= _LEAST_ARC_DEG else None
+    settling_us = path_settling_us(profile)
+    delay_x_us, delay_y_us = loop_delays_us(profile)
     circle = profile.circle
     setpoints = circle_setpoints(
         circle.radius_mm,
         feed_mm_per_min=circle.feed_mm_per_min,
         period_us=timing.period_us,
         ramp_periods=circle.ramp_periods,
+        settling_us=0.0 if settling_us == inf else settling_us,
     )
-    failures = (*bus_failures(profile, capacity), *(() if run is None else circle_failures(profile, run)))
+    circle_fails = () if run is None else circle_failures(profile, run, settled=settled)
+    failures = (*bus_failures(profile, capacity), *circle_fails)
     return CircleFigures(
         period_us=profile.cycle.period_us,
         feed_mm_per_min=circle.feed_mm_per_min,
         radius_mm=circle.radius_mm,
+        path=circle.path,
         duration_s=setpoints * timing.period_us / 1e6,
         setpoints=setpoints,
         steps=setpoints * timing.steps_per_period,
         step_us=timing.step_us,
         loop=timing.loop,
-        delay_us=timing.delay_us,
+        update=profile.servo.update,
+        delay_us=max(delay_x_us, delay_y_us),
+        delay_x_us=delay_x_us,
+        delay_y_us=delay_y_us,
         timing_model=capacity.timing_model,
         bus_fits=capacity.fits,
         verdict=capacity.verdict or "",
         required_us=capacity.required_us,
         available_us=capacity.available_us,
-        servo_grade=profile.servo.grade,
+        servo_grade=profile.servo.weakest_grade,
+        ideal_drive="servo" not in profile.model_fields_set,
         stable=run.margins_x.stable and run.margins_y.stable if run else None,
         phase_margin_deg=phase_deg,
         gain_margin_db=gain_db,
         crossover_hz=crossover_hz,
+        settled=settled if run and is_turn else None,
         mean_contour_error_mm=contour.mean_contour_error_mm if contour else None,
         max_contour_error_mm=contour.max_contour_error_mm if contour else None,
         radial_deviation_min_mm=contour.radial_deviation_min_mm if contour else None,
         radial_deviation_max_mm=contour.radial_deviation_max_mm if contour else None,
-        circular_deviation_mm=round_.circular_deviation_mm if round_ else None,
+        circular_deviation_mm=contour.circular_deviation_mm if contour else None,
         radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
         centre_offset_mm=round_.centre_offset_mm if round_ else None,
         constant_speed_deg=run.constant_speed_deg if run else None,
-        passed=not failures,
+        passed=False if failures else True if is_judged(profile) else None,
         failures=failures,
         contributions=None,
     )

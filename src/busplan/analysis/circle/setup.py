@@ -1,16 +1,22 @@
 """Make the input of a circle simulation from a profile: path, axes, timing, delivery and mechanics."""
 
-from typing import Any
+from math import inf
+from typing import Any, Final
 
+from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
+from busplan.analysis.circle.failures import CONTOUR_MEASURES
 from busplan.analysis.network import bus_of
 from busplan.sections.base import Section
 from busplan.sections.profile import Profile
 from busplan.servo.checks import parameters
-from busplan.servo.circle import check_circle
+from busplan.servo.circle import REST_MM, check_circle, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path
+
+_REST_SHARE: Final = 1e-3
+"""What settling may leave of the smallest contour tolerance."""
 
 
 def bus(profile: Profile) -> CapacityFigures:
@@ -26,7 +32,9 @@ def setup(profile: Profile) -> Setup:
     BusplanError
         As `circle_test`.
     """
-    circle, servo, delivery, mechanics = profile.circle, profile.servo, profile.delivery, profile.mechanics
+    circle, delivery, mechanics = profile.circle, profile.delivery, profile.mechanics
+    (x, y), timing = loop_axes(profile), loop_timing(profile)
+    settling_us = path_settling_us(profile)
     one = Setup(
         path=circle_path(
             circle.radius_mm,
@@ -34,12 +42,14 @@ def setup(profile: Profile) -> Setup:
             period_us=profile.cycle.period_us,
             ramp_periods=circle.ramp_periods,
             direction=circle.direction,
+            settling_us=0.0 if settling_us == inf else settling_us,
         ),
-        x=Axis(**servo.axis_keys("x")),
-        y=Axis(**servo.axis_keys("y")),
-        timing=loop_timing(profile),
+        x=x,
+        y=y,
+        timing=timing,
         delivery=Delivery(**_parameters_in(delivery, Delivery)),
         mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
+        settled=settling_us != inf,
     )
     check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
     return one
@@ -53,15 +63,62 @@ def loop_timing(profile: Profile) -> LoopTiming:
     BusplanError
         The period is no multiple of the step.
     """
-    period_us, servo = profile.cycle.period_us, profile.servo
+    servo = profile.servo
     return LoopTiming(
-        period_us=period_us,
-        step_us=servo.step_us,
-        loop=servo.loop,
-        interpolation=servo.interpolation,
-        # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
-        delay_us=min(bus(profile).required_us, period_us) if servo.loop == "host" else 0.0,
+        period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
     )
+
+
+def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
+    """Both axes of a profile with the delays of their loops."""
+    x_us, y_us = loop_delays_us(profile)
+    servo = profile.servo
+    return Axis(**servo.axis_keys("x"), delay_us=x_us), Axis(**servo.axis_keys("y"), delay_us=y_us)
+
+
+def loop_delays_us(profile: Profile) -> tuple[float, float]:
+    """Bus delay inside the loops of x and y: none on a node [us].
+
+    On the host it is one period, for the synchronous packet triggers both the sample and the update with the last
+    command. A node that applies its command on arrival has it earlier: x is taken to be on the first node of the
+    cycle and y on the last, which differ most.
+
+    References
+    ----------
+    Paper, section III-C.
+    """
+    period_us = profile.cycle.period_us
+    if profile.servo.loop == "node":
+        return 0.0, 0.0
+    if profile.servo.update == "next_sync":
+        return period_us, period_us
+    own = bus_of(profile)
+    arrived_us: dict[int, float] = {}
+    now_us = 0.0
+    for event in cycle_of(profile, model=own.deciding_model).events():
+        now_us += event.us
+        if event.node is not None and (event.transaction, event.kind) in own.command_events:
+            arrived_us[event.node] = now_us
+    first, last = min(arrived_us, default=0), max(arrived_us, default=0)
+    # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
+    return min(arrived_us.get(first, now_us), period_us), min(arrived_us.get(last, now_us), period_us)
+
+
+def path_settling_us(profile: Profile) -> float | None:
+    """Time of the lead-in at constant speed: None on a trapezoid, infinite if the loops do not settle [us]."""
+    if profile.circle.path == "trapezoid":
+        return None
+    tolerances_mm = [getattr(profile.tolerance, name) for name in CONTOUR_MEASURES]
+    least_mm = min((one for one in tolerances_mm if one), default=None)
+    x, y = loop_axes(profile)
+    found = settling_time_us(
+        x,
+        y,
+        timing=loop_timing(profile),
+        feed_mm_per_min=profile.circle.feed_mm_per_min,
+        rest_mm=REST_MM if least_mm is None else _REST_SHARE * least_mm,
+    )
+    return inf if found is None else found
 
 
 def _parameters_in(section: Section, of: type) -> dict[str, Any]:

@@ -7,7 +7,6 @@ a figure is one step that names its method, and its inputs are all inputs of tha
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.analysis.circle.failures import LEAST_ARC_DEG
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
@@ -24,7 +23,8 @@ _GIVEN: Final = {
     "radius_mm": "circle.radius_mm",
     "step_us": "servo.step_us",
     "loop": "servo.loop",
-    "servo_grade": "servo.grade",
+    "path": "circle.path",
+    "update": "servo.update",
 }
 """Figures that are keys of the profile."""
 _OF_BUS: Final = {
@@ -35,17 +35,19 @@ _OF_BUS: Final = {
 }
 """Figures that `capacity` has, too, with their key there."""
 _PATH: Final = ("duration_s", "setpoints", "steps")
-_LOOP: Final = ("stable", "phase_margin_deg", "gain_margin_db", "crossover_hz")
+_LOOP: Final = ("stable", "phase_margin_deg", "gain_margin_db", "crossover_hz", "settled")
+_DELAYS: Final = ("delay_us", "delay_x_us", "delay_y_us")
 _VERDICT: Final = ("passed", "failures")
 _LOOP_KEYS: Final = ("position_gain_per_s", "integral_gain_per_s2", "derivative_gain", "drive_lag_us")
 """Servo parameters of the linear loop."""
 _SIMULATION: Final = "a simulation of both axes, step by step, on the set-points that the bus delivers"
-_AT_CONSTANT_SPEED: Final = f"{_SIMULATION}; needs {LEAST_ARC_DEG:g} deg of the circle at constant speed"
 _WAYS: Final = {
-    **dict.fromkeys(_PATH, "a count along the path: once round at the feed, with both ramps, in whole periods"),
+    **dict.fromkeys(_PATH, "a count along the path: every turn at the feed, with both ramps, in whole periods"),
     **dict.fromkeys(_LOOP, "the linear position loop of both axes: its poles and its frequency response"),
     **dict.fromkeys(_VERDICT, "a comparison of bus, loop and simulation with what they must hold"),
-    **dict.fromkeys(("circular_deviation_mm", "radius_deviation_mm", "centre_offset_mm"), _AT_CONSTANT_SPEED),
+    "circular_deviation_mm": f"{_SIMULATION}; needs a whole turn: circle.path",
+    "servo_grade": "the weakest grade of the servo values that the profile gives",
+    "ideal_drive": "whether the profile has a section [servo]",
     "contributions": "a simulation of the same circle without each error source in turn",
 }
 """Method of a figure, if it is not a single simulation."""
@@ -82,7 +84,7 @@ def circle_figures(
         **{key: traced(profile, given) for key, given in _GIVEN.items()},
         "timing_model": found(result.timing_model, "the timing model that decides, whichever leads", ()),
         **{key: bus[own] for key, own in _OF_BUS.items()},
-        "delay_us": _delay(profile, result, bus["required_us"]),
+        **{key: _delay(profile, key, result, bus["required_us"]) for key in _DELAYS},
     }
     for figure in CIRCLE_FIGURES:
         if figure.key not in derived:
@@ -97,24 +99,30 @@ def simulated_inputs(profile: Profile) -> tuple[Input, ...]:
     return tuple(one.given for one in _simulation_inputs(profile) if one.given is not None)
 
 
-def _delay(profile: Profile, result: CircleFigures, required: Traced) -> Traced:
-    loop = traced(profile, "servo.loop")
+def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) -> Traced:
+    loop, value = traced(profile, "servo.loop"), getattr(result, key)
     if result.loop == "node":
-        return found(result.delay_us, "none: the loop is closed on the node", (loop,))
-    words = "T_need, at most T_s: the loop is closed on the host, and the cycle lies inside it"
-    return found(result.delay_us, words, (loop, min(required, traced(profile, "cycle.period_us"))))
+        return found(value, "none: the loop is closed on the node", (loop,))
+    update, period_us = traced(profile, "servo.update"), traced(profile, "cycle.period_us")
+    if result.update == "next_sync":
+        words = "T_s: the synchronous packet triggers the sample and the update with the last command (paper, III-C)"
+        return found(value, words, (loop, update, period_us))
+    words = "from the start of the cycle to the command of the axis, at most T_s: x on the first node, y on the last"
+    return found(value, words, (loop, update, required, period_us))
 
 
 def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Traced]) -> Traced:
     """A figure without an equation."""
     value = _plain(result, key)
+    if key in ("servo_grade", "ideal_drive"):
+        return found(value, _WAYS[key], (traced(profile, "servo.grade"),))
     if key in _PATH:
         return found(value, _WAYS[key], tuple(_path_inputs(profile, key)))
     if not result.bus_fits:
         words = _WAYS[key] if key in _VERDICT else "not simulated: the cycle does not fit the bus"
         return found(value, words, (bus["fits"], bus["verdict"]) if key in _VERDICT else (bus["fits"],))
     parts = _loop_inputs(profile) if key in _LOOP else _simulation_inputs(profile)
-    delay = (_delay(profile, result, bus["required_us"]),) if result.loop == "host" or key in _LOOP else ()
+    delay = (_delay(profile, "delay_us", result, bus["required_us"]),) if result.loop == "host" or key in _LOOP else ()
     verdict = (bus["fits"], bus["verdict"], *_tolerances(profile)) if key in _VERDICT else ()
     return found(value, _WAYS.get(key, _SIMULATION), (*parts, *delay, *verdict))
 
@@ -130,8 +138,10 @@ def _plain(result: CircleFigures, key: str) -> object:
 
 
 def _path_inputs(profile: Profile, key: str) -> Iterator[Traced]:
-    yield from (traced(profile, f"circle.{name}") for name in ("radius_mm", "feed_mm_per_min", "ramp_periods"))
+    yield from (traced(profile, f"circle.{name}") for name in ("path", "radius_mm", "feed_mm_per_min", "ramp_periods"))
     yield traced(profile, "cycle.period_us")
+    if profile.circle.path != "trapezoid":
+        yield from _loop_inputs(profile)
     if key == "steps":
         yield traced(profile, "servo.step_us")
 
@@ -149,7 +159,7 @@ def _simulation_inputs(profile: Profile) -> Iterator[Traced]:
     yield traced(profile, "cycle.period_us")
     for name in ("circle", "servo", "delivery", "mechanics"):
         section = getattr(profile, name)
-        unused = {"x", "y", "grade", *_idle(profile)}
+        unused = {"x", "y", "grade", "grades", *_idle(profile)}
         keys = [key for key in type(section).model_fields if key not in unused and getattr(section, key)]
         yield from (traced(profile, f"{name}.{key}") for key in keys)
     for axis in ("x", "y"):
@@ -158,9 +168,12 @@ def _simulation_inputs(profile: Profile) -> Iterator[Traced]:
 
 
 def _idle(profile: Profile) -> Iterator[str]:
-    """Keys without effect: `on_loss` without losses, `seed` without random numbers, `interpolation` on the host."""
-    if profile.servo.loop == "host":
-        yield "interpolation"
+    """Keys without effect.
+
+    These are `on_loss` without losses, `seed` without random numbers, `interpolation` or
+    `update` by the place of the loop.
+    """
+    yield "interpolation" if profile.servo.loop == "host" else "update"
     loses = profile.delivery.loss_probability > 0
     if not loses:
         yield "on_loss"

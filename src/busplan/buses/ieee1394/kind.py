@@ -65,6 +65,7 @@ class Ieee1394(Bus):
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     limits_of = "standard"
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     event_kinds = (
         EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
         EventKind("sync", "synchronous packet", figures.SYNC.reference, "S", "sync"),
