@@ -284,7 +284,8 @@ def _rank(measure: Figure, values: _Figures) -> float | None:
     """A figure as a number that ranks it; None if it has no rank. True ranks above False."""
     value = values.get(measure.key)
     if measure.key == "passed":
-        return float(value is True)
+        # A circle that is not judged has no rank; one that cannot be run ranks like one that fails.
+        return None if value is None and values.get("stable") else float(value is True)
     if measure.key == known.VERDICT.key:
         return None if value is None else -float(VERDICTS.index(value))
     stable = values.get("stable")

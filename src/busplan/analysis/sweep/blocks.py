@@ -51,6 +51,11 @@ class Column(NamedTuple):
     """Numbers, truth values, or indexes into `words`; broadcasts to the chunk's shape. NaN for a missing value."""
     words: tuple[Word, ...] | None = None
 
+    @property
+    def are_true(self) -> Array:
+        """Where a truth value is true; it may be missing."""
+        return self.values if self.words is None else np.equal(self.values, self.words.index(True))
+
 
 class SweepBlock(NamedTuple):
     """The figures of a chunk."""

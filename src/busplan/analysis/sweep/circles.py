@@ -25,6 +25,9 @@ CIRCLE_COLUMNS: Final = (
 MOST_CIRCLES_UNASKED: Final = 1000
 """Most circle tests without --force: minutes with numba, an hour without."""
 
+_TRUTHS: Final = (None, False, True)
+"""Values of a column of truth values that may be missing, in the order of sorting."""
+
 Figures = tuple[float | bool | None, ...]
 
 
@@ -82,14 +85,16 @@ def with_circles(
     """
     results = list(run(CircleTask(profile, block.chunk.point(index)) for index in range(block.chunk.points)))
     circles = {
-        name: Column(_array([point[place] for point in results]).reshape(block.chunk.shape))
+        name: _column([point[place] for point in results], shape=block.chunk.shape)
         for place, name in enumerate(CIRCLE_COLUMNS)
     }
     return block._replace(models=tuple({**figures, **circles} for figures in block.models))
 
 
-def _array(values: Sequence[float | None]) -> Array:
-    """Array of truth values, or of numbers with NaN for None."""
+def _column(values: Sequence[float | None], *, shape: tuple[int, ...]) -> Column:
+    """Column of truth values, also missing ones, or of numbers with NaN for None."""
     if all(isinstance(value, bool) for value in values):
-        return np.array(values, dtype=bool)
-    return np.array([np.nan if value is None else value for value in values], dtype=float)
+        return Column(np.array(values, dtype=bool).reshape(shape))
+    if all(value is None or isinstance(value, bool) for value in values):
+        return Column(np.array([_TRUTHS.index(value) for value in values], dtype=np.uint8).reshape(shape), _TRUTHS)
+    return Column(np.array([np.nan if value is None else value for value in values], dtype=float).reshape(shape))

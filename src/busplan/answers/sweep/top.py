@@ -82,7 +82,7 @@ class Tally:
             # Settings of the bus are the same under every model.
             self._unsafe += points - _share(block.models[0][safety.key].values, points)
         if "passed" in block.models[0]:
-            passed = [_share(figures["passed"].values, points) for figures in block.models]
+            passed = [_share(figures["passed"].are_true, points) for figures in block.models]
             before = self._passed or [0] * len(passed)
             self._passed = [old + new for old, new in zip(before, passed, strict=True)]
 
