@@ -34,9 +34,13 @@ from busplan.sections.profile import Profile
 _SHOWN: Final = (
     *("mean_contour_error_mm", "max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"),
     *("circular_deviation_mm", "radius_deviation_mm", "phase_margin_deg", "gain_margin_db", "crossover_hz"),
-    *("radius_mm", "feed_mm_per_min", "period_us", "step_us", "duration_s", "setpoints", "loop", "stable", "passed"),
+    *("path", "radius_mm", "feed_mm_per_min", "period_us", "step_us", "duration_s", "setpoints", "loop"),
+    *("update", "delay_us"),
+    *("stable", "passed"),
 )
 """Figures of the table, in order."""
+_OF_HOST: Final = ("update", "delay_us")
+"""Rows of the table for loops on the host."""
 ACT_TOGETHER: Final = Sentence(
     ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
 )
@@ -65,7 +69,7 @@ def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
     """Verdict of each period, the periods side by side, and the error sources of each circle."""
     places = [f"/results/{number}" for number in range(len(test.results))]
     for result, at in zip(test.results, places, strict=True):
-        yield from circle_sentences(test.profile.name, result, at=at, with_contributions=with_contributions)
+        yield from circle_sentences(test.profile, result, at=at, with_contributions=with_contributions)
     simulated = (result for result in test.results if result.stable is not None)
     yield from servo_sentence(next(simulated, test.results[0]))
     yield circle_table(test.results)
@@ -120,7 +124,8 @@ def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
         Owner(TableColumn(period(result.period_us)), result, f"/results/{start + number}")
         for number, result in enumerate(results)
     ]
-    rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN)
+    hidden = () if any(result.loop == "host" for result in results) else _OF_HOST
+    rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN if key not in hidden)
     return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
 
 
@@ -181,7 +186,8 @@ def circle_chart(
     scale = drawing.scale
     if scale is None:
         return None
-    caption = sentence("Contour error at constant speed, at {} and {}", *setup_values(result, at=at))
+    part = "at constant speed" if result.path == "trapezoid" else "on the turn"
+    caption = sentence(f"Contour error {part}, at {{}} and {{}}", *setup_values(result, at=at))
     tolerance = ShownValue(tolerance_mm, "max_contour_error_mm", "um")
     limit = (
         sentence("the profile has no tolerance of the largest contour error.")

@@ -2,22 +2,38 @@
 
 from collections.abc import Iterator
 
-from busplan.analysis.circle.failures import Stated
+from busplan.analysis.circle.failures import MARGINS, Stated
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
-from busplan.forms.blocks import Code, Part, Sentence, ShownValue, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, Words, figure_value, joined, sentence
 from busplan.forms.numbers import period_value
+from busplan.sections.profile import Profile
 
 
-def circle_sentences(
-    name: str, result: CircleFigures, *, at: str, with_contributions: bool = True
-) -> Iterator[Sentence]:
-    """Say whether the circle holds its tolerances, what it does not hold, and which error source to attack first.
+def verdict_words(result: CircleFigures) -> Words:
+    """The verdict in a word or two.
 
     Parameters
     ----------
-    name
-        Name of the profile.
+    result
+        The circle test at one period.
+    """
+    if result.stable is None:
+        return Words("NOT RUN", "fails")
+    if result.passed is None:
+        return Words("NOT JUDGED", "warns")
+    return Words("PASSED", "passes") if result.passed else Words("FAILED", "fails")
+
+
+def circle_sentences(
+    profile: Profile, result: CircleFigures, *, at: str, with_contributions: bool = True
+) -> Iterator[Sentence]:
+    """Say whether the circle holds what it must, what it does not hold, and which error source to attack first.
+
+    Parameters
+    ----------
+    profile
+        The network and its tolerances.
     result
         The circle test at one period.
     at
@@ -26,11 +42,29 @@ def circle_sentences(
         If True, the document ranks the error sources.
     """
     period, feed = setup_values(result, at=at)
-    subject = (Code(name), " at ", period, " and ", feed)
-    if result.passed:
-        yield Sentence((*subject, ": the circle holds every tolerance."), "passes")
+    subject = (Code(profile.name), " at ", period, " and ", feed)
+    verdict = verdict_words(result)
+    if result.failures:
+        yield Sentence((*subject, f": {verdict.text}, ", *failure_words(result, at=at).parts, "."), verdict.state)
+        yield from _attack(result, at=at, with_contributions=with_contributions)
         return
-    yield Sentence((*subject, ": FAILED, ", *failure_words(result, at=at).parts, "."), "fails")
+    said = "the circle holds every tolerance" if result.passed else f"{verdict.text}: no contour tolerance is asked for"
+    yield Sentence((*subject, f": {said}."), verdict.state)
+    yield sentence(
+        "The loop is stable, with a phase margin of {}{} or more and a gain margin of {}{} or more.",
+        *(
+            part
+            for key, unit in MARGINS.items()
+            for part in (
+                ShownValue(getattr(profile.tolerance, key), key, unit, None),
+                "" if key in profile.tolerance.model_fields_set else " (default)",
+            )
+        ),
+    )
+
+
+def _attack(result: CircleFigures, *, at: str, with_contributions: bool) -> Iterator[Sentence]:
+    """Say which error source to attack first for the first contour measure that fails."""
     measure, attack = failed_measure(result), to_attack(result)
     if measure is None:
         return
@@ -91,9 +125,15 @@ def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
     result
         The circle test at one period.
     """
-    if result.stable is not None:
-        text = f"The servo values behind these figures are {result.servo_grade}."
-        yield sentence(text, state="warns" if result.servo_grade == "assumed" else "neutral")
+    if result.stable is None:
+        return
+    if result.ideal_drive:
+        yield Sentence(("The profile has no [servo]: an ideal drive was simulated.",), "warns")
+        return
+    text = f"The servo values behind these figures are {result.servo_grade}."
+    if result.servo_grade == "assumed":
+        text = "Servo values behind these figures are assumed, some or all."
+    yield sentence(text, state="warns" if result.servo_grade == "assumed" else "neutral")
 
 
 def source_words(source: str) -> str:

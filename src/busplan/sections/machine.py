@@ -205,13 +205,17 @@ class ToleranceSection(Section):
     """Section [tolerance]: what the circle test must hold. A contour tolerance that is left out is not checked."""
 
     mean_contour_error_mm: LengthMm | None = Field(
-        default=None, description="Largest mean contour error of the turn, or of the whole trapezoid [mm]", examples=[0.005]
+        default=None,
+        description="Largest mean contour error of the turn, or of the whole trapezoid [mm]",
+        examples=[0.005],
     )
     max_contour_error_mm: LengthMm | None = Field(
         default=None, description="Largest contour error of the turn, or of the whole trapezoid [mm]", examples=[0.025]
     )
     circular_deviation_mm: LengthMm | None = Field(
-        default=None, description="Largest circular deviation G, which needs circle.path = \"iso230-4\" [mm]", examples=[0.03]
+        default=None,
+        description='Largest circular deviation G, which needs circle.path = "iso230-4" [mm]',
+        examples=[0.03],
     )
     min_phase_margin_deg: Annotated[float, Field(ge=0, le=180, allow_inf_nan=False)] = Field(
         default=30.0, description="Smallest phase margin of the position loop [deg]", examples=[30]

@@ -20,8 +20,8 @@ STABILITY: Final = ("stability", *MARGINS)
 """Failures of the loop itself."""
 _WITHOUT_TURN: Final = "circular_deviation_without_turn"
 _NEXT_SYNC: Final = (
-    '; with servo.update = "next_sync" one period lies inside the loop ("on_arrival" is for nodes that apply a command '
-    "when it comes)"
+    ' (servo.update = "next_sync" puts one period inside the loop; "on_arrival" is for nodes that apply a command when '
+    "it comes)"
 )
 
 
@@ -206,16 +206,18 @@ def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple
     late = _NEXT_SYNC if profile.servo.loop == "host" and profile.servo.update == "next_sync" else ""
     if not (run.margins_x.stable and run.margins_y.stable):
         return (Failure("stability", None, None, more=late),)
-    margins = zip(MARGINS, tightest_margins(run)[:2], strict=True)
+    low = [
+        Failure(name, value, limit, is_default=name not in tolerance.model_fields_set)
+        for name, value in zip(MARGINS, tightest_margins(run), strict=False)
+        if value is not None and value < (limit := getattr(tolerance, name))
+    ]
+    if low:
+        low[-1] = low[-1]._replace(more=late)
     return (
         *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
         # Radial errors do not show this: a table that stands still on the circle has none.
         *(() if run.follows else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
-        *(
-            Failure(name, value, limit, is_default=name not in tolerance.model_fields_set, more=late)
-            for name, value in margins
-            if value is not None and value < (limit := getattr(tolerance, name))
-        ),
+        *low,
         *(_contour_failures(profile, run) if settled else ()),
     )
 

@@ -6,7 +6,6 @@ from busplan.buses.figure import AVAILABLE, PERIOD, REQUIRED, VERDICT, Figure, b
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)
-_SLICE: Final = by(required_time_slice_us)
 _ISO: Final = "ISO 230-4"
 
 CIRCLE_FIGURES: Final = (
@@ -33,7 +32,9 @@ CIRCLE_FIGURES: Final = (
         "position loop on the",
         sort="word",
     ),
-    Figure("update", "update", "profile", "when a node applies a command of a loop on the host: next_sync or on_arrival"),
+    Figure(
+        "update", "update", "profile", "when a node applies a command of a loop on the host: next_sync or on_arrival"
+    ),
     Figure("delay_us", "T_d", "III-C", "bus delay inside the loop, the longer one of both axes", "delay in the loop"),
     Figure("delay_x_us", "T_dx", "III-C", "bus delay inside the loop of x"),
     Figure("delay_y_us", "T_dy", "III-C", "bus delay inside the loop of y"),
@@ -123,7 +124,13 @@ CIRCLE_FIGURES: Final = (
     Figure("centre_offset_mm", "centre", "least squares", "least-squares centre, x and y"),
     Figure("constant_speed_deg", "arc", "simulation", "arc that F, G, centre and radius are taken on: 360 for a turn"),
     Figure(
-        "passed", "passed", "profile", "whether the circle holds every tolerance; null without a contour tolerance", "passed", sort="truth", better="more"
+        "passed",
+        "passed",
+        "profile",
+        "whether the circle holds every tolerance; null without a contour tolerance",
+        "passed",
+        sort="truth",
+        better="more",
     ),
     Figure("failures", "failures", "profile", "what the circle does not hold"),
     Figure("contributions", "contributions", "simulation", "what each error source takes of the largest error"),

@@ -8,7 +8,7 @@ import numpy as np
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
-from busplan.analysis.sweep.grid import Array, Grid
+from busplan.analysis.sweep.grid import Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

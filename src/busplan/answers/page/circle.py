@@ -6,7 +6,7 @@ from typing import Final
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.answers.circle import ACT_TOGETHER, NO_SOURCES, circle_drawing, circle_table, contributions_table
-from busplan.answers.circle_verdict import circle_sentences, servo_sentence
+from busplan.answers.circle_verdict import circle_sentences, servo_sentence, verdict_words
 from busplan.answers.page.commands import Sources
 from busplan.forms.blocks import Block, Chapter, Facts, Question, Sentence, Words, attribute_value
 
@@ -31,8 +31,8 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
     facts = ((CIRCLE_BY_KEY[key].label, attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0")) for key in known)
     question = Question(
         _QUESTION,
-        Words("PASSED", "passes") if result.passed else Words("FAILED", "fails"),
-        (*circle_sentences(answer.profile.name, result, at="/results/0"), *servo_sentence(result)),
+        verdict_words(result),
+        (*circle_sentences(answer.profile, result, at="/results/0"), *servo_sentence(result)),
         Facts(tuple(facts)),
     )
     return sources["circle"].gives(question)

@@ -7,6 +7,7 @@ from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.network import bus_of
 from busplan.answers.assumptions import assumptions_table
+from busplan.answers.circle_verdict import verdict_words
 from busplan.answers.documents import document
 from busplan.answers.page.bus import axes_part, bus_question, models_part, terms_part, timeline_part
 from busplan.answers.page.circle import circle_part, circle_question, sources_part
@@ -38,6 +39,7 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
+    Words,
     attribute_value,
 )
 from busplan.forms.numbers import MISSING, plural
@@ -179,7 +181,7 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
         TableColumn("+/-", "us"),
         TableColumn("safe axes"),
         *(TableColumn(CIRCLE_BY_KEY[key].symbol, group="contour error, um") for key in _MEASURES),
-        TableColumn("circle passed", kind="words"),
+        TableColumn("circle", kind="words"),
     )
     rows = tuple(TableRow(_compared(one)) for one in subjects)
     return Table(columns, rows, Sentence(("All profiles, each under the timing model that decides",)))
@@ -200,7 +202,6 @@ def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
     result = subject.answer.circle_figures
     if result is None:
         return MISSING, MISSING, MISSING, "not run"
-    figures = (*_MEASURES, "passed")
-    return subject.sources["circle"].gives(
-        tuple(attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0") for key in figures)
-    )
+    figures = tuple(attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0") for key in _MEASURES)
+    verdict = verdict_words(result)
+    return *subject.sources["circle"].gives(figures), Words(verdict.text.lower(), verdict.state)
