@@ -71,7 +71,7 @@ def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
     for result, at in zip(test.results, places, strict=True):
         yield from circle_sentences(test.profile, result, at=at, with_contributions=with_contributions)
     simulated = (result for result in test.results if result.stable is not None)
-    yield from servo_sentence(next(simulated, test.results[0]))
+    yield from servo_sentence(test.profile, next(simulated, test.results[0]))
     yield circle_table(test.results)
     ranked = [
         result.contributions for result in test.results if with_contributions and result.contributions is not None

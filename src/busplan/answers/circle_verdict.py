@@ -1,11 +1,12 @@
 """The verdict of a circle test in sentences."""
 
+from collections import Counter
 from collections.abc import Iterator
 
 from busplan.analysis.circle.failures import MARGINS, Stated
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import CircleFigures, failed_measure, to_attack
-from busplan.forms.blocks import Code, Part, Sentence, ShownValue, Words, figure_value, joined, sentence
+from busplan.forms.blocks import Code, Part, Sentence, ShownValue, State, Words, figure_value, joined, sentence
 from busplan.forms.numbers import period_value
 from busplan.sections.profile import Profile
 
@@ -117,11 +118,13 @@ def _part(part: str | Stated, result: CircleFigures, *, at: str) -> Part:
     return ShownValue(part.value, part.key, part.unit, part.decimals, at=f"{at}/{part.key}" if known else "")
 
 
-def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
+def servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence]:
     """Say how the servo values behind the figures are known; nothing without a simulation.
 
     Parameters
     ----------
+    profile
+        The profile.
     result
         The circle test at one period.
     """
@@ -130,10 +133,10 @@ def servo_sentence(result: CircleFigures) -> Iterator[Sentence]:
     if result.ideal_drive:
         yield Sentence(("The profile has no [servo]: an ideal drive was simulated.",), "warns")
         return
-    text = f"The servo values behind these figures are {result.servo_grade}."
-    if result.servo_grade == "assumed":
-        text = "Servo values behind these figures are assumed, some or all."
-    yield sentence(text, state="warns" if result.servo_grade == "assumed" else "neutral")
+    counts = Counter(profile.servo.grades_given)
+    each = ", ".join(f"{number} {grade}" if len(counts) > 1 else grade for grade, number in counts.items())
+    state: State = "warns" if result.servo_grade == "assumed" else "neutral"
+    yield Sentence((f"The servo values behind these figures are {each}.",), state)
 
 
 def source_words(source: str) -> str:

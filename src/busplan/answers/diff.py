@@ -161,7 +161,8 @@ def _notes(found: Difference) -> Iterator[Sentence]:
             state = "FAILED" if circle.simulated else "is not simulated"
             yield Sentence((f"The circle of {side} {state}: {', and '.join(circle.problems)}.",), "warns")
     if any(circle.simulated for circle in found.circles):
-        yield from _graded("servo values behind the circle's figures are", found.a.servo.grade, found.b.servo.grade)
+        grades = (one.servo.grades_given[0] for one in (found.a, found.b))
+        yield from _graded("servo values behind the circle's figures are", *grades)
 
 
 def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:

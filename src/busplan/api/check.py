@@ -10,6 +10,7 @@ from busplan.api.inputs import Path, argument, items
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.profile.collect import collect
+from busplan.rules.circle import MOST_STEPS
 from busplan.rules.gate import FileResult, check_source
 from busplan.rules.report import CheckReport, Located, Summary
 
@@ -52,7 +53,7 @@ class CheckAnswer(Answer):
         return CheckReport(self.files)
 
 
-def check(paths: Path | Iterable[Path], *, with_circle: bool = True) -> CheckAnswer:
+def check(paths: Path | Iterable[Path], *, with_circle: bool = True, circle_steps: int = MOST_STEPS) -> CheckAnswer:
     """Check whether profiles fit their bus and hold their circle.
 
     Parameters
@@ -61,6 +62,8 @@ def check(paths: Path | Iterable[Path], *, with_circle: bool = True) -> CheckAns
         One or several files, folders (every *.toml below with a `schema_version`) or shipped names.
     with_circle
         Run the circle test of profiles that ask for one.
+    circle_steps
+        Most simulated steps of each axis of a circle: a longer one is not run, and has a warning.
 
     Returns
     -------
@@ -82,4 +85,6 @@ def check(paths: Path | Iterable[Path], *, with_circle: bool = True) -> CheckAns
     """
     several = [paths] if isinstance(paths, str | os.PathLike) else items(paths, name="paths")
     sources = collect([argument(path) for path in several]).sources
-    return CheckAnswer(tuple(check_source(source, with_circle=with_circle) for source in sources))
+    return CheckAnswer(
+        tuple(check_source(source, with_circle=with_circle, circle_steps=circle_steps) for source in sources)
+    )

@@ -58,6 +58,16 @@ def check_command(
         bool,
         typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one, or leave it out."),
     ] = True,
+    circle_steps: Annotated[
+        int | None,
+        typer.Option(
+            "--circle-steps",
+            metavar="N",
+            min=1,
+            help="Most simulated steps of each axis of a circle; a longer one is not run, which BP204 warns of.  "
+            "[default: 10000000]",
+        ),
+    ] = None,
     baseline: Annotated[
         Path | None,
         typer.Option(
@@ -88,11 +98,11 @@ def check_command(
 
     Example: busplan check paper-1ms paper-4ms --format github
     """
-    if update_baseline and baseline is None:
-        raise BusplanError("--update-baseline: needs --baseline FILE")
-    if update_baseline and baseline is not None:
-        require_changeable(baseline)
+    if circle_steps is not None and not circle:
+        raise BusplanError("--circle-steps: goes without --no-circle")
+    _require_baseline(baseline, update=update_baseline)
     from busplan.profile.collect import collect
+    from busplan.rules.circle import MOST_STEPS
     from busplan.rules.gate import check_source
 
     collection = collect(paths, stdin_name=stdin_filename)
@@ -106,7 +116,13 @@ def check_command(
                 f"warning: {baseline}: recorded by other timing models, so its figures are not compared; "
                 "record them again with --update-baseline"
             )
-    one = partial(check_source, recorded=before, with_circle=circle, record=update_baseline)
+    one = partial(
+        check_source,
+        recorded=before,
+        with_circle=circle,
+        circle_steps=circle_steps or MOST_STEPS,
+        record=update_baseline,
+    )
     report = _check(collection.sources, one, jobs=jobs)
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
@@ -124,6 +140,14 @@ def check_command(
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
         raise PlanFailsError
+
+
+def _require_baseline(baseline: Path | None, *, update: bool) -> None:
+    """Refuse to update what is not named or cannot be written."""
+    if update and baseline is None:
+        raise BusplanError("--update-baseline: needs --baseline FILE")
+    if update and baseline is not None:
+        require_changeable(baseline)
 
 
 def _require_apart(

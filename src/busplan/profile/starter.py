@@ -8,6 +8,10 @@ from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
 from busplan.profile.write import value_text
 
+_CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
+_TURN: Final = (
+    'path = "iso230-4"          # one whole turn is measured, behind a lead-in; the paper has a "trapezoid"\n'
+)
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
 
 
@@ -33,7 +37,7 @@ def starter_text(source: str, *, name: str) -> str:
     place = document.places["name",]
     # Remove suppressions: they were decided for the shipped profile, not for the new machine.
     before, after = document.text[: place.value_start], document.text[place.value_end :]
-    text = before + value_text(name) + _SUPPRESSION.sub("", after)
+    text = before + value_text(name) + _CIRCLE.sub(rf"\1{_TURN}", _SUPPRESSION.sub("", after))
     # The path to the schema is valid only in the shipped folder.
     text = text.removeprefix("#:schema ./busplan.schema.json\n")
     try:

@@ -12,19 +12,37 @@ from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError
 
 _NAMED: Final = ("circle", "servo", "delivery", "cycle")
+_NOT_RUN: Final = ("BP203", "BP204")
 
 
-def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
+MOST_STEPS: Final = 10_000_000
+"""Most steps of a circle that a check runs unless it is told otherwise: seconds, and a few hundred megabytes."""
+
+
+def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterator[tuple[str, RuleProblem]]:
     """Run the circle test of a profile, and yield the code of each broken rule with its problem.
 
     A cycle that does not fit breaks another rule, and has no circle.
+
+    Parameters
+    ----------
+    subject
+        The profile.
+    most_steps
+        Most simulated steps of each axis: a longer circle is not run.
     """
     from busplan.analysis.circle.failures import CONTOUR_MEASURES, STABILITY
     from busplan.analysis.circle.roundness import circle_test, to_attack
+    from busplan.analysis.circle.setup import path_steps
 
     if not subject.profile.asks_for_circle or not subject.deciding.fits:
         return
     try:
+        steps = path_steps(subject.profile)
+        if steps > most_steps:
+            key = _key_of("radius_mm", subject.profile)
+            yield "BP204", RuleProblem(key, f"the circle takes {steps:,} steps, more than {most_steps:,}: not run")
+            return
         result = circle_test(subject.profile).results[0]
     except ParameterError as error:
         for refused in error.refused:
@@ -54,11 +72,11 @@ def _key_of(name: str, profile: Profile) -> str:
 
 
 def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
-    """Codes of the rules that were checked: none without a test, only BP203 if the test cannot be run."""
+    """Codes of the rules that were checked: none without a test, one alone if it says why the test was not run."""
     if subject.profile.asks_for_circle and not subject.deciding.fits:
         return set()
-    impossible = {code for code, _ in problems if code == "BP203"}
-    return impossible or {rule.code for rule in RULES}
+    not_run = {code for code, _ in problems if code in _NOT_RUN}
+    return not_run or {rule.code for rule in RULES}
 
 
 RULES: Final = (
@@ -86,5 +104,14 @@ RULES: Final = (
         "the circle test cannot be run",
         "The values of [servo] and [circle] do not go together: the period is no multiple of the step, the drive "
         "cannot reach the feed, or the circle is too short for its ramps.",
+    ),
+    Rule(
+        "BP204",
+        "circle-too-long",
+        "warning",
+        "the circle test is too long for a check, and was not run",
+        "The circle of this profile takes more simulated steps than a check allows (--circle-steps, 10,000,000 unless "
+        "it says otherwise), so nothing is known of its circle. A faster circle.feed_mm_per_min, a smaller "
+        "circle.radius_mm or a longer servo.step_us makes it shorter; `busplan circle-test PROFILE` runs it.",
     ),
 )

@@ -45,6 +45,7 @@ def check_source(
     source: ProfileSource,
     *,
     with_circle: bool = True,
+    circle_steps: int = circle.MOST_STEPS,
     recorded: Mapping[str, Recorded] | None = None,
     record: bool = False,
 ) -> FileResult:
@@ -56,6 +57,8 @@ def check_source(
         The file; if it cannot be read, the result has a failure.
     with_circle
         Whether to run the circle test of profiles that ask for one.
+    circle_steps
+        Most simulated steps of each axis of a circle: a longer one is not run.
     recorded
         Baseline figures by file name; None for no baseline.
     record
@@ -72,11 +75,16 @@ def check_source(
     except PlacedError as error:
         return unreadable(source.name, error, content)
     before = None if recorded is None else recorded.get(source.name, {})
-    return check_document(document, with_circle=with_circle, baseline=before, record=record)
+    return check_document(document, with_circle=with_circle, circle_steps=circle_steps, baseline=before, record=record)
 
 
 def check_document(
-    document: Document, *, with_circle: bool = True, baseline: Recorded | None = None, record: bool = True
+    document: Document,
+    *,
+    with_circle: bool = True,
+    circle_steps: int = circle.MOST_STEPS,
+    baseline: Recorded | None = None,
+    record: bool = True,
 ) -> FileResult:
     """Check one document against all rules.
 
@@ -86,6 +94,8 @@ def check_document(
         The text and its name.
     with_circle
         Whether to run the circle test of profiles that ask for one.
+    circle_steps
+        Most simulated steps of each axis of a circle: a longer one is not run.
     baseline
         Baseline figures of the profile; None for no baseline.
     record
@@ -106,7 +116,7 @@ def check_document(
     found = list(_findings(subject, own))
     ran = {rule.code for rule in own}
     if with_circle:
-        problems = list(circle.circle_problems(subject))
+        problems = list(circle.circle_problems(subject, most_steps=circle_steps))
         found += [_placed(subject, all_rules()[code], problem) for code, problem in problems]
         ran |= circle.answered(subject, problems)
     if baseline is not None:

@@ -170,11 +170,11 @@ class ServoSection(AxisKeys):
         return own or self.grade
 
     @property
-    def weakest_grade(self) -> ServoGrade:
-        """The weakest grade of all values that the profile gives or grades."""
+    def grades_given(self) -> tuple[ServoGrade, ...]:
+        """The grade of each value that the profile gives or grades, the weakest first; servo.grade if there is none."""
         given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set | self.grades.model_fields_set
-        graded = {self.grade_of(key) for key in given & set(ServoGrades.model_fields)} or {self.grade}
-        return max(graded, key=SERVO_GRADES.index)
+        found = [self.grade_of(key) for key in given & set(ServoGrades.model_fields)] or [self.grade]
+        return tuple(sorted(found, key=SERVO_GRADES.index, reverse=True))
 
 
 class CircleSection(Section):

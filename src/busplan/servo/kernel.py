@@ -30,7 +30,7 @@ highest command [mm/s], levels [s/mm], level [mm/s], drive offset [mm/s], fricti
 An element whose ki, kd, counts, levels or friction is 0 is left out."""
 
 
-def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the arithmetic
+def run_rows(  # noqa: C901, PLR0915 - calls would cost more than the arithmetic
     state: MutableSequence[float],
     constants: Constants,
     out: MutableSequence[float],

@@ -5,11 +5,11 @@ delay of a host loop can make the circle rounder while it reduces the margins, s
 """
 
 from collections.abc import Sequence
-from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.circle.contributions import Contribution, Setup, contributions, sources
+from busplan.analysis.circle.estimate import announce, estimate
 from busplan.analysis.circle.failures import (
     CONTOUR_MEASURES,
     Failure,
@@ -18,13 +18,12 @@ from busplan.analysis.circle.failures import (
     is_judged,
     tightest_margins,
 )
-from busplan.analysis.circle.setup import bus, loop_delays_us, loop_timing, path_settling_us, setup
+from busplan.analysis.circle.setup import bus, loop_delays_us, loop_timing, path_setpoints, setup
 from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import LoopTiming
-from busplan.servo.path import circle_setpoints
 
 _LEAST_ARC_DEG: Final = 270.0
 """Shortest arc of a trapezoid for a least-squares centre and radius."""
@@ -180,9 +179,10 @@ def circle_test(
     # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus
     # needs no path.
     setups = [setup(variant) if bus(variant).fits else loop_timing(variant) for variant in variants]
-    for one in setups:
-        if isinstance(one, Setup):
-            counter.expect(one, *(sources(one).values() if with_contributions else ()))
+    simulated = [one for one in setups if isinstance(one, Setup)]
+    ranked = [source for one in simulated if with_contributions for source in sources(one).values()]
+    counter.expect(*simulated, *ranked)
+    announce(estimate(simulated, ranked))
     pairs = [
         _test(variant, one, with_contributions=with_contributions, explain=explain, counter=counter)
         for variant, one in zip(variants, setups, strict=True)
@@ -232,7 +232,9 @@ def _test(
     result = _figures(profile, one.timing, capacity, run, settled=one.settled)
     if with_contributions or (explain and failed_measure(result)):
         if not with_contributions:
-            counter.expect(*sources(one).values())
+            removed = tuple(sources(one).values())
+            counter.expect(*removed)
+            announce(estimate((), removed))
         ranked = contributions(one, max_contour_error_mm=run.contour.max_contour_error_mm, simulate=counter.run)
         result = result._replace(contributions=ranked)
     return result, run
@@ -246,16 +248,9 @@ def _figures(
     is_turn = profile.circle.path != "trapezoid"
     # The least-squares centre of a short arc is meaningless.
     round_ = contour if run and run.constant_speed_deg >= _LEAST_ARC_DEG else None
-    settling_us = path_settling_us(profile)
     delay_x_us, delay_y_us = loop_delays_us(profile)
     circle = profile.circle
-    setpoints = circle_setpoints(
-        circle.radius_mm,
-        feed_mm_per_min=circle.feed_mm_per_min,
-        period_us=timing.period_us,
-        ramp_periods=circle.ramp_periods,
-        settling_us=0.0 if settling_us == inf else settling_us,
-    )
+    setpoints = path_setpoints(profile)
     circle_fails = () if run is None else circle_failures(profile, run, settled=settled)
     failures = (*bus_failures(profile, capacity), *circle_fails)
     return CircleFigures(
@@ -277,7 +272,7 @@ def _figures(
         verdict=capacity.verdict or "",
         required_us=capacity.required_us,
         available_us=capacity.available_us,
-        servo_grade=profile.servo.weakest_grade,
+        servo_grade=profile.servo.grades_given[0],
         ideal_drive="servo" not in profile.model_fields_set,
         stable=run.margins_x.stable and run.margins_y.stable if run else None,
         phase_margin_deg=phase_deg,

@@ -13,7 +13,7 @@ from busplan.sections.profile import Profile
 from busplan.servo.checks import parameters
 from busplan.servo.circle import REST_MM, check_circle, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import circle_path
+from busplan.servo.path import circle_path, circle_setpoints
 
 _REST_SHARE: Final = 1e-3
 """What settling may leave of the smallest contour tolerance."""
@@ -102,6 +102,30 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
     first, last = min(arrived_us, default=0), max(arrived_us, default=0)
     # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
     return min(arrived_us.get(first, now_us), period_us), min(arrived_us.get(last, now_us), period_us)
+
+
+def path_steps(profile: Profile) -> int:
+    """Count the simulated steps of each axis; nothing is simulated [1].
+
+    Raises
+    ------
+    BusplanError
+        The period is no multiple of the step.
+    """
+    timing = loop_timing(profile)
+    return path_setpoints(profile) * timing.steps_per_period
+
+
+def path_setpoints(profile: Profile) -> int:
+    """Count the set-points of a profile's circle [1]."""
+    circle, settling_us = profile.circle, path_settling_us(profile)
+    return circle_setpoints(
+        circle.radius_mm,
+        feed_mm_per_min=circle.feed_mm_per_min,
+        period_us=profile.cycle.period_us,
+        ramp_periods=circle.ramp_periods,
+        settling_us=0.0 if settling_us == inf else settling_us,
+    )
 
 
 def path_settling_us(profile: Profile) -> float | None:

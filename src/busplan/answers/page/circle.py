@@ -32,7 +32,7 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
     question = Question(
         _QUESTION,
         verdict_words(result),
-        (*circle_sentences(answer.profile, result, at="/results/0"), *servo_sentence(result)),
+        (*circle_sentences(answer.profile, result, at="/results/0"), *servo_sentence(answer.profile, result)),
         Facts(tuple(facts)),
     )
     return sources["circle"].gives(question)
