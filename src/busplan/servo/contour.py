@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-_BLOCK = 1 << 15
-"""Points computed at once: little memory, and it fits into the cache."""
+_BLOCK = 1 << 13
+"""Points computed at once: they fit into the cache, and are too few for numpy's BLAS to share out among threads, so that
+sums are the same on any number of processors."""
 _ITERATIONS = 20
 _CONVERGED_MM = 1e-10
 _DEG_PER_TURN = 360.0
@@ -126,7 +127,7 @@ def measure_contour(
         radial_deviation_min_mm=nominal.lowest_mm,
         radial_deviation_max_mm=nominal.highest_mm,
         circular_deviation_mm=None if turn_share is None else fitted.highest_mm - fitted.lowest_mm,
-        centre_offset_mm=fitted.centre_mm,
+        centre_offset_mm=fitted.best_centre_mm,
         radius_deviation_mm=fitted.deviation_mm,
     )
 
@@ -199,7 +200,7 @@ def least_squares_circle(x_mm: Floats, *, y_mm: Floats, radius_mm: float) -> tup
     (-2e-06, 1e-06, True)
     """
     fitted = _Fit.about((0.0, 0.0), x_mm, y_mm, radius_mm, 0.0).best(x_mm, y_mm)
-    return fitted.centre_mm, fitted.deviation_mm
+    return fitted.best_centre_mm, fitted.deviation_mm
 
 
 class _Fit(NamedTuple):
@@ -236,14 +237,18 @@ class _Fit(NamedTuple):
         a, b, deviation = np.linalg.lstsq(normal, right, rcond=None)[0].tolist()
         return cls(centre_mm, radius_mm, missing, lowest, highest, (a, b), deviation)
 
+    @property
+    def best_centre_mm(self) -> tuple[float, float]:
+        """The best centre as seen from this one."""
+        return self.centre_mm[0] + self.step_mm[0], self.centre_mm[1] + self.step_mm[1]
+
     def best(self, x_mm: Floats, y_mm: Floats) -> "_Fit":
         """Step to the best centre."""
         fit = self
         for _ in range(_ITERATIONS):
             if max(map(abs, fit.step_mm)) <= _CONVERGED_MM:
                 break
-            centre_mm = fit.centre_mm[0] + fit.step_mm[0], fit.centre_mm[1] + fit.step_mm[1]
-            fit = _Fit.about(centre_mm, x_mm, y_mm, self.radius_mm, self.missing)
+            fit = _Fit.about(fit.best_centre_mm, x_mm, y_mm, self.radius_mm, self.missing)
         return fit
 
 

@@ -149,8 +149,11 @@ def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, perio
     [0.0, 3.0, 3.0, 0.0]
     """
     check_delivery(delivery, period_us=period_us)
-    random = np.random.default_rng([delivery.seed, _JITTER_STREAM])
-    offsets = delivery.jitter_us * random.uniform(-1.0, 1.0, cycles + 1)
+    offsets = np.zeros(cycles + 1)
+    # Without jitter nothing is drawn: numpy.random takes longer to load than all delays to compute.
+    if delivery.jitter_us:
+        random = np.random.default_rng([delivery.seed, _JITTER_STREAM])
+        offsets += delivery.jitter_us * random.uniform(-1.0, 1.0, cycles + 1)
     offsets += delivery.skew_us if name == "y" else 0.0
     offsets[[0, -1]] = 0.0
     return offsets
@@ -178,6 +181,8 @@ def lost_cycles(delivery: Delivery, *, name: AxisName, cycles: int) -> Flags:
     >>> lost_cycles(Delivery(loss_probability=1.0), name="x", cycles=2).tolist()
     [False, True, True]
     """
+    if not delivery.loss_probability:
+        return np.zeros(cycles + 1, dtype=np.bool_)
     random = np.random.default_rng([delivery.seed, _LOSS_STREAM[name]])
     lost = random.random(cycles + 1) < delivery.loss_probability
     lost[0] = False

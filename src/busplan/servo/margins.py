@@ -210,7 +210,8 @@ def _grid(numerator: Floats, denominator: Floats, poles: NDArray[Any]) -> Floats
     corners = np.abs(np.concatenate([zeros, np.roots(denominator), poles]))
     lowest = min(0.01 * corners[corners > 0].min(), 0.1)
     notches = np.abs(np.angle(1 + zeros))
-    return np.union1d(np.geomspace(lowest, math.pi, _GRID), notches[notches > lowest])
+    # Not np.union1d: it loads numpy.ma, which takes as long as all margins.
+    return np.sort(np.concatenate((np.geomspace(lowest, math.pi, _GRID), notches[notches > lowest])))
 
 
 def _phase_margin(angles: Floats, numerator: Floats, denominator: Floats) -> tuple[float | None, float | None]:

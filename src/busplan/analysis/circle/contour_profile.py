@@ -57,8 +57,10 @@ def contour_profile(run: CircleRun, *, sectors: int = CONTOUR_SECTORS) -> Contou
         error_mm = contour_error(x_mm, y_mm=y_mm, radius_mm=run.path.radius_mm)
         turn = np.arctan2(y_mm, x_mm) / (2 * np.pi) % 1.0
         sector = np.minimum((turn * sectors).astype(np.int64), sectors - 1)
-        np.minimum.at(low, sector, error_mm)
-        np.maximum.at(high, sector, error_mm)
+        # Neighbouring points are mostly in the same sector: only the extremes of each stay are looked at one by one.
+        entered = np.flatnonzero(np.diff(sector, prepend=-1))
+        np.minimum.at(low, sector[entered], np.minimum.reduceat(error_mm, entered))
+        np.maximum.at(high, sector[entered], np.maximum.reduceat(error_mm, entered))
     return ContourProfile(
         tuple(float(value) if np.isfinite(value) else None for value in low),
         tuple(float(value) if np.isfinite(value) else None for value in high),
