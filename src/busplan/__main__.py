@@ -10,8 +10,8 @@ def main() -> None:
 
     Garbage collection during imports and at exit takes a fifth of a short run, so its threshold is raised; it stays on
     for long runs. Searching all installed packages for pydantic plugins takes as long as the calculation, and a plugin
-    could change how profiles are validated, so plugins are disabled. Nothing here is large enough for several threads of
-    linear algebra, and starting them takes time.
+    could change how profiles are validated, so plugins are disabled. Nothing here is large enough for several threads
+    of linear algebra, and starting them takes time.
     """
     gc.set_threshold(500_000)
     atexit.register(gc.freeze)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _BLOCK = 1 << 13
-"""Points computed at once: they fit into the cache, and are too few for numpy's BLAS to share out among threads, so that
-sums are the same on any number of processors."""
+"""Points computed at once: they fit into the cache, and are too few for numpy's BLAS to share out among threads, so
+that sums are the same on any number of processors."""
 _ITERATIONS = 20
 _CONVERGED_MM = 1e-10
 _DEG_PER_TURN = 360.0
