@@ -23,11 +23,17 @@ class CompileKernel(BuildHookInterface[Any]):
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile into a wheel, or for an editable installation beside the source."""
         self._work = Path(tempfile.mkdtemp())
+        folder = Path(self.root, _SOURCE).parent
         built = self._compiled()
+        if version == "editable":
+            # What an earlier installation compiled may be another kernel.
+            for old in folder.glob("_kernel.*"):
+                if old.suffix != ".pxd":
+                    old.unlink()
         if built is None:
             self.app.display_warning("busplan: no C compiler, so circle tests run in plain Python, which takes longer")
         elif version == "editable":
-            shutil.copy(built, Path(self.root, _SOURCE).parent)
+            shutil.copy(built, folder)
         else:
             build_data["force_include"][str(built)] = f"busplan/servo/{built.name}"
         if built is not None:
@@ -43,12 +49,13 @@ class CompileKernel(BuildHookInterface[Any]):
             _MODULE,
             [str(Path(self.root, _SOURCE))],
             # Fused operations would round otherwise than Python does.
-            extra_compile_args=["-O2", "-ffp-contract=off"],
-            optional=True,
+            extra_compile_args=["-O2", "-g0", "-ffp-contract=off"],
         )
         generated = cythonize(
             [extension], build_dir=str(self._work / "c"), language_level=3, compiler_directives=_DIRECTIVES, quiet=True
         )
+        for one in generated:
+            one.optional = True
         command = build_ext(Distribution({"ext_modules": generated}))
         command.build_lib, command.build_temp = str(self._work / "lib"), str(self._work / "objects")
         command.ensure_finalized()

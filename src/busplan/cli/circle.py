@@ -76,9 +76,10 @@ def circle_test_command(
     """Tell whether the circle is still round: simulate both axes at the period that the bus delivers.
 
     First the bus: a cycle that does not fit its period fails the test before any simulation. Then stability: a loop
-    without its phase and gain margin fails, however round its circle. Then the tolerances of the profile. Errors are
-    in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of ISO 230-4. Exits 0 when every
-    tolerance holds and 1 when one does not.
+    without its phase and gain margin fails, however round its circle. Then the tolerances of the profile; without any,
+    the circle is not judged. Errors are in um in the table, in mm in JSON and CSV; F_min, F_max and G are the terms of
+    ISO 230-4, and circle.path = "iso230-4" measures them on a whole turn. Exits 0 when every tolerance holds or none is
+    asked for, and 1 when one does not hold.
 
     Example: busplan circle-test paper-4ms --contributions
     """

@@ -59,9 +59,11 @@ def given(profile: Profile, key: str) -> Input:
         section = getattr(section, part)
         if getattr(section, "grade", None):
             own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
-            single = getattr(getattr(section, "grades", None), name, None)
-            if single is not None:
-                own_grade, graded_by = single, f"; graded by {'.'.join(sections[:number])}.grades.{name}"
+            grades = getattr(section, "grades", None)
+            if grades is not None and name not in type(grades).model_fields:
+                own_grade, graded_by = None, ""  # a choice
+            elif grades is not None and getattr(grades, name) is not None:
+                own_grade, graded_by = getattr(grades, name), f"; graded by {'.'.join(sections[:number])}.grades.{name}"
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
