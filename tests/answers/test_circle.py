@@ -11,7 +11,7 @@ from busplan.analysis.circle.failures import Failure, Stated
 from busplan.analysis.circle.roundness import CircleTest, circle_test
 from busplan.answers.circle import circle_document, circle_records, circle_report, circle_table, contributions_table
 from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
-from busplan.answers.circle_verdict import circle_sentences, servo_sentence
+from busplan.answers.circle_verdict import circle_sentences, servo_sentence, verdict_words
 from busplan.forms import render
 from busplan.forms.blocks import Bar, Chart, Report, Sentence, ShownValue, Table, values_in
 from busplan.forms.columns import sentence_text
@@ -22,6 +22,7 @@ from busplan.profile.toml import override
 
 SMALL = {"circle.radius_mm": 25.0, "circle.ramp_periods": 20}
 TIGHT = {**SMALL, "tolerance.max_contour_error_mm": 0.001, "tolerance.mean_contour_error_mm": 0.0005}
+MINE = load("paper-4ms").profile.model_copy(update={"name": "mine"})
 UNSTABLE = {**SMALL, "servo.position_gain_per_s": 1e5}
 
 
@@ -72,9 +73,12 @@ def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for() -> No
     shown = {value.key for value in values_in(circle_table(small().results))}
     record = circle_document(small(), with_contributions=False)["results"][0]
     assert {key for key in record if key not in shown} == {
-        *("steps", "delay_us", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
-        *("centre_offset_mm", "constant_speed_deg", "failures"),
+        *("steps", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
+        *("centre_offset_mm", "constant_speed_deg", "failures", "settled", "ideal_drive"),
+        *("update", "delay_us", "delay_x_us", "delay_y_us"),
     }
+    host = circle_of(*SMALL.items(), ("servo.loop", "host"))
+    assert {value.key for value in values_in(circle_table(host.results))} == shown | {"update", "delay_us"}
 
 
 def test_the_second_result_stands_at_its_own_place() -> None:
@@ -86,14 +90,38 @@ def test_the_second_result_stands_at_its_own_place() -> None:
 
 
 def test_a_circle_that_holds_says_so() -> None:
-    (said,) = circle_sentences("mine", small().results[0], at="/results/0")
+    said, margins = circle_sentences(MINE, small().results[0], at="/results/0")
     assert sentence_text(said) == "mine at 4 ms and 2500 mm/min: the circle holds every tolerance."
     assert said.state == "passes"
+    assert sentence_text(margins) == (
+        "The loop is stable, with a phase margin of 30 deg (default) or more "
+        "and a gain margin of 6 dB (default) or more."
+    )
+
+
+def test_a_margin_that_the_profile_asks_for_is_no_default() -> None:
+    asking = override(MINE, {"tolerance.min_phase_margin_deg": 40.0})
+    _, margins = circle_sentences(asking, small().results[0], at="/results/0")
+    assert "a phase margin of 40 deg or more and a gain margin of 6 dB (default)" in sentence_text(margins)
+
+
+def test_a_circle_without_a_tolerance_is_not_judged_and_that_is_said_first() -> None:
+    result = small().results[0]._replace(passed=None)
+    said, _ = circle_sentences(MINE, result, at="/results/0")
+    assert sentence_text(said) == "mine at 4 ms and 2500 mm/min: NOT JUDGED: no contour tolerance is asked for."
+    assert (said.state, verdict_words(result).text) == ("warns", "NOT JUDGED")
+
+
+def test_a_circle_that_the_bus_does_not_carry_is_not_run() -> None:
+    (result,) = circle_of(*SMALL.items(), periods_us=(100.0,)).results
+    (said,) = circle_sentences(MINE, result, at="/results/0")
+    assert sentence_text(said).startswith("mine at 100 us and 2500 mm/min: NOT RUN, the cycle does not fit the bus: ")
+    assert said.state == "fails"
 
 
 def test_a_circle_that_fails_says_by_how_much_and_what_to_attack() -> None:
     result = circle_of(*TIGHT.items()).results[0]
-    failed, attack = circle_sentences("mine", result, at="/results/0")
+    failed, attack = circle_sentences(MINE, result, at="/results/0")
     text = ", and ".join(failure.text for failure in result.failures)
     assert sentence_text(failed) == f"mine at 4 ms and 2500 mm/min: FAILED, {text}."
     assert failed.state == "fails"
@@ -107,14 +135,14 @@ def test_a_circle_that_fails_says_by_how_much_and_what_to_attack() -> None:
     assert sentence_text(attack).startswith(f"Attack {source} first: without it the mean contour error is ")
     assert next(values_in(attack)).at == f"/results/0/contributions/{best}/mean_contour_error_mm"
     # Without --contributions the document has no place for it.
-    assert [value.at for value in values_in([*circle_sentences("", result, at="", with_contributions=False)][1])] == [
+    assert [value.at for value in values_in([*circle_sentences(MINE, result, at="", with_contributions=False)][1])] == [
         *("", ""),
     ]
 
 
 def test_what_no_single_source_explains_is_said() -> None:
     result = circle_of(*TIGHT.items()).results[0]._replace(contributions=())
-    _, said = circle_sentences("mine", result, at="/results/0")
+    _, said = circle_sentences(MINE, result, at="/results/0")
     assert sentence_text(said) == "No single error source of the profile explains the mean contour error."
 
 
@@ -127,30 +155,36 @@ def test_what_no_single_source_explains_is_said() -> None:
         Failure("min_phase_margin_deg", 20.125, 30.0),
         Failure("min_gain_margin_db", 2.0, 6.5),
         Failure("mean_contour_error_mm", 0.00456, 0.003),
-        Failure("constant_speed_deg", 201.0, 270.0),
+        Failure("min_phase_margin_deg", 20.125, 30.0, is_default=True, more=" (and why)"),
+        Failure("not_settled", None, 60.0),
+        Failure("circular_deviation_mm", None, 0.03),
         Failure("circular_deviation_mm", 0.0264, 0.0),
         Failure("nodes", 70.0, 62.0, "70 nodes are too many"),
     ],
 )
 def test_a_sentence_writes_a_failure_as_its_text_does(failure: Failure) -> None:
     result = small().results[0]._replace(passed=False, failures=(failure,))
-    first = next(circle_sentences("mine", result, at="/results/0"))
+    first = next(circle_sentences(MINE, result, at="/results/0"))
     assert sentence_text(first).endswith(f": FAILED, {failure.text}.")
     numbers = [part for part in failure.parts() if isinstance(part, Stated)]
     assert len([*values_in(first)]) == 2 + len(numbers)
-    # No number of the failure stands in the words between.
+    # No number of the failure stands in the words between; a word to set may have digits.
     assert not failure.said or numbers == []
-    assert all(not re.search("[0-9]", part) for part in failure.parts() if isinstance(part, str) and not failure.said)
+    words = [re.sub('"[^"]*"', "", part) for part in failure.parts() if isinstance(part, str)]
+    assert failure.said or not re.search("[0-9]", "".join(words))
 
 
 def test_how_the_servo_values_are_known_is_said_once_and_only_with_figures() -> None:
-    (known,) = servo_sentence(small().results[0])
-    assert (sentence_text(known), known.state) == (
-        "The servo values behind these figures are calibrated.",
-        "neutral",
+    (mixed,) = servo_sentence(MINE, small().results[0])
+    assert (sentence_text(mixed), mixed.state) == (
+        "The servo values behind these figures are 6 assumed, 4 calibrated, 2 published.",
+        "warns",
     )
-    (assumed,) = servo_sentence(small().results[0]._replace(servo_grade="assumed"))
-    assert assumed.state == "warns"
+    measured = override(MINE, {"servo": {"drive_lag_us": 7500.0, "grade": "measured"}})
+    (known,) = servo_sentence(measured, small().results[0]._replace(servo_grade="measured"))
+    assert (sentence_text(known), known.state) == ("The servo values behind these figures are measured.", "neutral")
+    (ideal,) = servo_sentence(MINE, small().results[0]._replace(ideal_drive=True))
+    assert sentence_text(ideal) == "The profile has no [servo]: an ideal drive was simulated."
     both = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0, 2000.0))
     assert len([text for text in texts(both) if "servo values" in text]) == 1
     assert not [text for text in texts(circle_of(*SMALL.items(), periods_us=(100.0,))) if "servo values" in text]

@@ -189,7 +189,8 @@ def test_what_is_worse_fails(paper: Profile) -> None:
 @pytest.mark.parametrize("name", ["paper-1ms", "paper-optimal-gap", "paper-dma", "paper-two-node"])
 def test_every_figure_stands_at_its_place(name: str, values_in_their_places: Callable[[Report], int]) -> None:
     found = difference(load("paper-4ms").profile, load(name).profile, circle=run_circle)
-    sides = (side.value for one in found.keys for side in (one.a, one.b) if side is not None)
+    # The table shows the first 20 keys.
+    sides = (side.value for one in found.keys[:20] for side in (one.a, one.b) if side is not None)
     numbers = [one for one in sides if isinstance(one, int | float) and not isinstance(one, bool)]
     # Four of each row, the two periods, and the numbers of the keys.
     assert values_in_their_places(diff_report(found, arguments=AB)) == 4 * len(figures(found)) + 2 + len(numbers)
@@ -213,16 +214,15 @@ def test_why_a_circle_has_no_figures_is_said() -> None:
     one = load("paper-1ms").profile
     lines = text(difference(one, override(one, {"cycle.period_us": 200}), circle=run_circle))
     assert "The circle of B is not simulated: the cycle does not fit the bus: 263.320 us needed of 100.000 us." in lines
-    lines = text(
-        difference(one, override(one, {"cycle.period_us": 1050.5, "servo.grade": "assumed"}), circle=run_circle)
-    )
+    bare = override(one, {"servo": {"grade": "calibrated", "drive_lag_us": 7500.0}})
+    lines = text(difference(bare, override(one, {"cycle.period_us": 1050.5}), circle=run_circle))
     assert any(line.startswith("The circle of B is not simulated: step_us = 100.0: the period of") for line in lines)
     assert "The servo values behind the circle's figures are calibrated in A and assumed in B." in lines
     lines = text(difference(one, override(one, {"tolerance.max_contour_error_mm": 0.01}), circle=run_circle))
     assert any(
         line.startswith("The circle of B FAILED: the largest contour error of 22.085 um is 12.085") for line in lines
     )
-    assert "The servo values behind the circle's figures are calibrated." in lines
+    assert "The servo values behind the circle's figures are assumed." in lines
 
 
 def test_regressions_are_named_with_the_timing_that_has_them(paper: Profile) -> None:

@@ -470,7 +470,8 @@ def test_every_key_of_the_profile_schema_is_described_with_its_unit() -> None:
         "per_s": "[1/s]", "mm_s": "[mm/s]", "us": "[us]", "mm": "[mm]", "bytes": "[bytes]", "deg": "[deg]",
         "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "s": "[s]",
     }  # fmt: skip
-    sections = [schema, *schema["$defs"].values()]
+    # A grade has the name of the value that it grades, and no unit.
+    sections = [schema, *(section for name, section in schema["$defs"].items() if name != "ServoGrades")]
     keys = [(name, key) for section in sections for name, key in section.get("properties", {}).items()]
     assert len(keys) > 60
     for name, key in keys:

@@ -325,6 +325,13 @@ def test_the_circle_can_be_left_out(busplan: Busplan, folder: Path) -> None:
     (folder / "circle.toml").write_text(CLEAN + "[servo]\nposition_gain_per_s = 30000\n", encoding="utf-8")
     assert busplan("check", "circle.toml", cwd=folder).returncode == 1
     assert busplan("check", "circle.toml", "--no-circle", cwd=folder).returncode == 0
+    # A circle that is left out for its length is a warning.
+    short = busplan("check", "circle.toml", "--circle-steps", "1000", cwd=folder)
+    assert (short.returncode, short.stdout.count("BP204"), short.stdout.count("BP201")) == (0, 1, 0)
+    assert "more than 1,000: not run" in short.stdout
+    both = busplan("check", "circle.toml", "--circle-steps", "1000", "--no-circle", cwd=folder)
+    assert (both.returncode, both.stdout) == (2, "")
+    assert "--circle-steps: goes without --no-circle" in both.stderr
 
 
 def test_names_that_command_the_terminal_do_not(busplan: Busplan, tmp_path: Path) -> None:
@@ -530,7 +537,7 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     listed = busplan("rule", cwd=tmp_path)
     assert listed.returncode == 0
     codes = re.findall(r"^(BP\d+) ", listed.stdout, re.MULTILINE)
-    assert len(codes) == 27
+    assert len(codes) == 28
     for code in ("BP110", "bp110"):
         page = busplan("rule", code, cwd=tmp_path)
         assert page.returncode == 0
@@ -539,7 +546,7 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     document = json.loads(busplan("rule", "--format", "json", cwd=tmp_path).stdout)
     assert (document["schema"], document["command"]) == (1, "rule")
     assert [rule["code"] for rule in document["rules"]] == codes
-    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * 27
+    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * 28
     (one,) = json.loads(busplan("rule", "BP110", "--format", "json", cwd=tmp_path).stdout)["rules"]
     assert one in document["rules"]
 

@@ -102,6 +102,7 @@ def test_codes_are_stable() -> None:
         "BP201": "circle-tolerance",
         "BP202": "no-stability-margin",
         "BP203": "circle-impossible",
+        "BP204": "circle-too-long",
         "BP301": "baseline-regression",
         "BP901": "suppression-without-reason",
         "BP902": "suppression-without-effect",

@@ -16,7 +16,7 @@ _HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
     {
         "changes": ("capacity", "cheapest_change"),
         **dict.fromkeys(("input", "label", "standard_uncertainty_us", "share"), ("capacity", "uncertainty_parts")),
-        **dict.fromkeys(("name", "value", "limit"), ("circle-test", "failures")),
+        **dict.fromkeys(("name", "value", "limit", "limit_is_default"), ("circle-test", "failures")),
         **dict.fromkeys(("source", "removed_mm"), ("circle-test", "contributions")),
     }
 )

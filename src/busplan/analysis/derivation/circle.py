@@ -4,9 +4,10 @@ Figures of the bus come from its equations. The path, the linear loop and the si
 a figure is one step that names its method, and its inputs are all inputs of that method.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
+from busplan.analysis.circle.failures import CONTOUR_MEASURES
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
@@ -35,7 +36,7 @@ _OF_BUS: Final = {
 }
 """Figures that `capacity` has, too, with their key there."""
 _PATH: Final = ("duration_s", "setpoints", "steps")
-_LOOP: Final = ("stable", "phase_margin_deg", "gain_margin_db", "crossover_hz", "settled")
+_LOOP: Final = ("stable", "phase_margin_deg", "gain_margin_db", "crossover_hz")
 _DELAYS: Final = ("delay_us", "delay_x_us", "delay_y_us")
 _VERDICT: Final = ("passed", "failures")
 _LOOP_KEYS: Final = ("position_gain_per_s", "integral_gain_per_s2", "derivative_gain", "drive_lag_us")
@@ -46,6 +47,7 @@ _WAYS: Final = {
     **dict.fromkeys(_LOOP, "the linear position loop of both axes: its poles and its frequency response"),
     **dict.fromkeys(_VERDICT, "a comparison of bus, loop and simulation with what they must hold"),
     "circular_deviation_mm": f"{_SIMULATION}; needs a whole turn: circle.path",
+    "settled": "the slowest pole of the linear loops, from the lag v / kp down to a thousandth of the least tolerance",
     "servo_grade": "the weakest grade of the servo values that the profile gives",
     "ideal_drive": "whether the profile has a section [servo]",
     "contributions": "a simulation of the same circle without each error source in turn",
@@ -124,6 +126,8 @@ def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Tra
     parts = _loop_inputs(profile) if key in _LOOP else _simulation_inputs(profile)
     delay = (_delay(profile, "delay_us", result, bus["required_us"]),) if result.loop == "host" or key in _LOOP else ()
     verdict = (bus["fits"], bus["verdict"], *_tolerances(profile)) if key in _VERDICT else ()
+    if key == "settled":
+        verdict = tuple(_tolerances(profile, CONTOUR_MEASURES))
     return found(value, _WAYS.get(key, _SIMULATION), (*parts, *delay, *verdict))
 
 
@@ -141,7 +145,7 @@ def _path_inputs(profile: Profile, key: str) -> Iterator[Traced]:
     yield from (traced(profile, f"circle.{name}") for name in ("path", "radius_mm", "feed_mm_per_min", "ramp_periods"))
     yield traced(profile, "cycle.period_us")
     if profile.circle.path != "trapezoid":
-        yield from _loop_inputs(profile)
+        yield from (*_loop_inputs(profile), *_tolerances(profile, CONTOUR_MEASURES))
     if key == "steps":
         yield traced(profile, "servo.step_us")
 
@@ -181,8 +185,8 @@ def _idle(profile: Profile) -> Iterator[str]:
         yield "seed"
 
 
-def _tolerances(profile: Profile) -> Iterator[Traced]:
-    """Tolerances of the circle."""
-    for name in type(profile.tolerance).model_fields:
+def _tolerances(profile: Profile, names: Iterable[str] | None = None) -> Iterator[Traced]:
+    """Tolerances of the circle, all or some."""
+    for name in type(profile.tolerance).model_fields if names is None else names:
         if getattr(profile.tolerance, name) is not None:
             yield traced(profile, f"tolerance.{name}")
