@@ -191,8 +191,8 @@ def circle_chart(
         else sentence("the tolerance of {} dashed.", tolerance)
     )
     magnified = sentence(
-        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start, the arrow the "
-        "direction; ",
+        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start of "
+        "the turn, the arrow its direction; ",
         ShownValue(scale.times(result.radius_mm), decimals=0),
         ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),
     )

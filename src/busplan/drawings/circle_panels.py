@@ -88,7 +88,7 @@ def draw_ranking(axes: Any, row: CircleRow, rows: Sequence[CircleRow], scales: S
     row
         The period.
     rows
-        All rows, which share the scale.
+        All rows. Those whose table followed the circle share a scale, the others another one.
     scales
         Scales of all rows.
     """
@@ -97,7 +97,8 @@ def draw_ranking(axes: Any, row: CircleRow, rows: Sequence[CircleRow], scales: S
         axes.set_axis_off()
         return
     unit = scales.unit
-    all_taken = [one.removed_mm * 1e3 * unit.per_um for each in rows for one in each.result.contributions or ()]
+    alike = [each for each in rows if each.run.diverged == row.run.diverged]
+    all_taken = [one.removed_mm * 1e3 * unit.per_um for each in alike for one in each.result.contributions or ()]
     low, high = min(0.0, *all_taken), max(0.0, *all_taken)
     room = (high - low) or 1.0
     axes.set_xlim(low - 0.05 * room, high + 0.35 * room)
@@ -114,6 +115,7 @@ def draw_ranking(axes: Any, row: CircleRow, rows: Sequence[CircleRow], scales: S
             fontsize=8,
         )
     axes.axvline(0.0, color="black", linewidth=0.8)
+    axes.locator_params(axis="x", nbins=4)
     axes.set_yticks(range(len(ranked)), [one.source.replace("_", " ") for one in ranked], fontsize=9)
     axes.set_ylim(len(ranked) - 0.4, -0.6)
     axes.set_xlabel(f"taken from the largest error [{unit.name}]")

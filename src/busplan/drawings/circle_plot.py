@@ -10,6 +10,7 @@ from busplan.errors import BusplanError
 from busplan.forms.numbers import period
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
     from busplan.analysis.circle.roundness import CircleTest
@@ -135,8 +136,10 @@ def _title(test: "CircleTest") -> str:
 
 def _legend(figure: "Figure", *, columns: int) -> None:
     """Explain each kind of line once, below all rows."""
-    kinds = {}
+    kinds: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             kinds.setdefault(label, handle)
-    figure.legend(kinds.values(), kinds, loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
+    figure.legend(
+        list(kinds.values()), list(kinds), loc="outside lower center", ncols=columns, frameon=False, fontsize=9
+    )

@@ -7,7 +7,7 @@ import numpy as np
 from busplan.drawings.circle_panels import LIMIT_STYLE, curve_style, measure_text
 from busplan.drawings.circle_rows import CircleRow, Scales
 from busplan.drawings.circle_scale import ERROR_SHARE
-from busplan.forms.numbers import period
+from busplan.forms.numbers import decimals_of, period
 
 _VERDICTS: Final[dict[bool | None, tuple[str, dict[str, Any]]]] = {
     True: ("PASSED", {"facecolor": "white", "edgecolor": "#00694E"}),
@@ -118,11 +118,11 @@ def _centre(row: CircleRow, scales: Scales) -> str:
     """What the middle of the circle says: scale, circular deviation, direction."""
     result, circle = row.result, scales.circle
     if row.run.diverged:
-        return "not drawn: the table\ndid not follow\nthe circle"
+        return "not drawn:\nthe table left\nthe circle" if result.stable else "not drawn:\nthe loop is unstable"
     scale = (
         ("no contour error",)
         if circle is None
-        else (f"{circle.ring_text} a ring", f"{circle.times(result.radius_mm):.0f} times magnified")
+        else (f"{circle.ring_text} a ring", f"{decimals_of(circle.times(result.radius_mm), 0)} times magnified")
     )
     deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
     whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}".replace(" (", "\n(")

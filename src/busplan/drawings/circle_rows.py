@@ -100,7 +100,8 @@ def _curves(run: CircleRun) -> tuple[Curve, ...]:
     for first, end, measured in parts:
         kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
         angle = np.arctan2(run.y_mm[kept], run.x_mm[kept])
-        curves.append(Curve((kept + 1) * run.timing.step_us / 1e6, angle, error_um[kept], measured))
+        time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
+        curves.append(Curve(time_s, angle, error_um[kept], measured))
     return tuple(curves)
 
 
