@@ -182,7 +182,7 @@ def circle_chart(
         JSON pointer to its figures.
     """
     tolerance_mm = profile.tolerance.max_contour_error_mm
-    drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm)
+    drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm, direction=profile.circle.direction)
     scale = drawing.scale
     if scale is None:
         return None
@@ -197,9 +197,10 @@ def circle_chart(
         else sentence("the tolerance of {} dashed.", tolerance)
     )
     magnified = sentence(
-        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; ",
+        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start of "
+        "the turn, the arrow its direction; ",
         ShownValue(scale.times(result.radius_mm), decimals=0),
-        ShownValue(scale.ring_um, unit="um"),
+        ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),
     )
     return Chart(drawing, caption, joined(magnified, limit, by=""))
 

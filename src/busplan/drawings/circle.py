@@ -1,63 +1,25 @@
 """The circle with its error magnified, as in ballbar reports."""
 
 from collections.abc import Iterator, Sequence
-from math import ceil, cos, pi, sin
-from typing import Final, NamedTuple
+from math import cos, radians, sin
+from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.circle.contour_profile import ContourProfile
 from busplan.drawings.circle_characters import contour_lines
+from busplan.drawings.circle_scale import ERROR_SHARE, Magnified, magnified
 from busplan.forms.blocks import Drawing
 from busplan.forms.lines import Line
-from busplan.forms.numbers import ROUNDING_UM
-from busplan.forms.scale import ring_step
 from busplan.forms.svg import drawing, markup, text_at
+from busplan.servo.path import Direction
 
 _WIDTH: Final = 470
 _HEIGHT: Final = 400
 _NOMINAL: Final = 140
 """Drawn radius of the nominal circle."""
-ERROR_SHARE: Final = 0.25
-"""Largest drawn error as a share of the drawn radius."""
-_WIDEST: Final = 3.0
-"""A tolerance is drawn up to this multiple of the largest error: a larger ring would flatten the error."""
-
-
-class Magnified(NamedTuple):
-    """Scale of a drawing."""
-
-    largest_mm: float
-    """Error at the edge: the largest error, or the tolerance if that is larger."""
-    ring_um: float
-    """Distance between rings."""
-    tolerance_mm: float | None
-    """Ring of the tolerance; None if there is none or it lies far outside."""
-
-    def times(self, radius_mm: float) -> float:
-        """Magnification of the error relative to the circle."""
-        return ERROR_SHARE / self.largest_mm * radius_mm
-
-    def radius(self, error_mm: float) -> float:
-        """Drawn radius of an error."""
-        return _NOMINAL * (1 + ERROR_SHARE * error_mm / self.largest_mm)
-
-
-def magnified(profile: ContourProfile, *, tolerance_mm: float | None) -> Magnified | None:
-    """Find the scale of a drawing; None if there is no error to show.
-
-    Parameters
-    ----------
-    profile
-        Contour error around the circle.
-    tolerance_mm
-        Largest contour error that is allowed, where there is a limit [mm].
-    """
-    largest_mm = max((abs(one) for one in (*profile.low_mm, *profile.high_mm) if one is not None), default=0.0)
-    if largest_mm * 1e3 < ROUNDING_UM:
-        return None
-    drawn = tolerance_mm if tolerance_mm is not None and 0 < tolerance_mm <= _WIDEST * largest_mm else None
-    edge_mm = max(largest_mm, drawn or 0.0)
-    return Magnified(edge_mm, ring_step(edge_mm * 1e3), drawn)
+_ARROW: Final = 0.62
+"""Radius of the arrow, as a multiple of the nominal one: no error is drawn there."""
+_ARROW_DEG: Final = (20, 65)
 
 
 class CircleDrawing(Drawing):
@@ -69,13 +31,17 @@ class CircleDrawing(Drawing):
         Contour error around the circle.
     tolerance_mm
         Largest contour error that is allowed, where there is a limit [mm].
+    direction
+        Direction of rotation; the circle starts on the positive x axis.
     """
 
     shape = "round"
 
-    def __init__(self, profile: ContourProfile, *, tolerance_mm: float | None) -> None:
+    def __init__(self, profile: ContourProfile, *, tolerance_mm: float | None, direction: Direction) -> None:
         self._profile = profile
-        self.scale = magnified(profile, tolerance_mm=tolerance_mm)
+        self._direction = direction
+        largest_mm = max((abs(one) for one in (*profile.low_mm, *profile.high_mm) if one is not None), default=0.0)
+        self.scale = magnified(largest_mm, tolerance_mm=tolerance_mm)
 
     def svg(self) -> str | None:
         """Draw the magnified circle; None if there is no error to show."""
@@ -85,13 +51,14 @@ class CircleDrawing(Drawing):
         root = drawing("Circle with its contour error magnified", css="chart circle")
         root.set("viewBox", f"{-_WIDTH // 2} {-_HEIGHT // 2} {_WIDTH} {_HEIGHT}")
         _cross(root)
-        rings = ceil(scale.largest_mm * 1e3 / scale.ring_um)
-        for ring in range(-rings, rings + 1):
-            _ring(root, scale.radius(ring * scale.ring_um / 1e3), css="nominal" if ring == 0 else "ring")
+        for error_mm in scale.rings_mm:
+            _ring(root, scale.radius(error_mm), css="ring" if error_mm else "nominal")
         for error_mm in () if scale.tolerance_mm is None else (-scale.tolerance_mm, scale.tolerance_mm):
             _ring(root, scale.radius(error_mm), css="tolerance")
         SubElement(root, "path", {"class": "path", "d": "".join(_outlines(self._profile, scale))})
-        text_at(root, f"{scale.ring_um:g} um", x="0", y=-6, css="centre", anchor="middle")
+        SubElement(root, "path", {"class": "direction", "d": _arrow(self._direction)})
+        SubElement(root, "circle", {"cx": f"{_NOMINAL}", "r": "4", "class": "point"})
+        text_at(root, scale.ring_text, x="0", y=-6, css="centre", anchor="middle")
         text_at(root, "a ring", x="0", y=16, css="centre", anchor="middle")
         return markup(root)
 
@@ -101,16 +68,31 @@ class CircleDrawing(Drawing):
 
 
 def _cross(root: Element) -> None:
-    """Draw the two axes with angles at their ends."""
+    """Draw the two axes with their names and with angles at their ends."""
     far = _NOMINAL * (1 + ERROR_SHARE) + 8
-    for number, (x, y, anchor) in enumerate(((1, 0, "start"), (0, -1, "middle"), (-1, 0, "end"), (0, 1, "middle"))):
+    ends = (("X 0°", 1, 0, "start"), ("Y 90°", 0, -1, "middle"), ("180°", -1, 0, "end"), ("270°", 0, 1, "middle"))
+    for text, x, y, anchor in ends:
         line = {"x1": x * 40, "y1": y * 40, "x2": x * far, "y2": y * far}
         SubElement(root, "line", {**{key: f"{value:g}" for key, value in line.items()}, "class": "rule"})
-        text_at(root, f"{90 * number}°", x=f"{x * (far + 4):g}", y=round(y * (far + 9)) + 5, anchor=anchor)
+        text_at(root, text, x=f"{x * (far + 4):g}", y=round(y * (far + 9)) + 5, anchor=anchor)
 
 
 def _ring(root: Element, radius: float, *, css: str) -> None:
-    SubElement(root, "circle", {"r": f"{radius:.1f}", "class": css})
+    SubElement(root, "circle", {"r": f"{_NOMINAL * radius:.1f}", "class": css})
+
+
+def _arrow(direction: Direction) -> str:
+    """An arc inside the circle with a head at its end."""
+    start, end = _ARROW_DEG if direction == "ccw" else reversed(_ARROW_DEG)
+    back, size = end + (start - end) / 5, _ARROW * _NOMINAL
+    sweep = 0 if direction == "ccw" else 1
+    arc = f"M{_place(start, size)}A{size:.1f} {size:.1f} 0 0 {sweep} {_place(end, size)}"
+    return f"{arc}M{_place(back, size - 6)}L{_place(end, size)}L{_place(back, size + 6)}"
+
+
+def _place(angle_deg: float, radius: float) -> str:
+    """Coordinates; y points down in SVG."""
+    return f"{radius * cos(radians(angle_deg)):.1f} {-radius * sin(radians(angle_deg)):.1f}"
 
 
 def _outlines(profile: ContourProfile, scale: Magnified) -> Iterator[str]:
@@ -141,5 +123,4 @@ def _runs(values: Sequence[float | None]) -> Iterator[list[int]]:
 
 
 def _point(error_mm: float | None, index: int, sectors: int, scale: Magnified) -> str:
-    angle, radius = 2 * pi * (index + 0.5) / sectors, scale.radius(error_mm or 0.0)
-    return f"{radius * cos(angle):.1f} {-radius * sin(angle):.1f}"
+    return _place(360 * (index + 0.5) / sectors, _NOMINAL * scale.radius(error_mm or 0.0))

@@ -3,23 +3,22 @@
 from importlib import import_module
 from importlib.util import find_spec
 from io import BytesIO
-from math import ceil
-from typing import TYPE_CHECKING, Any, Final
+from textwrap import fill
+from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from busplan.drawings.circle import ERROR_SHARE
 from busplan.errors import BusplanError
-from busplan.forms.numbers import ROUNDING_UM
-from busplan.forms.scale import ring_step
+from busplan.forms.numbers import period
 
 if TYPE_CHECKING:
-    from busplan.analysis.circle.roundness import CircleFigures, CircleTest
-    from busplan.servo.circle import CircleRun
+    from matplotlib.artist import Artist
+    from matplotlib.figure import Figure
+
+    from busplan.analysis.circle.roundness import CircleTest
 
 PLOT_FORMATS: Final = ("png", "svg", "pdf")
-_MAX_POINTS: Final = 8000
-"""Most points of one curve: more would not be visible."""
+_NAME_WIDTH: Final = 60
+"""Longest line of a name, in characters: even of wide ones it fits the figure."""
+_TITLE_WIDTH: Final = 110
 
 
 def require_matplotlib(option: str = "--plot") -> None:
@@ -47,7 +46,7 @@ def require_matplotlib(option: str = "--plot") -> None:
 
 
 def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
-    """Draw the magnified polar error and the contour error over time of every simulated period.
+    """Draw the circle test into a file.
 
     Parameters
     ----------
@@ -68,22 +67,11 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
     """
     require_matplotlib()
     from matplotlib import rc_context
-    from matplotlib.figure import Figure
 
-    pairs = [(result, run) for result, run in zip(test.results, test.runs, strict=True) if run is not None]
-    if not pairs:
-        raise BusplanError("--plot: nothing to draw, no period fits the bus")
     buffer = BytesIO()
-    # A dollar sign in a name starts no formula. A fixed salt makes the ids of an SVG reproducible.
-    with rc_context({"text.parse_math": False, "svg.hashsalt": "busplan"}):
-        figure = Figure(figsize=(11.0, 4.6 * len(pairs)), layout="constrained")
-        axes = figure.subplots(len(pairs), 2, squeeze=False, width_ratios=(1, 1.4))
-        grades = f"servo values: {test.results[0].servo_grade}"
-        figure.suptitle(f"{test.profile.name}: circle test, {grades}")
-        for (left, right), (result, run) in zip(axes, pairs, strict=True):
-            _polar(left, result, run)
-            _over_time(right, result, run)
-        figure.savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
+    # A fixed salt makes the ids of an SVG reproducible.
+    with rc_context({"svg.hashsalt": "busplan"}):
+        draw_test(test).savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
     return buffer.getvalue()
 
 
@@ -92,53 +80,66 @@ def metadata(file_format: str) -> dict[str, None]:
     return {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(file_format, {})
 
 
-def _title(result: "CircleFigures") -> str:
-    verdict = "passed" if result.passed else "failed"
-    return f"{result.period_us / 1000:g} ms, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm: {verdict}"
+def draw_test(test: "CircleTest") -> "Figure":
+    """Draw a row for each simulated period: the magnified circle, the error over time, and error sources if ranked.
+
+    Parameters
+    ----------
+    test
+        The circle test.
+
+    Returns
+    -------
+    Figure
+        A figure of matplotlib. All rows have the same scales.
+
+    Raises
+    ------
+    BusplanError
+        No period was simulated.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    from busplan.drawings.circle_panels import draw_errors, draw_ranking
+    from busplan.drawings.circle_polar import draw_circle
+    from busplan.drawings.circle_rows import circle_rows, common_scales
+
+    rows = circle_rows(test)
+    if not rows:
+        raise BusplanError("--plot: nothing to draw, no period fits the bus")
+    scales = common_scales(rows, test.profile.tolerance)
+    ranked = any(row.result.contributions for row in rows)
+    # A dollar sign in a name starts no formula.
+    with rc_context({"text.parse_math": False}):
+        figure = Figure(figsize=(15.5 if ranked else 11.0, 4.6 * len(rows) + 1.0), layout="constrained")
+        ratios = (1, 1.4, 0.8) if ranked else (1, 1.4)
+        panels = figure.subplots(len(rows), len(ratios), squeeze=False, width_ratios=ratios)
+        figure.suptitle(_title(test))
+        for (polar, over_time, *ranking), row in zip(panels, rows, strict=True):
+            draw_circle(polar, row, scales)
+            draw_errors(over_time, row, scales)
+            for axes in ranking:
+                draw_ranking(axes, row, rows, scales)
+        _legend(figure, columns=5 if ranked else 3)
+    return figure
 
 
-def _every(points: int) -> int:
-    return max(1, ceil(points / _MAX_POINTS))
+def _title(test: "CircleTest") -> str:
+    """Name, grade of the servo values, and the periods that are not drawn."""
+    first = test.results[0]
+    servo = "ideal drive" if first.ideal_drive else f"servo values: {first.servo_grade}"
+    missing = [period(one.period_us) for one, run in zip(test.results, test.runs, strict=True) if run is None]
+    without = f"; not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
+    return f"{fill(test.profile.name, _NAME_WIDTH)}\n{fill(f'circle test, {servo}{without}', _TITLE_WIDTH)}"
 
 
-def _polar(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
-    """Draw the nominal circle, rings, and the path with its error magnified."""
-    trace = run.trace(every=_every(run.steps))
-    error_um = trace.contour_error_mm * 1e3
-    largest_um = max(float(np.abs(error_um).max()), ROUNDING_UM)
-    step_um = ring_step(largest_um)
-    per_um = ERROR_SHARE / largest_um
-    turn = np.linspace(0.0, 2 * np.pi, 361)
-    rings = range(-ceil(largest_um / step_um), ceil(largest_um / step_um) + 1)
-    for ring in rings:
-        size = 1 + ring * step_um * per_um
-        style = {"color": "black", "linewidth": 0.9} if ring == 0 else {"color": "0.8", "linewidth": 0.6}
-        axes.plot(size * np.cos(turn), size * np.sin(turn), **style)
-    magnified = 1 + error_um * per_um
-    angle = np.arctan2(trace.y_mm, trace.x_mm)
-    axes.plot(magnified * np.cos(angle), magnified * np.sin(angle), color="tab:red", linewidth=0.8)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_title(_title(result), fontsize=10)
-    factor = per_um * 1e3 * result.radius_mm
-    deviation = "-" if result.circular_deviation_mm is None else f"{result.circular_deviation_mm * 1e3:.2f} um"
-    axes.text(
-        0.0,
-        0.0,
-        f"{step_um:g} um a ring\n{factor:.0f} times magnified\nG = {deviation}",
-        ha="center",
-        va="center",
-        fontsize=9,
+def _legend(figure: "Figure", *, columns: int) -> None:
+    """Explain each kind of line once, below all rows."""
+    kinds: dict[str, Artist] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            kinds.setdefault(label, handle)
+    figure.legend(
+        list(kinds.values()), list(kinds), loc="outside lower center", ncols=columns, frameon=False, fontsize=9
     )
-
-
-def _over_time(axes: Any, result: "CircleFigures", run: "CircleRun") -> None:
-    """Draw the contour error over time, with its mean and maximum in the title."""
-    trace = run.trace(every=_every(run.steps))
-    axes.plot(trace.time_us / 1e6, trace.contour_error_mm * 1e3, linewidth=0.7, color="tab:red")
-    axes.axhline(0.0, color="black", linewidth=0.8)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("contour error [um]")
-    axes.grid(visible=True, linewidth=0.4, color="0.85")
-    mean_um, max_um = ((value or 0.0) * 1e3 for value in (result.mean_contour_error_mm, result.max_contour_error_mm))
-    axes.set_title(f"mean {mean_um:.3f} um, max {max_um:.3f} um", fontsize=10)
