@@ -66,8 +66,9 @@ def circle_test_command(
         typer.Option(
             "--plot",
             metavar="FILE",
-            help="Draw the magnified polar error and the error over time into FILE.png, FILE.svg or FILE.pdf; an old "
-            "file is replaced. Needs the extra plot (matplotlib).  [default: no figure]",
+            help="Draw the magnified polar error, the error over time and the ranked error sources, with the tolerances, "
+            "into FILE.png, FILE.svg or FILE.pdf; an old file is replaced. Needs the extra plot (matplotlib).  "
+            "[default: no figure]",
         ),
     ] = None,
     format_: FormatOption = None,
