@@ -66,7 +66,7 @@ def circle_test_command(
         typer.Option(
             "--plot",
             metavar="FILE",
-            help="Draw the magnified polar error, the error over time and the ranked error sources, with the tolerances, "
+            help="Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, "
             "into FILE.png, FILE.svg or FILE.pdf; an old file is replaced. Needs the extra plot (matplotlib).  "
             "[default: no figure]",
         ),

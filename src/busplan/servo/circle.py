@@ -64,11 +64,6 @@ class CircleRun:
         Measures; finite even if the loop is unstable.
     measured
         Steps at constant speed that are measured: a whole turn, or the settled arc of a trapezoid.
-    covered_deg
-        Angle of the table about the centre on that turn, or on the whole trapezoid, positive in the direction of the
-        path [deg].
-    constant_speed_deg
-        Angle of the measured steps about the centre: 360 for a turn [deg].
     margins_x, margins_y
         Stability of both position loops.
     """
@@ -83,8 +78,6 @@ class CircleRun:
     y_mm: Floats
     contour: Contour
     measured: slice
-    covered_deg: float
-    constant_speed_deg: float
     margins_x: LoopMargins
     margins_y: LoopMargins
 
@@ -92,6 +85,20 @@ class CircleRun:
     def steps(self) -> int:
         """Number of simulated steps [1]."""
         return len(self.x_mm)
+
+    @property
+    def covered_deg(self) -> float:
+        """Angle of the table about the centre on the turn or on the whole trapezoid, positive along the path [deg]."""
+        return self._along_path_deg(None if self.path.turn_from_us is None else self.measured)
+
+    @property
+    def constant_speed_deg(self) -> float:
+        """Angle of the measured steps about the centre, positive along the path: 360 on a turn [deg]."""
+        return self._along_path_deg(self.measured) if self.path.turn_from_us is None else FULL_TURN_DEG
+
+    def _along_path_deg(self, part: slice | None) -> float:
+        forward = 1.0 if self.path.direction == "ccw" else -1.0
+        return forward * covered_deg(self.x_mm, y_mm=self.y_mm, part=part)
 
     @property
     def follows(self) -> bool:
@@ -212,10 +219,9 @@ def simulate_circle(
     y_mm = run(path.y_mm, axis=y, arrivals=arrivals_y, progress=partial(report, total // 2))
     move_to_table(x_mm, y_mm=y_mm, mechanics=mechanics, engine=engine)
     margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
-    measured = _turn(path, timing) if path.turn_from_us is not None else None
-    part = measured or _settled_arc(path, timing=timing, margins=(margins_x, margins_y))
-    # The direction of the path counts as positive.
-    forward = 1.0 if path.direction == "ccw" else -1.0
+    part = _settled_arc(path, timing=timing, margins=(margins_x, margins_y))
+    if path.turn_from_us is not None:
+        part = _turn(path, timing, from_us=path.turn_from_us)
     return CircleRun(
         path=path,
         x=x,
@@ -227,10 +233,6 @@ def simulate_circle(
         y_mm=y_mm,
         contour=measure_contour(x_mm, y_mm=y_mm, radius_mm=path.radius_mm, part=part.steps, turn_share=part.turn_share),
         measured=part.steps,
-        covered_deg=forward * covered_deg(x_mm, y_mm=y_mm, part=None if measured is None else part.steps),
-        constant_speed_deg=(
-            forward * covered_deg(x_mm, y_mm=y_mm, part=part.steps) if measured is None else FULL_TURN_DEG
-        ),
         margins_x=margins_x,
         margins_y=margins_y,
     )
@@ -337,9 +339,9 @@ class _Part(NamedTuple):
     """Share of the last step that belongs to a turn; None for an arc."""
 
 
-def _turn(path: CirclePath, timing: LoopTiming) -> _Part:
+def _turn(path: CirclePath, timing: LoopTiming, *, from_us: float) -> _Part:
     """Steps of the whole turn at constant speed."""
-    first = round((path.turn_from_us or 0.0) / timing.step_us)
+    first = round(from_us / timing.step_us)
     turn = path.turn_us / timing.step_us
     count = max(1, math.ceil(turn - _ROUNDING_STEPS))
     return _Part(slice(first, first + count), min(1.0, turn - (count - 1)))

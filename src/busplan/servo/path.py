@@ -160,7 +160,7 @@ def circle_path(
     (12164, 12.164)
     >>> turn = circle_path(320.0, feed_mm_per_min=10000.0, period_us=1000.0, settling_us=200e3)
     >>> turn.turn_from_us / 1e6, turn.constant_until_us / 1e6, turn.duration_us / 1e6
-    (12.114, 24.17774315704766, 24.278)
+    (12.114, 24.177715789784806, 24.278)
     """
     refuse(
         *not_positive(radius_mm=radius_mm, feed_mm_per_min=feed_mm_per_min, period_us=period_us),

@@ -260,10 +260,10 @@ def _fill(
     return KernelRows(
         substeps,
         target_mm,
-        np.zeros(shape) if increment_mm is None else increment_mm,
+        np.broadcast_to(0.0, shape) if increment_mm is None else increment_mm,
         forward_mm_s,
-        np.full(shape, CONTROL | SWITCH | STORE) if action is None else action,
-        *(np.full(shape, column) for column in timed),
+        np.broadcast_to(CONTROL | SWITCH | STORE, shape) if action is None else action,
+        *(np.broadcast_to(column, shape) for column in timed),
     )
 
 

@@ -100,14 +100,14 @@ def sources(one: Setup) -> dict[str, Setup]:
 
 
 def contributions(
-    one: Setup, *, max_contour_error_mm: float, simulate: Callable[[Setup], CircleRun]
+    without: Mapping[str, Setup], *, max_contour_error_mm: float, simulate: Callable[[Setup], CircleRun]
 ) -> tuple[Contribution, ...]:
     """Rank the error sources of a circle test.
 
     Parameters
     ----------
-    one
-        The test.
+    without
+        The test without each source (`sources`).
     max_contour_error_mm
         Its largest contour error [mm].
     simulate
@@ -122,7 +122,7 @@ def contributions(
     -----
     Sources interact: their single contributions need not add up to the whole error.
     """
-    without = {source: simulate(setup).contour for source, setup in sources(one).items()}
+    contours = {source: simulate(setup).contour for source, setup in without.items()}
     ranked = (
         Contribution(
             source,
@@ -131,6 +131,6 @@ def contributions(
             left.mean_contour_error_mm,
             left.circular_deviation_mm,
         )
-        for source, left in without.items()
+        for source, left in contours.items()
     )
     return tuple(sorted(ranked, key=lambda contribution: -contribution.removed_mm))

@@ -4,7 +4,7 @@ The bus is checked first: a cycle that does not fit its period delivers no set-p
 delay of a host loop can make the circle rounder while it reduces the margins, so a circle without margins fails.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import CapacityFigures
@@ -180,12 +180,13 @@ def circle_test(
     # needs no path.
     setups = [setup(variant) if bus(variant).fits else loop_timing(variant) for variant in variants]
     simulated = [one for one in setups if isinstance(one, Setup)]
-    ranked = [source for one in simulated if with_contributions for source in sources(one).values()]
-    counter.expect(*simulated, *ranked)
-    announce(estimate(simulated, ranked))
+    ranked = [sources(one) if with_contributions and isinstance(one, Setup) else {} for one in setups]
+    passing = [source for each in ranked for source in each.values()]
+    counter.expect(*simulated, *passing)
+    announce(estimate(simulated, passing))
     pairs = [
-        _test(variant, one, with_contributions=with_contributions, explain=explain, counter=counter)
-        for variant, one in zip(variants, setups, strict=True)
+        _test(variant, one, without if with_contributions else None, explain=explain, counter=counter)
+        for variant, one, without in zip(variants, setups, ranked, strict=True)
     ]
     return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
 
@@ -223,19 +224,20 @@ class _Counter:
 
 
 def _test(
-    profile: Profile, one: Setup | LoopTiming, *, with_contributions: bool, explain: bool, counter: _Counter
+    profile: Profile, one: Setup | LoopTiming, without: Mapping[str, Setup] | None, *, explain: bool, counter: _Counter
 ) -> tuple[CircleFigures, CircleRun | None]:
+    """Test one period; `without` has the setup without each error source, if they are to be ranked."""
     capacity = bus(profile)
     if isinstance(one, LoopTiming):
         return _figures(profile, one, capacity, None, settled=True), None
     run = counter.run(one)
     result = _figures(profile, one.timing, capacity, run, settled=one.settled)
-    if with_contributions or (explain and failed_measure(result)):
-        if not with_contributions:
-            removed = tuple(sources(one).values())
-            counter.expect(*removed)
-            announce(estimate((), removed))
-        ranked = contributions(one, max_contour_error_mm=run.contour.max_contour_error_mm, simulate=counter.run)
+    if without is None and explain and failed_measure(result):
+        without = sources(one)
+        counter.expect(*without.values())
+        announce(estimate((), tuple(without.values())))
+    if without is not None:
+        ranked = contributions(without, max_contour_error_mm=run.contour.max_contour_error_mm, simulate=counter.run)
         result = result._replace(contributions=ranked)
     return result, run
 
