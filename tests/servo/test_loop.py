@@ -38,7 +38,7 @@ def an_axis(**changes: Any) -> Axis:
     return Axis(**(values | changes))
 
 
-def response(loop: control.StateSpace, frequency_hz: Floats) -> NDArray[np.complex128]:
+def response(loop: control.LTI, frequency_hz: Floats) -> NDArray[np.complex128]:
     return np.asarray(loop(np.exp(2j * math.pi * frequency_hz * loop.dt)))
 
 
@@ -93,6 +93,49 @@ def test_the_margins_are_python_controls(
     assert found.phase_margin_deg == pytest.approx(phase_deg, rel=1e-5)
     assert found.gain_margin_db == pytest.approx(20 * math.log10(gain), rel=1e-5)
     assert found.crossover_hz == pytest.approx(crossover / (2 * math.pi), rel=1e-5)
+
+
+@pytest.mark.parametrize("kp", [20.0, 143.0, 400.0, 1500.0])
+@pytest.mark.parametrize("lag_us", [0.0, 3000.0, 20_000.0])
+def test_a_host_that_is_one_period_late_is_python_controls_own_sampling_and_a_delay(kp: float, lag_us: float) -> None:
+    period_s = HOST.period_us / 1e6
+    drive = control.tf([1], [lag_us / 1e6, 1, 0] if lag_us else [1, 0])
+    loop = kp * control.sample_system(drive, period_s, method="zoh") * control.tf([1], [1, 0], period_s)
+    slowest = np.abs(control.poles(control.feedback(loop, 1))).max()
+    found = loop_margins(an_axis(position_gain_per_s=kp, drive_lag_us=lag_us, delay_us=1000.0), timing=HOST)
+    assert found.stable == (slowest < 1)
+    if not found.stable:
+        return
+    frequency_hz = np.geomspace(0.1, 500.0, 2000)
+    # Its default way warns of lost digits.
+    gain, phase_deg, _, crossover = control.margin(
+        control.frd(response(loop, frequency_hz), 2 * math.pi * frequency_hz)
+    )
+    assert found.settling_us == pytest.approx(1000 * math.log(1e-3) / math.log(slowest), rel=1e-6)
+    assert found.phase_margin_deg == pytest.approx(phase_deg, rel=1e-5)
+    assert found.gain_margin_db == pytest.approx(20 * math.log10(gain), rel=1e-5)
+    assert found.crossover_hz == pytest.approx(crossover / (2 * math.pi), rel=1e-5)
+
+
+def test_a_delay_beyond_the_period_is_one_of_a_period() -> None:
+    whole, longer = (loop_margins(an_axis(delay_us=delay_us), timing=HOST) for delay_us in (1000.0, 5000.0))
+    assert whole == longer != loop_margins(an_axis(delay_us=999.0), timing=HOST)
+    assert loop_margins(an_axis(delay_us=5000.0), timing=NODE) == loop_margins(an_axis(), timing=NODE)
+
+
+@pytest.mark.parametrize("share", [0.05, 1e-2, 1e-5])
+def test_after_its_time_no_more_than_the_share_of_a_double_pole_is_left(share: float) -> None:
+    """A P loop with a lag of 1 / (4 kp) has a double pole at 2 kp; and the time is not far too long."""
+    axis = an_axis(position_gain_per_s=50.0, drive_lag_us=5000.0)
+    found = loop_margins(axis, timing=LoopTiming(period_us=1000.0, step_us=10.0))
+    constants = found.time_to_us(share) / 1e6 * 2 * 50.0
+    left = (1 + constants) * math.exp(-constants)
+    assert 0.5 * share < left <= share * (1 + 1e-3)
+
+
+def test_an_unstable_loop_takes_for_ever_and_what_has_gone_takes_no_time() -> None:
+    assert loop_margins(an_axis(position_gain_per_s=2500.0), timing=HOST).time_to_us(0.5) == math.inf
+    assert loop_margins(an_axis(), timing=HOST).time_to_us(2.0) == 0.0
 
 
 plants = st.fixed_dictionaries(
