@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from busplan.servo.contour import contour_error, least_squares_circle, measure_contour
+from busplan.servo.contour import contour_error, covered_deg, least_squares_circle, measure_contour
 
 ANGLE = np.linspace(0.3, 0.3 + 2 * np.pi, 70_000, endpoint=False)
 """A whole turn, in more points than one block holds."""
@@ -70,6 +70,13 @@ def test_blocks_do_not_show() -> None:
     error = contour_error(x[11:69_998], y_mm=y[11:69_998], radius_mm=10.0)
     assert whole.radial_deviation_min_mm == error.min()
     assert whole.radial_deviation_max_mm == error.max()
+
+
+def test_the_angle_is_that_from_the_first_to_the_last_point_of_the_part() -> None:
+    x, y = 10 * np.cos(ANGLE), 10 * np.sin(ANGLE)
+    step_deg = 360 / len(ANGLE)
+    assert covered_deg(x, y_mm=y) == pytest.approx(69_999 * step_deg, abs=1e-9)
+    assert covered_deg(x, y_mm=y, part=slice(20_000, 60_000)) == pytest.approx(39_999 * step_deg, abs=1e-9)
 
 
 @given(points=st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=1, max_size=20))

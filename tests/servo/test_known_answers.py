@@ -270,6 +270,11 @@ def test_after_the_settling_time_no_more_than_the_rest_is_left(
     assert left_mm[round(steps * (0.2 if ramp_periods else 0.5)) :].max() > rest_mm
 
 
+def test_even_a_loop_that_has_nothing_to_settle_takes_the_set_points_period() -> None:
+    axis = an_axis(position_gain_per_s=200.0)
+    assert settling_time_us(axis, axis, timing=NODE, feed_mm_per_min=6000.0, rest_mm=100 / 200.0) == NODE.period_us
+
+
 def test_an_unstable_or_endless_loop_never_settles() -> None:
     steady, endless, wild = (an_axis(position_gain_per_s=kp) for kp in (50.0, 0.1, 30_000.0))
     for other in (endless, wild, an_axis(position_gain_per_s=0.0)):

@@ -73,6 +73,13 @@ def test_without_ramps_every_chord_but_the_last_is_alike() -> None:
 def test_a_move_that_ends_on_a_period_gains_none() -> None:
     feed_mm_per_min = 2 * math.pi * 7.0 / 1.0 * 60
     assert circle_path(7.0, feed_mm_per_min=feed_mm_per_min, period_us=1000.0, ramp_periods=100).setpoints == 1100
+    for radius_mm in (1.0, 2.0, 7.0):
+        feed_mm_per_min = 2 * math.pi * radius_mm / 0.25 * 60
+        path = circle_path(
+            radius_mm, feed_mm_per_min=feed_mm_per_min, period_us=1000.0, ramp_periods=20, settling_us=0.0
+        )
+        assert path.turn_from_us == 260e3
+        assert path.setpoints == 530
 
 
 @given(
