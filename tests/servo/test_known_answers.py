@@ -270,6 +270,14 @@ def test_after_the_settling_time_no_more_than_the_rest_is_left(
     assert left_mm[round(steps * (0.2 if ramp_periods else 0.5)) :].max() > rest_mm
 
 
+def test_the_friction_of_the_start_has_gone_before_the_turn_begins() -> None:
+    """It recovers in a second, and the loop alone would settle in a quarter of one."""
+    axis = an_axis(reversal_mm_s=1.6, reversal_recovery_us=1e6)
+    found, settled = (turn(axis, extra_us=extra_us, rest_mm=1e-4) for extra_us in (0.0, 20e6))
+    assert deviation_mm(found) == pytest.approx(deviation_mm(settled), abs=1e-4)
+    assert found.contour.centre_offset_mm == pytest.approx(settled.contour.centre_offset_mm, abs=1e-4)
+
+
 def test_even_a_loop_that_has_nothing_to_settle_takes_the_set_points_period() -> None:
     axis = an_axis(position_gain_per_s=200.0)
     assert settling_time_us(axis, axis, timing=NODE, feed_mm_per_min=6000.0, rest_mm=100 / 200.0) == NODE.period_us

@@ -313,6 +313,8 @@ def settling_time_us(
     -----
     A loop that starts to move is off by its following error, at most v / kp. With the spectral radius rho of the linear
     loop, about rho^n of it is left after n control periods; `LoopMargins.time_to_us` allows for a double pole.
+    Friction puts an axis off by at most ``reversal / kp``, which fades with its recovery: that of the start must go,
+    too.
 
     Examples
     --------
@@ -325,6 +327,9 @@ def settling_time_us(
         lag_mm = feed_mm_per_min / _S_PER_MIN / axis.position_gain_per_s if axis.position_gain_per_s else math.inf
         margins = loop_margins(axis, timing=timing)
         each.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
+        if each[-1] < math.inf:
+            friction_mm = axis.reversal_mm_s / axis.position_gain_per_s
+            each.append(axis.reversal_recovery_us * math.log(max(friction_mm / rest_mm, 1.0)))
     settling_us = max(each) + timing.period_us
     return settling_us if settling_us <= LONGEST_SETTLING_US else None
 
