@@ -30,7 +30,7 @@ highest command [mm/s], levels [s/mm], level [mm/s], drive offset [mm/s], fricti
 An element whose ki, kd, counts, levels or friction is 0 is left out."""
 
 
-def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the arithmetic
+def run_rows(  # noqa: C901, PLR0915 - calls would cost more than the arithmetic
     state: MutableSequence[float],
     constants: Constants,
     out: MutableSequence[float],
@@ -85,10 +85,7 @@ def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the a
         fade_shift = friction_shift[row]
         for _ in range(substeps[row]):
             if control:
-                if counts > 0.0:
-                    error = aim - (position * counts + ROUND - ROUND) * resolution
-                else:
-                    error = aim - position
+                error = aim - (position * counts + ROUND - ROUND) * resolution if counts > 0.0 else aim - position
                 pending = kp * error + feed
                 if remembers:
                     # Rarely used values stay in `state`, so that compiled code does not keep them for all loops.

@@ -3,8 +3,7 @@
 All functions work in place, because the positions are large.
 """
 
-from collections.abc import MutableSequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,9 @@ from numpy.typing import NDArray
 from busplan.servo.engine import Engine, compiled_kernel
 from busplan.servo.kernel import drag
 from busplan.servo.parameters import Mechanics
+
+if TYPE_CHECKING:
+    from collections.abc import MutableSequence
 
 Floats = NDArray[np.float64]
 

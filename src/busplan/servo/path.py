@@ -224,9 +224,7 @@ def circle_setpoints(
     return _move(radius_mm, feed_mm_s, period_s, ramp_periods, settling_us).setpoints(feed_mm_s, period_s)
 
 
-def _move(
-    radius_mm: float, feed_mm_s: float, period_s: float, ramp_periods: int, settling_us: float | None
-) -> _Move:
+def _move(radius_mm: float, feed_mm_s: float, period_s: float, ramp_periods: int, settling_us: float | None) -> _Move:
     circle_mm, ramp_s = 2 * math.pi * radius_mm, ramp_periods * period_s
     if settling_us is None:
         return _Move(0.0, circle_mm, ramp_s, None)
