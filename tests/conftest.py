@@ -194,14 +194,12 @@ def shell() -> Run:
 
 
 @pytest.fixture(scope="session")
-def no_numba(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
-    """Variables for a process whose interpreter, and that of its workers, starts as if numba were not installed.
-
-    To load it takes each of them longer than to simulate a small circle.
-    """
-    folder = tmp_path_factory.mktemp("no_numba")
-    (folder / "sitecustomize.py").write_text('import sys\nsys.modules["numba"] = None\n', encoding="utf-8")
-    return {"PYTHONPATH": str(folder)}
+def no_compiler(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
+    """Variables for a process whose interpreter, and that of its workers, starts as if no kernel had been compiled."""
+    folder = tmp_path_factory.mktemp("no_compiler")
+    text = 'import sys\nsys.modules["busplan.servo._kernel"] = None\n'
+    (folder / "sitecustomize.py").write_text(text, encoding="utf-8")
+    return {"PYTHONPATH": os.pathsep.join(filter(None, [str(folder), os.environ.get("PYTHONPATH")]))}
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 
 import busplan
 
-HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "numba", "scipy", "tomllib", "tomli_w", "json"}
+HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "scipy", "tomllib", "tomli_w", "json"}
 FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check")
 WITH_NUMPY = ("circle_test", "sweep")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)

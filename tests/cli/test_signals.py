@@ -31,8 +31,8 @@ if __name__ == "__main__":
 
 
 @pytest.fixture
-def folder(tmp_path: Path, no_numba: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name, value in no_numba.items():
+def folder(tmp_path: Path, no_compiler: Mapping[str, str], monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name, value in no_compiler.items():
         monkeypatch.setenv(name, value)
     (tmp_path / "p.toml").write_bytes(PROFILE.read_bytes())
     return tmp_path

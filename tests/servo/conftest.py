@@ -49,7 +49,7 @@ def plant(axis: Axis, *, period_s: float, delay_s: float) -> control.StateSpace:
 
 def open_loop(axis: Axis, timing: LoopTiming) -> control.StateSpace:
     period_s = timing.control_period_us / 1e6
-    delay_s = timing.delay_us / 1e6 if timing.loop == "host" else 0.0
+    delay_s = min(axis.delay_us, timing.period_us) / 1e6 if timing.loop == "host" else 0.0
     controller = control.tf([axis.position_gain_per_s], [1], period_s)
     if axis.integral_gain_per_s2:
         controller += control.tf([axis.integral_gain_per_s2 * period_s, 0], [1, -1], period_s)

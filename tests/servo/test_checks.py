@@ -11,8 +11,8 @@ from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 
 
 @pytest.mark.parametrize("of", [Axis, Delivery, Mechanics])
-def test_every_field_declares_its_range(of: type) -> None:
-    assert [one.name for one in parameters(of)] == [one.name for one in fields(of)]
+def test_every_field_but_the_delay_that_is_computed_declares_its_range(of: type) -> None:
+    assert [one.name for one in parameters(of)] == [one.name for one in fields(of) if one.name != "delay_us"]
 
 
 @pytest.mark.parametrize(

@@ -53,21 +53,11 @@ def deadbeat(step_us: float, **changes: Any) -> Axis:
 
 def settled(run: CircleRun) -> Floats:
     """Contour error well after the ramp."""
-    part = slice(run.steps // 3, run.constant_speed.stop)
+    part = slice(run.steps // 3, run.measured.stop)
     return contour_error(run.x_mm[part], y_mm=run.y_mm[part], radius_mm=RADIUS_MM)
 
 
 # --- closed forms ------------------------------------------------------------------------------------------
-
-
-def test_a_p_loop_cuts_the_circle_as_the_continuous_one_does() -> None:
-    run = a_run(an_axis(), timing=LoopTiming(period_us=1000.0, step_us=20.0))
-    expected = RADIUS_MM * (1 / math.sqrt(1 + (TURN_PER_S / 50) ** 2) - 1)
-    assert settled(run).mean() == pytest.approx(expected, rel=5e-3)
-    assert run.contour.radius_deviation_mm == pytest.approx(expected, rel=5e-3)
-    # Matched axes lag, and the lag has no direction: a smaller circle, round and centred.
-    assert run.contour.circular_deviation_mm < 5e-3 * abs(expected)
-    assert run.contour.centre_offset_mm == pytest.approx((0, 0), abs=1e-4 * abs(expected))
 
 
 @pytest.mark.parametrize("lag_us", [0.0, 3000.0])
@@ -86,22 +76,12 @@ def test_a_sampled_p_loop_cuts_the_circle_by_its_own_frequency_response(lag_us: 
 def test_a_delay_inside_the_loop_makes_the_circle_larger_and_the_margin_smaller(delay_us: float) -> None:
     """The command is held for a period: half of one more, on average."""
     kp, jw = 50.0, 1j * TURN_PER_S
-    timing = LoopTiming(period_us=1000.0, step_us=1000.0, loop="host", delay_us=delay_us)
-    run = a_run(an_axis(), timing=timing)
+    timing = LoopTiming(period_us=1000.0, step_us=1000.0, loop="host")
+    run = a_run(an_axis(delay_us=delay_us), timing=timing)
     inside_s = delay_us / 1e6 + 0.5e-3
     expected = RADIUS_MM * (kp / abs(jw + kp * np.exp(-jw * inside_s)) - 1)
     assert settled(run) == pytest.approx(expected, rel=1e-3)
     assert run.margins_x.phase_margin_deg == pytest.approx(90 - math.degrees(kp * inside_s), abs=0.01)
-
-
-def test_an_ideal_axis_shows_the_sagitta_of_its_lines() -> None:
-    period_s = 8e-3
-    timing = LoopTiming(period_us=8000.0, step_us=100.0)
-    run = simulate_circle(a_path(8000.0, ramp_periods=10), x=deadbeat(100.0), y=deadbeat(100.0), timing=timing)
-    sagitta = (FEED_MM_S * period_s) ** 2 / (8 * RADIUS_MM)
-    assert run.contour.radial_deviation_min_mm == pytest.approx(-sagitta, rel=1e-3)
-    assert abs(run.contour.radial_deviation_max_mm) < 1e-9
-    assert run.contour.circular_deviation_mm == pytest.approx(sagitta, rel=2e-3)
 
 
 def test_held_setpoints_shrink_the_circle_by_a_sinc_and_lines_by_its_square() -> None:
@@ -110,58 +90,15 @@ def test_held_setpoints_shrink_the_circle_by_a_sinc_and_lines_by_its_square() ->
     radius = {}
     for interpolation in ("hold", "linear"):
         timing = LoopTiming(period_us=period_us, step_us=100.0, interpolation=interpolation)
-        path = a_path(period_us, ramp_periods=20)
+        path = a_path(period_us, ramp_periods=20, settling_us=1e6)
         axis = an_axis(position_gain_per_s=10.0)
         run = simulate_circle(path, x=axis, y=axis, timing=timing)
-        part = slice(run.steps * 2 // 3, run.constant_speed.stop)
-        radius[interpolation] = np.hypot(run.x_mm[part], run.y_mm[part]).mean()
+        radius[interpolation] = np.hypot(run.x_mm[run.measured], run.y_mm[run.measured]).mean()
     step_s, kp = 1e-4, 10.0
     loop = abs(kp * step_s / (np.exp(1j * TURN_PER_S * step_s) - 1 + kp * step_s))
     sinc = np.sinc(TURN_PER_S * period_us / 1e6 / 2 / math.pi)
     assert RADIUS_MM * loop - radius["hold"] == pytest.approx(RADIUS_MM * loop * (1 - sinc), rel=0.02)
     assert RADIUS_MM * loop - radius["linear"] == pytest.approx(RADIUS_MM * loop * (1 - sinc**2), rel=0.02)
-
-
-def test_mismatched_gains_make_an_ellipse() -> None:
-    kx, ky = 52.0, 50.0
-    run = a_run(an_axis(position_gain_per_s=kx), an_axis(position_gain_per_s=ky))
-    assert run.contour.circular_deviation_mm == pytest.approx(FEED_MM_S * abs(1 / kx - 1 / ky), rel=0.02)
-
-
-def test_offsets_of_the_drives_move_the_circle() -> None:
-    run = a_run(an_axis(drive_offset_mm_s=0.5), an_axis(drive_offset_mm_s=-1.0))
-    assert run.contour.centre_offset_mm == pytest.approx((0.5 / 50, -1.0 / 50), rel=1e-3)
-
-
-def test_skew_makes_an_ellipse_of_feed_times_skew() -> None:
-    skew_us = 40.0
-    perfect = deadbeat(100.0)
-    run = a_run(perfect, delivery=Delivery(skew_us=skew_us))
-    assert run.contour.circular_deviation_mm == pytest.approx(FEED_MM_S * skew_us / 1e6, rel=0.02)
-
-
-def test_mechanics_show_in_the_measures() -> None:
-    # Short ramps: an ellipse looks rounder when a part of it is missing.
-    kwargs = {"x": deadbeat(100.0), "y": deadbeat(100.0), "timing": LoopTiming(period_us=1000.0)}
-    short = a_path(ramp_periods=2)
-    scaled = simulate_circle(short, **kwargs, mechanics=Mechanics(scale_x_ppm=80.0, scale_y_ppm=-20.0))  # type: ignore[arg-type]
-    assert scaled.contour.circular_deviation_mm == pytest.approx(RADIUS_MM * 100e-6, rel=0.02)
-    leaning = simulate_circle(short, **kwargs, mechanics=Mechanics(squareness_um_per_m=-150.0))  # type: ignore[arg-type]
-    assert leaning.contour.circular_deviation_mm == pytest.approx(RADIUS_MM * 150e-6, rel=0.02)
-
-
-def test_backlash_steps_at_every_quadrant() -> None:
-    """Half a gap behind on each axis: outwards where it comes from outside, inwards where it comes from inside."""
-    run = a_run(deadbeat(100.0), mechanics=Mechanics(backlash_mm=0.02))
-    part = run.constant_speed
-    angle = np.degrees(np.arctan2(run.y_mm[part], run.x_mm[part]))
-    error = contour_error(run.x_mm[part], y_mm=run.y_mm[part], radius_mm=RADIUS_MM)
-    diagonal = np.abs(angle - 135) < 5
-    # Moving in -x and -y there: the table stays back by half a gap in both, +x costs and +y gains radius.
-    assert error[diagonal].mean() == pytest.approx(0, abs=1e-4)
-    assert run.contour.radial_deviation_max_mm == pytest.approx(0.01, rel=0.05)
-    crossing = np.abs(angle - 90) < 10
-    assert np.ptp(error[crossing]) > 0.9 * 0.01
 
 
 # --- symmetry ----------------------------------------------------------------------------------------------
@@ -195,14 +132,68 @@ def test_host_and_node_agree_on_a_circle_when_nothing_separates_them() -> None:
     np.testing.assert_allclose(errors[0][1:], errors[1][:-1], rtol=0, atol=1e-9)
 
 
+# --- a whole turn ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("direction", ["ccw", "cw"])
+def test_exactly_the_turn_is_measured(direction: str) -> None:
+    path = a_path(settling_us=10e3, direction=direction)
+    run = simulate_circle(path, x=deadbeat(100.0), y=deadbeat(100.0), timing=LoopTiming(period_us=1000.0))
+    assert path.turn_from_us is not None
+    assert run.measured.start * 100 == path.turn_from_us
+    # pi seconds: the last of the steps ends after the turn does.
+    assert run.measured.stop - run.measured.start == math.ceil(math.pi * 1e4)
+    assert run.constant_speed_deg == 360.0
+    assert run.covered_deg == pytest.approx(360.0, abs=0.02)
+    assert run.follows
+    assert run.contour.max_contour_error_mm < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("edge", "beyond", "counts"), [("start", 0, 1), ("start", -1, 0), ("stop", -1, 1), ("stop", 0, 0)]
+)
+def test_what_goes_wrong_before_and_after_the_turn_does_not_count(edge: str, beyond: int, counts: int) -> None:
+    path, axis, timing = a_path(settling_us=10e3), deadbeat(1000.0), LoopTiming(period_us=1000.0, step_us=1000.0)
+    measured = simulate_circle(path, x=axis, y=axis, timing=timing).measured
+    # At the end of a step the table is on the set-point before it.
+    wrong = getattr(measured, edge) + beyond - 1
+    path.x_mm[wrong] *= 1 + 1e-3
+    path.y_mm[wrong] *= 1 + 1e-3
+    run = simulate_circle(path, x=axis, y=axis, timing=timing)
+    assert run.measured == measured
+    assert run.contour.max_contour_error_mm == pytest.approx(counts * RADIUS_MM * 1e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize("radius_mm", [5.0, 5.004, 5.008, 5.012])
+def test_the_measures_of_a_turn_do_not_depend_on_where_its_last_step_ends(radius_mm: float) -> None:
+    """With a scale error s, the contour error is r s / 2 cos 2 angle; what is left is of second order in a step."""
+    path = circle_path(radius_mm, feed_mm_per_min=FEED_MM_PER_MIN, period_us=1000.0, settling_us=10e3)
+    perfect, timing = deadbeat(1000.0), LoopTiming(period_us=1000.0, step_us=1000.0)
+    mechanics = Mechanics(scale_x_ppm=500.0, scale_y_ppm=-500.0)
+    run = simulate_circle(path, x=perfect, y=perfect, timing=timing, mechanics=mechanics)
+    second_order = (FEED_MM_S * 1e-3 / radius_mm) ** 2
+    assert run.contour.mean_contour_error_mm == pytest.approx(radius_mm * 1e-3 / math.pi, rel=second_order)
+    assert run.contour.centre_offset_mm == pytest.approx((0, 0), abs=radius_mm * 1e-3 * second_order)
+
+
+def test_without_a_turn_there_is_no_circular_deviation() -> None:
+    run = a_run(an_axis())
+    assert run.contour.circular_deviation_mm is None
+    assert run.covered_deg == pytest.approx(360.0, abs=0.5)
+    assert 300 < run.constant_speed_deg < 360
+
+
 # --- what a bus does ---------------------------------------------------------------------------------------
 
 
 def test_common_jitter_harms_little_and_skew_of_the_same_size_much() -> None:
-    axis = an_axis(position_gain_per_s=200.0)
+    axis, path, timing = an_axis(position_gain_per_s=200.0), a_path(settling_us=0.0), LoopTiming(period_us=1000.0)
     calm, shaken, skewed = (
-        a_run(axis, delivery=delivery).contour.circular_deviation_mm
-        for delivery in (Delivery(), Delivery(jitter_us=50.0), Delivery(skew_us=50.0))
+        np.ptp(contour_error(run.x_mm[run.measured], y_mm=run.y_mm[run.measured], radius_mm=RADIUS_MM))
+        for run in (
+            simulate_circle(path, x=axis, y=axis, timing=timing, delivery=delivery)
+            for delivery in (Delivery(), Delivery(jitter_us=50.0), Delivery(skew_us=50.0))
+        )
     )
     assert calm < shaken < 0.3 * skewed
 
@@ -223,9 +214,11 @@ def test_losses_harm_and_extrapolation_heals_most_of_them() -> None:
 
 @pytest.mark.parametrize("loop", ["node", "host"])
 def test_the_seed_decides_the_run(loop: str) -> None:
-    timing = LoopTiming(period_us=1000.0, loop=loop, delay_us=300.0)  # type: ignore[arg-type]
+    timing = LoopTiming(period_us=1000.0, loop=loop)  # type: ignore[arg-type]
     runs = [
-        a_run(an_axis(), timing=timing, delivery=Delivery(jitter_us=20.0, loss_probability=0.01, seed=seed))
+        a_run(
+            an_axis(delay_us=300.0), timing=timing, delivery=Delivery(jitter_us=20.0, loss_probability=0.01, seed=seed)
+        )
         for seed in (1, 1, 2)
     ]
     assert runs[0].contour == runs[1].contour
@@ -262,17 +255,18 @@ def test_the_part_at_constant_speed_waits_for_the_loop_and_ends_with_the_feed() 
     settling_us = run.margins_x.settling_us
     assert settling_us is not None
     assert settling_us == pytest.approx(math.log(1000) / 50 * 1e6, rel=5e-3)
-    assert run.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + settling_us, abs=100)
-    assert run.constant_speed.stop * 100 == pytest.approx(path.constant_until_us, abs=100)
+    assert run.measured.start * 100 == pytest.approx(path.constant_from_us + 1000 + settling_us, abs=100)
+    assert run.measured.stop * 100 == pytest.approx(path.constant_until_us, abs=100)
     slow = simulate_circle(path, x=an_axis(position_gain_per_s=0.5), y=an_axis(), timing=timing)
     whole_us = path.constant_until_us - path.constant_from_us - 1000
-    assert slow.constant_speed.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 5, abs=100)
+    assert slow.measured.start * 100 == pytest.approx(path.constant_from_us + 1000 + whole_us / 5, abs=100)
 
 
 def test_a_circle_of_ramps_only_still_has_measures() -> None:
     path = circle_path(1.0, feed_mm_per_min=2 * math.pi * 10 * 60, period_us=1000.0, ramp_periods=100)
     run = simulate_circle(path, x=an_axis(), y=an_axis(), timing=LoopTiming(period_us=1000.0))
-    assert run.contour.circular_deviation_mm >= 0
+    assert run.measured.stop - run.measured.start == 1
+    assert run.contour.radius_deviation_mm < 0
 
 
 def test_memory_grows_by_no_more_than_16_bytes_a_step_and_axis(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,13 +296,13 @@ def test_memory_grows_by_no_more_than_16_bytes_a_step_and_axis(monkeypatch: pyte
 
 @pytest.mark.parametrize(("loop", "gain"), [("node", 21_000.0), ("host", 700.0)])
 def test_an_unstable_loop_ends_as_one(loop: str, gain: float) -> None:
-    timing = LoopTiming(period_us=2000.0, loop=loop, delay_us=2000.0)  # type: ignore[arg-type]
-    run = a_run(an_axis(position_gain_per_s=gain), timing=timing)
+    timing = LoopTiming(period_us=2000.0, loop=loop)  # type: ignore[arg-type]
+    run = a_run(an_axis(position_gain_per_s=gain, delay_us=2000.0), timing=timing)
     assert run.diverged
     assert run.margins_x.phase_margin_deg is None
     assert math.isfinite(run.contour.mean_contour_error_mm)
     assert run.contour.max_contour_error_mm > 0.01
-    assert not a_run(an_axis(), timing=timing).diverged
+    assert not a_run(an_axis(delay_us=2000.0), timing=timing).diverged
 
 
 def test_a_table_that_runs_away_has_diverged() -> None:
@@ -343,18 +337,19 @@ def test_a_path_of_another_period_is_refused() -> None:
     jitter_us=st.floats(0, 400),
     skew_us=st.floats(-100, 100),
     backlash_mm=st.floats(0, 1),
+    settling_us=st.sampled_from([None, 0.0]),
 )
 def test_whatever_is_set_the_measures_are_finite(**drawn: Any) -> None:
-    path = circle_path(5.0, feed_mm_per_min=6000.0, period_us=1000.0, ramp_periods=20)
+    settling_us = drawn["settling_us"]
+    path = circle_path(5.0, feed_mm_per_min=6000.0, period_us=1000.0, ramp_periods=20, settling_us=settling_us)
     axis = an_axis(
         position_gain_per_s=drawn["kp"],
         integral_gain_per_s2=drawn["ki"],
         derivative_gain=drawn["kd"],
         drive_lag_us=drawn["lag_us"],
+        delay_us=321.0,
     )
-    timing = LoopTiming(
-        period_us=1000.0, step_us=250.0, loop=drawn["loop"], interpolation=drawn["interpolation"], delay_us=321.0
-    )
+    timing = LoopTiming(period_us=1000.0, step_us=250.0, loop=drawn["loop"], interpolation=drawn["interpolation"])
     delivery = Delivery(
         jitter_us=drawn["jitter_us"],
         skew_us=drawn["skew_us"],
@@ -368,11 +363,12 @@ def test_whatever_is_set_the_measures_are_finite(**drawn: Any) -> None:
         contour.max_contour_error_mm,
         contour.radial_deviation_min_mm,
         contour.radial_deviation_max_mm,
-        contour.circular_deviation_mm,
+        0.0 if contour.circular_deviation_mm is None else contour.circular_deviation_mm,
         contour.radius_deviation_mm,
         *contour.centre_offset_mm,
     ]
     assert np.isfinite(numbers).all()
+    assert (contour.circular_deviation_mm is None) == (settling_us is None)
     assert contour.radial_deviation_min_mm <= contour.radial_deviation_max_mm
     assert 0 <= contour.mean_contour_error_mm <= contour.max_contour_error_mm
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from busplan.servo.contour import contour_error, least_squares_circle, measure_contour
+from busplan.servo.contour import contour_error, covered_deg, least_squares_circle, measure_contour
 
 ANGLE = np.linspace(0.3, 0.3 + 2 * np.pi, 70_000, endpoint=False)
 """A whole turn, in more points than one block holds."""
@@ -34,7 +34,7 @@ def test_the_fit_is_scipys() -> None:
 def test_the_measures_of_an_oval_off_its_place() -> None:
     radial = 0.004 * np.cos(2 * ANGLE)
     x, y = (50 + radial) * np.cos(ANGLE) + 0.002, (50 + radial) * np.sin(ANGLE)
-    found = measure_contour(x, y_mm=y, radius_mm=50.0, constant_speed=slice(0, len(ANGLE)))
+    found = measure_contour(x, y_mm=y, radius_mm=50.0, part=slice(0, len(ANGLE)), turn_share=1.0)
     error = np.hypot(x, y) - 50
     assert found.mean_contour_error_mm == pytest.approx(np.abs(error).mean(), rel=1e-12)
     assert found.max_contour_error_mm == np.abs(error).max()
@@ -46,23 +46,43 @@ def test_the_measures_of_an_oval_off_its_place() -> None:
 def test_only_the_part_at_constant_speed_counts_for_iso_and_all_of_it_for_the_contour_error() -> None:
     x, y = 10 * np.cos(ANGLE), 10 * np.sin(ANGLE)
     x[:100] *= 1.5
-    found = measure_contour(x, y_mm=y, radius_mm=10.0, constant_speed=slice(100, len(x)))
+    found = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(100, len(x)))
     assert found.max_contour_error_mm > 1
     assert found.radial_deviation_max_mm < 1e-12
-    assert found.circular_deviation_mm < 1e-12
+    assert found.circular_deviation_mm is None
+
+
+@given(share=st.floats(0.01, 1))
+def test_the_last_step_of_a_turn_counts_by_its_share(share: float) -> None:
+    """Off its place by a, a circle has a mean error of 2 a / pi; what is left is of second order in a step."""
+    angle = 0.3 + 2 * np.pi * np.arange(200) / (199 + share)
+    x, y = 10 * np.cos(angle) + 0.002, 10 * np.sin(angle)
+    found = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(0, 200), turn_share=share)
+    assert found.mean_contour_error_mm == pytest.approx(0.004 / np.pi, rel=(2 * np.pi / 199) ** 2)
+    assert found.centre_offset_mm == pytest.approx((0.002, 0.0), abs=1e-10)
+    assert found.radius_deviation_mm == pytest.approx(0.0, abs=1e-10)
+    assert found.circular_deviation_mm == pytest.approx(0.0, abs=1e-10)
 
 
 def test_blocks_do_not_show() -> None:
     x, y = 10.01 * np.cos(ANGLE), 10 * np.sin(ANGLE)
-    whole = measure_contour(x, y_mm=y, radius_mm=10.0, constant_speed=slice(11, 69_998))
+    whole = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(11, 69_998))
     error = contour_error(x[11:69_998], y_mm=y[11:69_998], radius_mm=10.0)
     assert whole.radial_deviation_min_mm == error.min()
     assert whole.radial_deviation_max_mm == error.max()
 
 
+def test_the_angle_is_that_from_the_first_to_the_last_point_of_the_part() -> None:
+    x, y = 10 * np.cos(ANGLE), 10 * np.sin(ANGLE)
+    step_deg = 360 / len(ANGLE)
+    assert covered_deg(x, y_mm=y) == pytest.approx(69_999 * step_deg, abs=1e-9)
+    assert covered_deg(x, y_mm=y, part=slice(20_000, 60_000)) == pytest.approx(39_999 * step_deg, abs=1e-9)
+
+
 @given(points=st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=1, max_size=20))
 def test_even_a_lost_table_has_finite_measures(points: list[tuple[float, float]]) -> None:
     x, y = (np.array(column) for column in zip(*points, strict=True))
-    found = measure_contour(x, y_mm=y, radius_mm=10.0, constant_speed=slice(0, len(x)))
+    found = measure_contour(x, y_mm=y, radius_mm=10.0, part=slice(0, len(x)), turn_share=0.5)
+    assert found.circular_deviation_mm is not None
     numbers = [found.circular_deviation_mm, found.radius_deviation_mm, *found.centre_offset_mm]
     assert np.all(np.isfinite(numbers))

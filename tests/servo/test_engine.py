@@ -1,30 +1,98 @@
-"""Compiled code is a gain and never a condition."""
+"""Compiled code is a gain and never a condition: the same bits with and without it."""
 
+import subprocess
 import sys
-from types import ModuleType
+from collections.abc import Mapping
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from busplan.servo.engine import compiled
-from busplan.servo.kernel import run_rows
+from busplan import servo
+from busplan.errors import BusplanError
+from busplan.servo import engine
+from busplan.servo.axis import simulate_axis
+from busplan.servo.delivery import arrivals
+from busplan.servo.engine import compiled_kernel
+from busplan.servo.mechanics import add_backlash
+from busplan.servo.parameters import Axis, Delivery, LoopTiming
+
+KERNEL = "busplan.servo._kernel"
+WAVE = 20 * np.sin(np.linspace(0, 3, 301))
+
+needs_compiled = pytest.mark.skipif(compiled_kernel("auto") is None, reason="the kernel is not compiled here")
+
+axes = st.builds(
+    Axis,
+    position_gain_per_s=st.floats(1, 300),
+    integral_gain_per_s2=st.sampled_from([0.0, 400.0]),
+    derivative_gain=st.sampled_from([0.0, 0.01]),
+    velocity_feedforward=st.sampled_from([0.0, 0.97]),
+    acceleration_feedforward_s=st.sampled_from([0.0, 0.004]),
+    drive_lag_us=st.sampled_from([0.0, 6000.0]),
+    drive_offset_mm_s=st.floats(-1, 1),
+    max_velocity_mm_s=st.sampled_from([400.0, 5.0]),
+    dac_bits=st.sampled_from([0, 14]),
+    encoder_resolution_mm=st.sampled_from([0.0, 0.0005]),
+    reversal_mm_s=st.sampled_from([0.0, 1.1]),
+    delay_us=st.floats(0, 1000),
+)
+timings = st.builds(
+    LoopTiming,
+    period_us=st.just(1000.0),
+    loop=st.sampled_from(["node", "host"]),
+    interpolation=st.sampled_from(["linear", "hold"]),
+)
 
 
-@pytest.mark.parametrize("error", [EOFError("empty"), ValueError("garbage"), KeyError("x"), OSError("read-only")])
-def test_a_damaged_cache_leaves_plain_python(monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    def njit(*_: object, **__: object) -> None:
-        raise error
+@needs_compiled
+@given(axis=axes, timing=timings, backlash_mm=st.floats(0.001, 1))
+def test_both_engines_give_the_same_bits(axis: Axis, timing: LoopTiming, backlash_mm: float) -> None:
+    delivery = Delivery(jitter_us=30.0, skew_us=11.0, loss_probability=0.02, on_loss="extrapolate")
+    arriving = arrivals(delivery, name="y", cycles=300, period_us=1000.0)
+    found = []
+    for name in ("python", "compiled"):
+        position = simulate_axis(WAVE, axis=axis, timing=timing, arrivals=arriving, engine=name)
+        motor = position.copy()
+        add_backlash(position, backlash_mm=backlash_mm, engine=name)
+        found.append((motor.tobytes(), position.tobytes()))
+    assert found[0] == found[1]
 
-    broken = ModuleType("numba")
-    broken.njit = njit  # type: ignore[attr-defined]  # a module takes any name
-    monkeypatch.setitem(sys.modules, "numba", broken)
-    assert compiled.__wrapped__(run_rows, "") is None
+
+@needs_compiled
+def test_auto_is_compiled_where_it_can_be() -> None:
+    assert compiled_kernel("auto") is compiled_kernel("compiled") is sys.modules[KERNEL]
+    assert compiled_kernel("python") is None
 
 
-def test_a_numba_that_does_not_load_leaves_plain_python(
-    monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+@pytest.fixture
+def afresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Look for the compiled kernel anew, as a process that starts does."""
+    monkeypatch.setattr(engine, "_compiled", engine._compiled.__wrapped__)  # noqa: SLF001
+    monkeypatch.delitem(sys.modules, KERNEL, raising=False)
+
+
+@pytest.mark.usefixtures("afresh")
+@pytest.mark.parametrize("content", [None, b"", b"built for another Python"], ids=["none", "empty", "garbage"])
+def test_without_an_extension_that_loads_plain_python_runs_and_compiled_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, content: bytes | None
 ) -> None:
-    folder = tmp_path_factory.mktemp("broken")
-    (folder / "numba.py").write_text("raise SystemError('wrong numpy')", encoding="utf-8")
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.delitem(sys.modules, "numba", raising=False)
-    assert compiled.__wrapped__(run_rows, "") is None
+    if content is not None:
+        (tmp_path / f"_kernel{EXTENSION_SUFFIXES[0]}").write_bytes(content)
+    monkeypatch.setattr(servo, "__path__", [str(tmp_path)])
+    known: dict[str, Any] = {"axis": Axis(drive_lag_us=3000.0), "timing": LoopTiming(period_us=1000.0)}
+    expected = simulate_axis(WAVE, **known, engine="python")
+    np.testing.assert_array_equal(simulate_axis(WAVE, **known), expected)
+    with pytest.raises(BusplanError, match=r"engine 'compiled': .* install one and busplan again, or use 'python'"):
+        simulate_axis(WAVE, **known, engine="compiled")
+
+
+def test_a_process_can_be_started_as_if_nothing_were_compiled(no_compiler: Mapping[str, str]) -> None:
+    """What other rooms rely on when they ask for plain Python."""
+    program = "from busplan.servo.engine import compiled_kernel; print(compiled_kernel('auto'))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, env=no_compiler)
+    assert done.stdout == "None\n"

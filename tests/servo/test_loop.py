@@ -26,12 +26,10 @@ CONTROLLERS: list[dict[str, float]] = [
     {"position_gain_per_s": 80.0, "derivative_gain": 0.15},
     {"position_gain_per_s": 90.0, "integral_gain_per_s2": 700.0, "derivative_gain": 0.2, "drive_lag_us": 4000.0},
 ]
-TIMINGS = [
-    LoopTiming(period_us=500.0, step_us=500.0),
-    LoopTiming(period_us=1000.0, step_us=250.0, loop="host"),
-    LoopTiming(period_us=1000.0, step_us=250.0, loop="host", delay_us=317.0),
-    LoopTiming(period_us=1000.0, step_us=250.0, loop="host", delay_us=1000.0),
-]
+NODE = LoopTiming(period_us=500.0, step_us=500.0)
+HOST = LoopTiming(period_us=1000.0, step_us=250.0, loop="host")
+PLACES = [(NODE, 0.0), (HOST, 0.0), (HOST, 317.0), (HOST, 1000.0)]
+"""Timing, and delay of the axis."""
 
 
 def an_axis(**changes: Any) -> Axis:
@@ -40,7 +38,7 @@ def an_axis(**changes: Any) -> Axis:
     return Axis(**(values | changes))
 
 
-def response(loop: control.StateSpace, frequency_hz: Floats) -> NDArray[np.complex128]:
+def response(loop: control.LTI, frequency_hz: Floats) -> NDArray[np.complex128]:
     return np.asarray(loop(np.exp(2j * math.pi * frequency_hz * loop.dt)))
 
 
@@ -48,12 +46,12 @@ def response(loop: control.StateSpace, frequency_hz: Floats) -> NDArray[np.compl
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-@pytest.mark.parametrize("timing", TIMINGS)
+@pytest.mark.parametrize(("timing", "delay_us"), PLACES)
 @pytest.mark.parametrize("cycles_per_wave", [50, 200])
 def test_the_simulated_frequency_response_is_the_loops(
-    reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, cycles_per_wave: int
+    reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, delay_us: float, cycles_per_wave: int
 ) -> None:
-    axis, cycles = an_axis(**controller), 8000
+    axis, cycles = an_axis(**controller, delay_us=delay_us), 8000
     wave = np.exp(2j * math.pi * np.arange(cycles + 1) / cycles_per_wave)
     real, imaginary = (simulate_axis(part.copy(), axis=axis, timing=timing) for part in (wave.real, wave.imag))
     # At the end of the last period a host aims at the last set-point, a node at the one before.
@@ -66,20 +64,22 @@ def test_the_simulated_frequency_response_is_the_loops(
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-@pytest.mark.parametrize("timing", TIMINGS)
-def test_the_gain_is_python_controls(reference_loop: Loop, controller: dict[str, float], timing: LoopTiming) -> None:
-    axis = an_axis(**controller)
+@pytest.mark.parametrize(("timing", "delay_us"), PLACES)
+def test_the_gain_is_python_controls(
+    reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, delay_us: float
+) -> None:
+    axis = an_axis(**controller, delay_us=delay_us)
     frequency_hz = np.geomspace(0.1, 0.5e6 / timing.control_period_us, 50)
     expected = response(reference_loop(axis, timing), frequency_hz)
     np.testing.assert_allclose(loop_gain(frequency_hz, axis=axis, timing=timing), expected, rtol=1e-8)
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
-@pytest.mark.parametrize("timing", TIMINGS)
+@pytest.mark.parametrize(("timing", "delay_us"), PLACES)
 def test_the_margins_are_python_controls(
-    reference_loop: Loop, controller: dict[str, float], timing: LoopTiming
+    reference_loop: Loop, controller: dict[str, float], timing: LoopTiming, delay_us: float
 ) -> None:
-    axis = an_axis(**controller)
+    axis = an_axis(**controller, delay_us=delay_us)
     found = loop_margins(axis, timing=timing)
     # Sampled finely: its polynomials in z lose too many digits for these loops, and it says so.
     frequency_hz = np.geomspace(0.01, 0.5e6 / timing.control_period_us, 2000)
@@ -95,6 +95,49 @@ def test_the_margins_are_python_controls(
     assert found.crossover_hz == pytest.approx(crossover / (2 * math.pi), rel=1e-5)
 
 
+@pytest.mark.parametrize("kp", [20.0, 143.0, 400.0, 1500.0])
+@pytest.mark.parametrize("lag_us", [0.0, 3000.0, 20_000.0])
+def test_a_host_that_is_one_period_late_is_python_controls_own_sampling_and_a_delay(kp: float, lag_us: float) -> None:
+    period_s = HOST.period_us / 1e6
+    drive = control.tf([1], [lag_us / 1e6, 1, 0] if lag_us else [1, 0])
+    loop = kp * control.sample_system(drive, period_s, method="zoh") * control.tf([1], [1, 0], period_s)
+    slowest = np.abs(control.poles(control.feedback(loop, 1))).max()
+    found = loop_margins(an_axis(position_gain_per_s=kp, drive_lag_us=lag_us, delay_us=1000.0), timing=HOST)
+    assert found.stable == (slowest < 1)
+    if not found.stable:
+        return
+    frequency_hz = np.geomspace(0.1, 500.0, 2000)
+    # Its default way warns of lost digits.
+    gain, phase_deg, _, crossover = control.margin(
+        control.frd(response(loop, frequency_hz), 2 * math.pi * frequency_hz)
+    )
+    assert found.settling_us == pytest.approx(1000 * math.log(1e-3) / math.log(slowest), rel=1e-6)
+    assert found.phase_margin_deg == pytest.approx(phase_deg, rel=1e-5)
+    assert found.gain_margin_db == pytest.approx(20 * math.log10(gain), rel=1e-5)
+    assert found.crossover_hz == pytest.approx(crossover / (2 * math.pi), rel=1e-5)
+
+
+def test_a_delay_beyond_the_period_is_one_of_a_period() -> None:
+    whole, longer = (loop_margins(an_axis(delay_us=delay_us), timing=HOST) for delay_us in (1000.0, 5000.0))
+    assert whole == longer != loop_margins(an_axis(delay_us=999.0), timing=HOST)
+    assert loop_margins(an_axis(delay_us=5000.0), timing=NODE) == loop_margins(an_axis(), timing=NODE)
+
+
+@pytest.mark.parametrize("share", [0.05, 1e-2, 1e-5])
+def test_after_its_time_no_more_than_the_share_of_a_double_pole_is_left(share: float) -> None:
+    """A P loop with a lag of 1 / (4 kp) has a double pole at 2 kp; and the time is not far too long."""
+    axis = an_axis(position_gain_per_s=50.0, drive_lag_us=5000.0)
+    found = loop_margins(axis, timing=LoopTiming(period_us=1000.0, step_us=10.0))
+    constants = found.time_to_us(share) / 1e6 * 2 * 50.0
+    left = (1 + constants) * math.exp(-constants)
+    assert 0.5 * share < left <= share * (1 + 1e-3)
+
+
+def test_an_unstable_loop_takes_for_ever_and_what_has_gone_takes_no_time() -> None:
+    assert loop_margins(an_axis(position_gain_per_s=2500.0), timing=HOST).time_to_us(0.5) == math.inf
+    assert loop_margins(an_axis(), timing=HOST).time_to_us(2.0) == 0.0
+
+
 plants = st.fixed_dictionaries(
     {
         "position_gain_per_s": st.floats(0.1, 3000),
@@ -108,7 +151,7 @@ delays = st.one_of(st.sampled_from([0.0, 1000.0]), st.floats(0, 1000))
 
 @given(plant=plants, delay_us=delays)
 def test_stability_is_where_the_poles_are(reference_loop: Loop, plant: dict[str, float], delay_us: float) -> None:
-    axis, timing = an_axis(**plant), LoopTiming(period_us=1000.0, loop="host", delay_us=delay_us)
+    axis, timing = an_axis(**plant, delay_us=delay_us), HOST
     loop = reference_loop(axis, timing)
     radius = np.abs(np.linalg.eigvals(loop.A - loop.B @ loop.C / (1 + loop.D[0, 0]))).max()
     assume(abs(radius - 1) > 1e-9)
@@ -123,7 +166,7 @@ def test_stability_is_where_the_poles_are(reference_loop: Loop, plant: dict[str,
 @given(plant=plants, delay_us=delays)
 def test_no_crossover_is_missed(plant: dict[str, float], delay_us: float) -> None:
     """Against a search on a grid, which can only find what lies between two of its points."""
-    axis, timing = an_axis(**plant), LoopTiming(period_us=1000.0, loop="host", delay_us=delay_us)
+    axis, timing = an_axis(**plant, delay_us=delay_us), HOST
     found = loop_margins(axis, timing=timing)
     assume(found.stable)
     frequency_hz = np.geomspace(1e-5, 500.0, 40_000)
@@ -153,10 +196,9 @@ def test_no_crossover_is_missed(plant: dict[str, float], delay_us: float) -> Non
 @pytest.mark.parametrize(("delay_us", "limit"), [(0.0, 2.0), (500.0, 2.0), (1000.0, 1.0)])
 def test_a_p_loop_is_stable_up_to_its_limit(delay_us: float, limit: float) -> None:
     """Ideal drive: z (z - 1) + kp ((T - Td) z + Td) has its roots inside up to kp T = 2 and 1 / (Td / T)."""
-    timing = LoopTiming(period_us=1000.0, loop="host", delay_us=delay_us)
     for share, stable in ((0.999, True), (1.001, False)):
-        axis = an_axis(position_gain_per_s=share * limit * 1000)
-        found = loop_margins(axis, timing=timing)
+        axis = an_axis(position_gain_per_s=share * limit * 1000, delay_us=delay_us)
+        found = loop_margins(axis, timing=HOST)
         assert found.stable == stable
         if stable:
             assert found.gain_margin_db == pytest.approx(-20 * math.log10(share), rel=1e-6)
@@ -194,13 +236,13 @@ def test_an_integral_may_not_be_weakened_below_its_own_margin_either() -> None:
 
 
 def test_without_a_gain_there_is_no_loop() -> None:
-    assert not loop_margins(an_axis(position_gain_per_s=0.0), timing=TIMINGS[0]).stable
+    assert not loop_margins(an_axis(position_gain_per_s=0.0), timing=NODE).stable
 
 
 def test_resolution_and_feed_forward_are_not_part_of_the_loop() -> None:
-    plain = loop_margins(an_axis(), timing=TIMINGS[2])
-    assert loop_margins(an_axis(velocity_feedforward=1.0, encoder_resolution_mm=0.1), timing=TIMINGS[2]) == plain
-    assert plain != loop_margins(an_axis(), timing=TIMINGS[1])
+    plain = loop_margins(an_axis(), timing=HOST)
+    assert loop_margins(an_axis(velocity_feedforward=1.0, encoder_resolution_mm=0.1), timing=HOST) == plain
+    assert plain != loop_margins(an_axis(), timing=NODE)
 
 
 # --- the loop on the host ------------------------------------------------------------------------------------
@@ -208,12 +250,10 @@ def test_resolution_and_feed_forward_are_not_part_of_the_loop() -> None:
 
 @pytest.mark.parametrize("delay_us", [0.0, 123.4, 500.0, 999.0, 1000.0])
 def test_the_step_of_a_host_loop_decides_only_where_one_looks(delay_us: float) -> None:
-    axis = an_axis(drive_lag_us=4000.0, integral_gain_per_s2=200.0, velocity_feedforward=0.9)
+    axis = an_axis(drive_lag_us=4000.0, integral_gain_per_s2=200.0, velocity_feedforward=0.9, delay_us=delay_us)
     setpoints = np.sin(np.arange(300) / 20)
     coarse, fine = (
-        simulate_axis(
-            setpoints, axis=axis, timing=LoopTiming(period_us=1000.0, step_us=step_us, loop="host", delay_us=delay_us)
-        )
+        simulate_axis(setpoints, axis=axis, timing=LoopTiming(period_us=1000.0, step_us=step_us, loop="host"))
         for step_us in (500.0, 62.5)
     )
     np.testing.assert_allclose(fine[7::8], coarse, rtol=0, atol=1e-12)
@@ -235,7 +275,7 @@ def literal_host(setpoints: Floats, *, axis: Axis, timing: LoopTiming, arriving:
     events: list[tuple[float, float, int]] = [(t, 2, 0) for t in times_us]
     for k in range(cycles):
         events.append((at[k], 1, k))
-        events.append((min(at[k] + timing.delay_us, at[k + 1]), 0 if timing.delay_us else 1.5, k))
+        events.append((min(at[k] + axis.delay_us, at[k + 1]), 0 if axis.delay_us else 1.5, k))
     position, velocity, command, integral, now, seen = setpoints[0], 0.0, 0.0, 0.0, 0.0, []
     commands: dict[int, float] = {}
     for time_us, kind, k in sorted(events):
@@ -256,13 +296,13 @@ def literal_host(setpoints: Floats, *, axis: Axis, timing: LoopTiming, arriving:
     return np.array(seen)
 
 
-@pytest.mark.parametrize("delay_us", [0.0, 250.0, 731.0, 1000.0])
+@pytest.mark.parametrize("delay_us", [0.0, 250.0, 731.0, 1000.0, 1400.0])
 @pytest.mark.parametrize(
     "delivery", [Delivery(), Delivery(jitter_us=170.0, skew_us=23.0, loss_probability=0.1, seed=4)]
 )
 def test_a_host_loop_is_what_its_events_make_of_it(delay_us: float, delivery: Delivery) -> None:
-    axis = an_axis(drive_lag_us=4000.0, integral_gain_per_s2=200.0, velocity_feedforward=0.9)
-    timing = LoopTiming(period_us=1000.0, step_us=200.0, loop="host", delay_us=delay_us)
+    axis = an_axis(drive_lag_us=4000.0, integral_gain_per_s2=200.0, velocity_feedforward=0.9, delay_us=delay_us)
+    timing = LoopTiming(period_us=1000.0, step_us=200.0, loop="host")
     setpoints = np.sin(np.arange(200) / 20)
     arriving = arrivals(delivery, name="y", cycles=199, period_us=1000.0)
     found = simulate_axis(setpoints, axis=axis, timing=timing, arrivals=arriving)

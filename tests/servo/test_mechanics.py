@@ -18,7 +18,9 @@ X, Y = RADIUS_MM * np.cos(ANGLE), RADIUS_MM * np.sin(ANGLE)
 def circular_deviation(mechanics: Mechanics) -> float:
     x, y = X.copy(), Y.copy()
     move_to_table(x, y_mm=y, mechanics=mechanics)
-    return measure_contour(x, y_mm=y, radius_mm=RADIUS_MM, constant_speed=slice(0, len(x))).circular_deviation_mm
+    found = measure_contour(x, y_mm=y, radius_mm=RADIUS_MM, part=slice(0, len(x)), turn_share=1.0)
+    assert found.circular_deviation_mm is not None
+    return found.circular_deviation_mm
 
 
 def test_the_table_turns_only_after_the_whole_gap() -> None:

@@ -1,6 +1,7 @@
 """The circle's set-points."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
-from busplan.servo.path import MAX_SETPOINTS, circle_path
+from busplan.servo.path import MAX_SETPOINTS, circle_path, circle_setpoints
 
 
 @pytest.mark.parametrize(
@@ -72,6 +73,58 @@ def test_without_ramps_every_chord_but_the_last_is_alike() -> None:
 def test_a_move_that_ends_on_a_period_gains_none() -> None:
     feed_mm_per_min = 2 * math.pi * 7.0 / 1.0 * 60
     assert circle_path(7.0, feed_mm_per_min=feed_mm_per_min, period_us=1000.0, ramp_periods=100).setpoints == 1100
+    for radius_mm in (1.0, 2.0, 7.0):
+        feed_mm_per_min = 2 * math.pi * radius_mm / 0.25 * 60
+        path = circle_path(
+            radius_mm, feed_mm_per_min=feed_mm_per_min, period_us=1000.0, ramp_periods=20, settling_us=0.0
+        )
+        assert path.turn_from_us == 260e3
+        assert path.setpoints == 530
+
+
+@given(
+    radius_mm=st.floats(0.5, 100),
+    feed_mm_per_min=st.floats(1000, 20_000),
+    period_us=st.sampled_from([250.0, 1000.0, 4000.0]),
+    ramp_periods=st.integers(0, 300),
+    settling_us=st.floats(0, 1e6),
+)
+def test_a_turn_at_constant_speed_follows_a_lead_in_of_whole_turns(
+    radius_mm: float, feed_mm_per_min: float, period_us: float, ramp_periods: int, settling_us: float
+) -> None:
+    feed_mm_s = feed_mm_per_min / 60
+    assume(3 * 2 * math.pi * radius_mm / feed_mm_s / period_us * 1e6 < 50_000)
+    known: dict[str, Any] = {
+        "feed_mm_per_min": feed_mm_per_min, "period_us": period_us, "settling_us": settling_us,
+    }  # fmt: skip
+    path = circle_path(radius_mm, ramp_periods=ramp_periods, **known)
+    assert path.turn_from_us is not None
+    start, rounding_us = round(path.turn_from_us / period_us), 1e-6 * period_us
+    assert path.turn_from_us == pytest.approx(start * period_us, abs=rounding_us)
+    assert (path.x_mm[start], path.y_mm[start]) == pytest.approx((radius_mm, 0.0), abs=1e-9 * radius_mm)
+    assert path.turn_us == pytest.approx(2 * math.pi * radius_mm / feed_mm_s * 1e6)
+    assert path.constant_until_us - path.turn_from_us == pytest.approx(path.turn_us)
+    assert path.turn_from_us - path.constant_from_us >= settling_us - rounding_us
+    assert path.constant_from_us == pytest.approx(ramp_periods * period_us)
+    # Along the circle: a ramp, the feed, and a ramp that mirrors the first.
+    way_mm = np.unwrap(np.arctan2(path.y_mm, path.x_mm)) * radius_mm
+    assert way_mm[start] - way_mm[0] >= 2 * math.pi * radius_mm * (1 - 1e-9)
+    steady = way_mm[ramp_periods : math.floor(path.constant_until_us / period_us) + 1]
+    np.testing.assert_allclose(np.diff(steady), feed_mm_s * period_us / 1e6, rtol=1e-6)
+    assert np.diff(way_mm).max() <= feed_mm_s * period_us / 1e6 * (1 + 1e-6)
+    ramp_mm = feed_mm_s * ramp_periods * period_us / 2e6
+    assert way_mm[ramp_periods] - way_mm[0] == pytest.approx(ramp_mm, abs=1e-6)
+    assert way_mm[-1] - way_mm[start] == pytest.approx(2 * math.pi * radius_mm + ramp_mm, abs=1e-6)
+    assert path.setpoints == circle_setpoints(radius_mm, ramp_periods=ramp_periods, **known)
+    # Not a turn more than is needed.
+    needed_us = path.turn_us + settling_us + path.constant_from_us
+    assert path.turn_from_us <= needed_us + period_us + rounding_us
+
+
+@pytest.mark.parametrize("settling_us", [-1.0, math.inf, math.nan])
+def test_a_bad_settling_time_is_refused(settling_us: float) -> None:
+    with pytest.raises(BusplanError, match=r"^settling_us = "):
+        circle_path(10.0, feed_mm_per_min=600.0, period_us=1000.0, settling_us=settling_us)
 
 
 def test_a_circle_too_short_for_its_feed_is_refused_with_what_would_do() -> None:
@@ -89,5 +142,6 @@ def test_all_bad_values_are_reported_together() -> None:
 
 
 def test_a_move_without_end_is_refused() -> None:
-    with pytest.raises(BusplanError, match=str(MAX_SETPOINTS)):
-        circle_path(320.0, feed_mm_per_min=1e-3, period_us=1000.0)
+    for settling_us in (None, 0.0):
+        with pytest.raises(BusplanError, match=str(MAX_SETPOINTS)):
+            circle_path(320.0, feed_mm_per_min=1e-3, period_us=1000.0, settling_us=settling_us)

@@ -89,7 +89,10 @@ class CircleRun:
     @property
     def covered_deg(self) -> float:
         """Angle of the table about the centre on the turn or on the whole trapezoid, positive along the path [deg]."""
-        return self._along_path_deg(None if self.path.turn_from_us is None else self.measured)
+        if self.path.turn_from_us is None:
+            return self._along_path_deg(None)
+        # From the end of the step before the turn.
+        return self._along_path_deg(slice(self.measured.start - 1, self.measured.stop))
 
     @property
     def constant_speed_deg(self) -> float:
@@ -315,6 +318,8 @@ def settling_time_us(
     -----
     A loop that starts to move is off by its following error, at most v / kp. With the spectral radius rho of the linear
     loop, about rho^n of it is left after n control periods; `LoopMargins.time_to_us` allows for a double pole.
+    Friction puts an axis off by at most ``reversal / kp``, which fades with its recovery: that of the start must go,
+    too.
 
     Examples
     --------
@@ -327,6 +332,9 @@ def settling_time_us(
         lag_mm = feed_mm_per_min / _S_PER_MIN / axis.position_gain_per_s if axis.position_gain_per_s else math.inf
         margins = loop_margins(axis, timing=timing)
         each.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
+        if each[-1] < math.inf:
+            friction_mm = axis.reversal_mm_s / axis.position_gain_per_s
+            each.append(axis.reversal_recovery_us * math.log(max(friction_mm / rest_mm, 1.0)))
     settling_us = max(each) + timing.period_us
     return settling_us if settling_us <= LONGEST_SETTLING_US else None
 
