@@ -234,7 +234,7 @@ def test_the_trace_tells_times_targets_and_positions() -> None:
     np.testing.assert_allclose(trace.time_us, 700.0 * np.arange(1, run.steps // 7 + 1))
     np.testing.assert_array_equal(trace.x_mm, run.x_mm[6::7])
     np.testing.assert_array_equal(trace.y_mm, run.y_mm[6::7])
-    np.testing.assert_allclose(trace.contour_error_mm, np.hypot(trace.x_mm, trace.y_mm) - RADIUS_MM)
+    np.testing.assert_allclose(trace.contour_error_mm, np.hypot(trace.x_mm, trace.y_mm) - RADIUS_MM, atol=1e-13)
     for command, position in ((trace.command_x_mm, trace.x_mm), (trace.command_y_mm, trace.y_mm)):
         assert command.shape == position.shape
         np.testing.assert_allclose(command, position, rtol=0, atol=1e-9)

@@ -1,6 +1,5 @@
 """The verdict of a circle test in sentences."""
 
-from collections import Counter
 from collections.abc import Iterator
 
 from busplan.analysis.circle.failures import MARGINS, Stated
@@ -133,10 +132,8 @@ def servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence
     if result.ideal_drive:
         yield Sentence(("The profile has no [servo]: an ideal drive was simulated.",), "warns")
         return
-    counts = Counter(profile.servo.grades_given)
-    each = ", ".join(f"{number} {grade}" if len(counts) > 1 else grade for grade, number in counts.items())
     state: State = "warns" if result.servo_grade == "assumed" else "neutral"
-    yield Sentence((f"The servo values behind these figures are {each}.",), state)
+    yield Sentence((f"The servo values behind these figures are {profile.servo.grades_text}.",), state)
 
 
 def source_words(source: str) -> str:

@@ -128,7 +128,7 @@ def draw_test(test: "CircleTest") -> "Figure":
 def _title(test: "CircleTest") -> str:
     """Name, grade of the servo values, and the periods that are not drawn."""
     first = test.results[0]
-    servo = "ideal drive" if first.ideal_drive else f"servo values: {first.servo_grade}"
+    servo = "ideal drive" if first.ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(one.period_us) for one, run in zip(test.results, test.runs, strict=True) if run is None]
     without = f"; not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
     return f"{fill(test.profile.name, _NAME_WIDTH)}\n{fill(f'circle test, {servo}{without}', _TITLE_WIDTH)}"

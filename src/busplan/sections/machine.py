@@ -4,6 +4,7 @@ All are optional. Zero in a resolution, a lag or `dac_bits` means ideal. Keys th
 take their names, defaults, ranges and descriptions from there.
 """
 
+from collections import Counter
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, create_model
@@ -175,6 +176,12 @@ class ServoSection(AxisKeys):
         given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set | self.grades.model_fields_set
         found = [self.grade_of(key) for key in given & set(ServoGrades.model_fields)] or [self.grade]
         return tuple(sorted(found, key=SERVO_GRADES.index, reverse=True))
+
+    @property
+    def grades_text(self) -> str:
+        """How the values are known in words, the weakest first."""
+        counts = Counter(self.grades_given)
+        return ", ".join(f"{number} {grade}" if len(counts) > 1 else grade for grade, number in counts.items())
 
 
 class CircleSection(Section):
