@@ -205,11 +205,12 @@ def test_the_title_names_grade_and_periods_that_are_not_drawn() -> None:
     title = draw_test(test).get_suptitle()
     assert title.splitlines() == [
         "paper-4ms",
-        "circle test, servo values: 6 assumed, 4 calibrated, 2 published; not drawn, for the bus does not carry it: 100 us",
+        "circle test, servo values: 6 assumed, 4 calibrated, 2 published",
+        "not drawn, for the bus does not carry it: 100 us",
     ]
     (result, missing) = test.results
     ideal = test._replace(results=(result._replace(ideal_drive=True), missing))
-    assert "circle test, ideal drive; " in draw_test(ideal).get_suptitle()
+    assert "circle test, ideal drive\n" in draw_test(ideal).get_suptitle()
 
 
 def test_each_kind_of_line_is_explained_once() -> None:

@@ -130,8 +130,9 @@ def _title(test: "CircleTest") -> str:
     first = test.results[0]
     servo = "ideal drive" if first.ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(one.period_us) for one, run in zip(test.results, test.runs, strict=True) if run is None]
-    without = f"; not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
-    return f"{fill(test.profile.name, _NAME_WIDTH)}\n{fill(f'circle test, {servo}{without}', _TITLE_WIDTH)}"
+    without = f"not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
+    lines = (fill(line, _TITLE_WIDTH) for line in (f"circle test, {servo}", without) if line)
+    return "\n".join((fill(test.profile.name, _NAME_WIDTH), *lines))
 
 
 def _legend(figure: "Figure", *, columns: int) -> None:
