@@ -151,7 +151,8 @@ def test_a_circle_that_fails_asks_for_another_period(make: Make) -> None:
     def circle(profile: Profile) -> tuple[str, ...]:
         return () if profile.cycle.period_us == 1300.0 else ("too rough",)
 
-    result = plan(make(cycle__period_us=1000.0), circle=circle)
+    round_enough = {"max_contour_error_mm": 0.1}
+    result = plan(make(cycle__period_us=1000.0, tolerance=round_enough), circle=circle)
     best = result.recommended
     assert best is not None
     assert best.changes == {"cycle.period_us": 1300.0}
@@ -168,7 +169,7 @@ def test_the_circle_is_not_run_where_the_bus_does_not_fit(make: Make) -> None:
         assert figures(profile, model="standard").verdict == FITS
         return ()
 
-    result = plan(make(cycle__period_us=200.0), circle=circle)
+    result = plan(make(cycle__period_us=200.0, tolerance={"max_contour_error_mm": 0.1}), circle=circle)
     assert result.options[0].circle_passed is None
     assert result.recommended is not None
     assert result.recommended.circle_passed

@@ -8,8 +8,8 @@ import pytest
 from busplan.analysis.planning.options import plan
 from busplan.answers.plan import plan_document, plan_records, plan_report, settings
 from busplan.forms import render
-from busplan.forms.blocks import Report, ShownValue, Table, TableRow, Words, values_in
-from busplan.forms.columns import cell_text
+from busplan.forms.blocks import Report, Sentence, ShownValue, Table, TableRow, Words, values_in
+from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
 from busplan.profile.shipped import load
@@ -160,3 +160,12 @@ def test_data_holds_the_contract(paper: Profile) -> None:
     assert recommended["changes"] == document["recommended_changes"] == {"bus.nodes": 4, "bus.gap_count": 10}
     assert recommended["circle_passed"] is None
     assert to_csv(plan_records(result)).splitlines()[2].startswith("best gap count,bus.nodes=4 bus.gap_count=10,true,")
+
+
+def test_a_circle_without_a_tolerance_is_not_said_to_pass() -> None:
+    goal = override(load("paper-4ms").profile, {"circle.radius_mm": 25.0, "tolerance": {}})
+    plan_ = plan(goal, circle=lambda _: ())
+    said = next(block for block in plan_report(plan_, with_circle=True).blocks() if isinstance(block, Sentence))
+    assert sentence_text(said).endswith(", and its circle is not judged.")
+    assert {option.circle_passed for option in plan_.options} == {None}
+    assert {option["circle_passed"] for option in plan_report(plan_, with_circle=True).document()["options"]} == {None}

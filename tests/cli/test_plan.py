@@ -191,6 +191,7 @@ def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: lis
 
 def test_the_circle_is_asked_for_and_can_be_left_out(busplan: Run, tmp_path: Path) -> None:
     circle = "[servo]\nposition_gain_per_s = 50\n[circle]\nradius_mm = 20\nfeed_mm_per_min = 3000\nramp_periods = 20\n"
+    circle += "[tolerance]\nmax_contour_error_mm = 0.1\n"
     (tmp_path / "mine.toml").write_text(PROFILE + circle, encoding="utf-8")
     run = busplan("mine.toml", "--format", "json", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")

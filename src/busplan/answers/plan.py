@@ -94,6 +94,8 @@ def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
             f"is shown to fit{safe}{circle}{_why_none(plan)}."
         )
         return Sentence((*subject, none), "fails")
+    if with_circle and not plan.goal.tolerance.judges_contour:
+        circle = ", and its circle is not judged"
     number = plan.options.index(option)
     margin, doubt = option_margin(option, at=f"/options/{number}")
     result = ("fits with a margin of ", margin, " +/- ", doubt, f"{circle}.")

@@ -38,7 +38,9 @@ def options_table(plan: Plan) -> Table:
 
 def _row(option: Option, *, at: str) -> TableRow:
     passed = option.circle_passed
-    circle = MISSING if passed is None else Words("passes", "passes") if passed else Words("FAILS", "fails")
+    circle: Cell = MISSING if option.circle_failures is None else "not judged"
+    if passed is not None:
+        circle = Words("passes", "passes") if passed else Words("FAILS", "fails")
     cells: tuple[Cell, ...] = (
         option.title,
         "*" * option.recommended + "?" * (not option.proven),

@@ -8,6 +8,7 @@ from typing import Final
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.rules.finding import Subject
+from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError
 
@@ -31,7 +32,7 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
     most_steps
         Most simulated steps of each axis: a longer circle is not run.
     """
-    from busplan.analysis.circle.failures import CONTOUR_MEASURES, STABILITY
+    from busplan.analysis.circle.failures import STABILITY
     from busplan.analysis.circle.roundness import circle_test, to_attack
     from busplan.analysis.circle.setup import path_steps
 

@@ -208,6 +208,10 @@ class CircleSection(Section):
     )
 
 
+CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
+"""Measures of roundness that have a tolerance, in the order of the checks."""
+
+
 class ToleranceSection(Section):
     """Section [tolerance]: what the circle test must hold. A contour tolerance that is left out is not checked."""
 
@@ -230,3 +234,8 @@ class ToleranceSection(Section):
     min_gain_margin_db: Annotated[float, Field(ge=0, le=200, allow_inf_nan=False)] = Field(
         default=6.0, description="Smallest gain margin of the position loop [dB]", examples=[6]
     )
+
+    @property
+    def judges_contour(self) -> bool:
+        """Whether it says how round the circle must be."""
+        return any(getattr(self, name) is not None for name in CONTOUR_MEASURES)

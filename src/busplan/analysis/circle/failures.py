@@ -9,11 +9,10 @@ from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.network import bus_of, network_of
+from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, LONGEST_SETTLING_US, CircleRun
 
-CONTOUR_MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
-"""Measures of roundness that have a tolerance, in the order of the checks."""
 MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
 """Least margins of the loop by key, with their unit; they have defaults, so that they are always asked for."""
 STABILITY: Final = ("stability", *MARGINS)
@@ -227,14 +226,3 @@ def _contour_failures(profile: Profile, run: CircleRun) -> Iterator[Failure]:
         limit, value = getattr(profile.tolerance, name), getattr(run.contour, name)
         if limit is not None and (value is None or value > limit):
             yield Failure(name, value, limit)
-
-
-def is_judged(profile: Profile) -> bool:
-    """Whether the profile says how round its circle must be.
-
-    Parameters
-    ----------
-    profile
-        The network and its tolerances.
-    """
-    return any(getattr(profile.tolerance, name) is not None for name in CONTOUR_MEASURES)

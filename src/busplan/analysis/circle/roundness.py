@@ -11,16 +11,15 @@ from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.circle.contributions import Contribution, Setup, contributions, sources
 from busplan.analysis.circle.estimate import announce, estimate
 from busplan.analysis.circle.failures import (
-    CONTOUR_MEASURES,
     Failure,
     bus_failures,
     circle_failures,
-    is_judged,
     tightest_margins,
 )
 from busplan.analysis.circle.setup import bus, loop_delays_us, loop_timing, path_setpoints, setup
 from busplan.profile.toml import override
 from busplan.progress import Progress
+from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import CircleRun, simulate_circle
 from busplan.servo.parameters import LoopTiming
@@ -289,7 +288,7 @@ def _figures(
         radius_deviation_mm=round_.radius_deviation_mm if round_ else None,
         centre_offset_mm=round_.centre_offset_mm if round_ else None,
         constant_speed_deg=run.constant_speed_deg if run else None,
-        passed=False if failures else True if is_judged(profile) else None,
+        passed=False if failures else True if profile.tolerance.judges_contour else None,
         failures=failures,
         contributions=None,
     )

@@ -6,9 +6,9 @@ from typing import Any, Final
 from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
-from busplan.analysis.circle.failures import CONTOUR_MEASURES
 from busplan.analysis.network import bus_of
 from busplan.sections.base import Section
+from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import parameters
 from busplan.servo.circle import REST_MM, check_circle, settling_time_us

@@ -7,7 +7,6 @@ a figure is one step that names its method, and its inputs are all inputs of tha
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from busplan.analysis.circle.failures import CONTOUR_MEASURES
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
@@ -15,7 +14,7 @@ from busplan.analysis.derivation.inputs import traced
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, found
 from busplan.progress import Progress
-from busplan.sections.machine import AxisKeys
+from busplan.sections.machine import CONTOUR_MEASURES, AxisKeys
 from busplan.sections.profile import Profile
 
 _GIVEN: Final = {

@@ -49,7 +49,9 @@ class Option(NamedTuple):
 
     @property
     def circle_passed(self) -> bool | None:
-        """Whether the circle holds its tolerances; None if it was not run."""
+        """Whether the circle holds its tolerances; None if it was not run, or holds what always judges and has none."""
+        if not self.circle_failures and not self.profile.tolerance.judges_contour:
+            return None
         return None if self.circle_failures is None else not self.circle_failures
 
     @property
