@@ -15,13 +15,13 @@ from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.timing import Phases, TimingModelName
-from busplan.buses.network import TRANSACTION_KINDS, TransactionKind
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement, parse_measurements
 from busplan.profile.shipped import load, locate_measurements
 from busplan.profile.toml import override
 from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, capacity, figures
 from busplan.analysis.capacity.node_limit import largest_nodes
-from busplan.analysis.network import model_names
+from busplan.analysis.network import model_names, network_of
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
 from busplan.sections.profile import Profile
 
@@ -25,7 +25,7 @@ MODELS = st.sampled_from(sorted(TIMING_MODELS))
 def brute_force(profile: Profile, model: str, exact: Exact, start: Start) -> int:
     """Largest number of nodes by trying each, in exact arithmetic."""
     limit = {"S100": 512, "S200": 1024, "S400": 2048}[profile.bus.speed]
-    if max(profile.payload.read_bytes, profile.payload.write_bytes) > limit:
+    if network_of(profile).largest_payload_bytes > limit:
         return 0
     available = Fraction(profile.cycle.slice_ratio) * Fraction(profile.cycle.period_us)
     answer = 0

@@ -14,7 +14,6 @@ from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
 from busplan.answers.capacity import capacity_records
 from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
 from busplan.answers.sweep.top import Tally, TopRows, sweep_report
-from busplan.buses import kind_named
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.forms import html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue, Table, values_in
@@ -132,35 +131,54 @@ def test_without_a_sort_the_top_rows_are_the_first() -> None:
     assert [row.record["timing_model"] for row in kept.kept] == ["paper", "standard", "paper"]
 
 
+def named(name: str) -> Profile:
+    return load("paper-4ms").profile.model_copy(update={"name": name})
+
+
 def test_the_summary_counts_points_under_each_model() -> None:
-    tally = Tally(kind_named("ieee1394"), BOTH)
+    grid = checked_grid(named("p"), AXES, with_circle=False)
+    tally = Tally(named("p"), grid, BOTH)
     for block in blocks(4):
         tally.add(block)
     pairs = [capacity(profile, timing_models=BOTH).results for _, profile in points()]
     by_hand = (sum(paper.fits for paper, _ in pairs), sum(standard.verdict == "fits" for _, standard in pairs))
     assert by_hand[1] <= sum(standard.fits for _, standard in pairs) < by_hand[0] < 18
     unsafe = sum(not capacity(profile).results[0].gap_count_safe for _, profile in points())
-    lines = [sentence_text(one) for one in tally.sentences("p", expected=18)]
+    lines = [sentence_text(one) for one in tally.sentences()]
     assert lines[0] == (
         f"p: 18 points; {by_hand[0]} fit by the closed form of the paper model, {by_hand[1]} shown to fit "
         "(standard model)."
     )
     assert (len(lines) == 2) == (unsafe > 0)
-    stopped = next(tally.sentences("p", expected=2000))
-    assert "18 points of 2,000 (interrupted)" in sentence_text(stopped)
+    partial = Tally(named("p"), grid, BOTH)
+    partial.add(blocks(5)[0])
+    stopped = next(partial.sentences())
+    assert "3 points of 18 (interrupted)" in sentence_text(stopped)
     # Only the whole grid's number is in the document.
-    assert [(value.value, value.at) for value in values_in(stopped)][:2] == [(18, ""), (2000, "/points")]
+    assert [(value.value, value.at) for value in values_in(stopped)][:2] == [(3, ""), (18, "/points")]
 
 
 def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, {"bus.gap_count": Steps(0, 1, 1, 64)}, with_circle=False)
-    tally = Tally(kind_named("ieee1394"), BOTH)
+    tally = Tally(profile, grid, BOTH)
     for block in sweep(profile, grid, timing_models=BOTH):
         tally.add(block)
     # Two hops need 7: 0 to 6 are unsafe.
-    *_, last = tally.sentences("p", expected=64)
+    *_, last = tally.sentences()
     assert (sentence_text(last), last.state) == ("At 7 points the gap count is unsafe (gap_count_safe).", "warns")
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_a_payload_that_the_axes_do_not_change_is_said_to_be_so(follows: bool) -> None:
+    own = override(named("p"), {"payload.read_bytes_per_axis": 8} if follows else {})
+    tally = Tally(own, checked_grid(own, {"node.axes": Steps(1, 1, 1, 3)}, with_circle=False), BOTH)
+    said = [sentence_text(one) for one in tally.sentences()]
+    words = (
+        "The payload does not depend on the axes of a node: payload.read_bytes_per_axis and "
+        "payload.write_bytes_per_axis say what each adds."
+    )
+    assert (words in said) is not follows
 
 
 COLUMNS = ("bus.gap_count", "timing_model", "margin_us", "utilisation", "exceeded", "fits", "phase_margin_deg")
@@ -170,7 +188,8 @@ def reported(*, sort_by: str | None = None, top: int = 7) -> Report:
     """The answer with a circle's figure that does not exist."""
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, AXES, with_circle=False)
-    tally, rows = Tally(kind_named("ieee1394"), BOTH), TopRows(COLUMNS, sort_by=sort_by, ascending=True, top=top)
+    tally = Tally(named("<b>p|q"), grid, BOTH)
+    rows = TopRows(COLUMNS, sort_by=sort_by, ascending=True, top=top)
     parts = []
     for block in blocks():
         missing = Column(np.full(block.chunk.shape, np.nan))
@@ -179,7 +198,7 @@ def reported(*, sort_by: str | None = None, top: int = 7) -> Report:
         rows.add(parts[-1])
     text = "".join(json_rows(part, COLUMNS) for part in parts)
     text = json_header(profile.name, grid, BOTH) + text + json_footer(complete=True)
-    return sweep_report(rows, tally, name="<b>p|q", expected=18, document=lambda: json.loads(text))
+    return sweep_report(rows, tally, document=lambda: json.loads(text))
 
 
 @pytest.mark.parametrize("sort_by", [None, "margin_us"])

@@ -11,6 +11,7 @@ from busplan.errors import BusplanError
 from busplan.sections.base import with_unchecked
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 
 class Transaction(NamedTuple):
@@ -89,7 +90,10 @@ def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float]:
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:
     """Return a copy with the payload of both read and write replaced [bytes], unvalidated."""
-    return with_unchecked(with_unchecked(profile, "payload.read_bytes", size_bytes), "payload.write_bytes", size_bytes)
+    for kind in TRANSACTION_KINDS:
+        profile = with_unchecked(profile, f"payload.{kind}_bytes", size_bytes)
+        profile = with_unchecked(profile, f"payload.{kind}_bytes_per_axis", None)
+    return profile
 
 
 def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:

@@ -5,6 +5,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
 from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 
 def bus_of(profile: Profile) -> Bus:
@@ -22,12 +23,13 @@ def network_of(profile: Profile) -> Network:
     """
     payload, node, cycle = profile.payload, profile.node, profile.cycle
     execution = node.execution
-    read_us, write_us = execution.execution_us(payload.read_bytes), execution.execution_us(payload.write_bytes)
+    read_bytes, write_bytes = (payload.bytes_of(kind, axes=node.axes) for kind in TRANSACTION_KINDS)
+    read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     group = Group(
         nodes=profile.bus.nodes,
         axes=node.axes,
-        read_bytes=payload.read_bytes,
-        write_bytes=payload.write_bytes,
+        read_bytes=read_bytes,
+        write_bytes=write_bytes,
         read_execution_us=read_us,
         write_execution_us=write_us,
         worst_extra_us=execution.worst_extra_us,

@@ -108,9 +108,9 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
     """Say what to check before using these figures."""
     if result.outliers:
         yield _outliers(result)
-    execution, payload = result.execution, result.profile.payload
+    execution, (group,) = result.execution, network_of(result.profile).groups
     if isinstance(execution, TableExecution):
-        outside = [size for size in (payload.read_bytes, payload.write_bytes) if not execution.covers(size)]
+        outside = [int(size) for size in (group.read_bytes, group.write_bytes) if not execution.covers(int(size))]
         for size in dict.fromkeys(outside):
             yield sentence(
                 f"the profile's payload of {{}} is outside the table, {execution.range_bytes}: measure it, or use "

@@ -27,6 +27,7 @@ from busplan.forms.blocks import (
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns, period_value
 from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 
 def plan_report(plan: Plan, *, with_circle: bool) -> Report:
@@ -177,8 +178,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "period_us": one.period_us,
         "slice_ratio": profile.cycle.slice_ratio,
         **{key: getattr(one, key) for key in bus_of(profile).planned_figures},
-        "read_bytes": profile.payload.read_bytes,
-        "write_bytes": profile.payload.write_bytes,
+        **{f"{kind}_bytes": profile.payload.bytes_of(kind, axes=profile.node.axes) for kind in TRANSACTION_KINDS},
     }
 
 

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from busplan.analysis.network import bus_of
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Column, SweepBlock
@@ -89,13 +88,11 @@ class SweepAnswer(Answer):
         circle = [name for name in CIRCLE_COLUMNS if name in self.columns]
         shown = dict.fromkeys((*self.grid.axes, "timing_model", *DEFAULT_COLUMNS, *circle))
         top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
-        tally = Tally(bus_of(self.profile), self.timing_models)
+        tally = Tally(self.profile, self.grid, self.timing_models)
         for block in self.blocks:
             top.add(block)
             tally.add(block)
-        return sweep_report(
-            top, tally, name=self.profile.name, expected=self.grid.points, document=lambda: json.loads(self.to_json())
-        )
+        return sweep_report(top, tally, document=lambda: json.loads(self.to_json()))
 
 
 def _rows(block: SweepBlock, name: str) -> Array:

@@ -1,12 +1,9 @@
 """What a cycle is computed from: groups of nodes, the period, and the kind's own keys."""
 
 from functools import reduce
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from busplan.elementwise import Number, larger, total
-
-TransactionKind = Literal["read", "write"]
-TRANSACTION_KINDS: Final[tuple[TransactionKind, ...]] = ("read", "write")
 
 
 class Group(NamedTuple):

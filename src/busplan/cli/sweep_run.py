@@ -37,14 +37,14 @@ def run_sweep(job: "SweepJob") -> None:
     StoppedError
         Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
-    from busplan.analysis.network import bus_of
     from busplan.answers.sweep.top import Tally
     from busplan.forms.columns import sentence_text
 
     drawing = _drawing(job)
     if job.jobs is not None:
         _require_circles(job)
-    tally, expected = Tally(bus_of(job.profile), job.timing_models), job.grid.points
+    tally = Tally(job.profile, job.grid, job.timing_models)
+    expected = tally.expected
     with ExitStack() as stack:
         with signals_noted() as noted:
             # Opened before the work, so that a path that cannot be written fails at once.
@@ -56,7 +56,7 @@ def run_sweep(job: "SweepJob") -> None:
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.form not in TOP_FORMS or file is not None:
-            say(*map(sentence_text, tally.sentences(job.profile.name, expected=expected)))
+            say(*map(sentence_text, tally.sentences()))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
             say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")

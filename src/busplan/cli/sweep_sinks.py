@@ -56,8 +56,7 @@ class _TopSink:
         """Write the answer."""
         from busplan.answers.sweep.top import sweep_report
 
-        name, expected = self._job.profile.name, self._job.grid.points
-        report = sweep_report(self._rows, self._tally, name=name, expected=expected, document=_not_kept)
+        report = sweep_report(self._rows, self._tally, document=_not_kept)
         if self._file is None:
             give(report, self._form)
         else:

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 from typing import Final, NamedTuple
 
-from busplan.buses.network import TRANSACTION_KINDS, TransactionKind
 from busplan.errors import PlacedError, PlacedProblem, ProblemKind
 from busplan.profile.document import text_of
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 MAX_MEASUREMENTS_BYTES: Final = 20_000_000
 """About a million measurements; a larger file is something else."""

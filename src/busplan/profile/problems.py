@@ -83,7 +83,8 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
         path, section = _path(details["loc"], model)
         if details["type"] == "busplan":
             for problem in details["ctx"]["problems"]:
-                yield KeyFinding(_parsed(problem.key) if problem.key else path, problem.message, problem.kind)
+                own = _parsed(problem.key) if problem.key else path
+                yield KeyFinding(own, problem.message, problem.kind, shows_value=problem.kind != "missing-key")
         elif details["type"] == "missing":
             yield KeyFinding(path, _missing(path, section), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
@@ -156,8 +157,10 @@ def _expected(details: ErrorDetails) -> str:
 def _missing(path: KeyPath, section: type[BaseModel]) -> str:
     field = section.model_fields[str(path[-1])]
     if not field.examples:
-        needed = [name for name, one in models_of(field.annotation)[-1].model_fields.items() if one.is_required()]
-        return f"missing section [{'.'.join(map(str, path))}]; it needs {', '.join(needed)}"
+        known = models_of(field.annotation)[-1].model_fields
+        needed = [name for name, one in known.items() if one.is_required()]
+        keys = f"it needs {', '.join(needed)}" if needed else f"it has {', '.join(known)}"
+        return f"missing section [{'.'.join(map(str, path))}]; {keys}"
     return f"missing key. {field.description}; for example {path[-1]} = {value_text(field.examples[0])}"
 
 

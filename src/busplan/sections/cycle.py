@@ -4,12 +4,14 @@ A kind of bus adds its own keys in a class of its own. The limits of its standar
 breaks them loads, and the analysis says why it does not fit.
 """
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Section, TimeUs
+from busplan.elementwise import Number
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
 from busplan.sections.execution import Execution
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 SliceRatio = Annotated[
     float,
@@ -55,10 +57,59 @@ class CycleSection(_Extended):
 
 
 class PayloadSection(_Extended):
-    """Section [payload]: what is read from and written to each node in a cycle."""
+    """Section [payload]: what is read from and written to each node in a cycle, fixed and for each of its axes."""
 
-    read_bytes: Count = Field(description="Payload of the read transaction [bytes]", examples=[12])
-    write_bytes: Count = Field(description="Payload of the write transaction [bytes]", examples=[12])
+    read_bytes: Count | None = Field(
+        default=None, description="Payload of the read transaction, or its fixed part [bytes]", examples=[12]
+    )
+    write_bytes: Count | None = Field(
+        default=None, description="Payload of the write transaction, or its fixed part [bytes]", examples=[12]
+    )
+    read_bytes_per_axis: Count | None = Field(
+        default=None, description="What each axis of a node adds to the read payload [bytes]", examples=[8]
+    )
+    write_bytes_per_axis: Count | None = Field(
+        default=None, description="What each axis of a node adds to the write payload [bytes]", examples=[8]
+    )
+
+    @model_validator(mode="after")
+    def _is_given(self) -> Self:
+        missing = [
+            Problem(
+                f"missing key; expected {kind}_bytes, {kind}_bytes_per_axis or both",
+                key=f"payload.{kind}_bytes",
+                kind="missing-key",
+            )
+            for kind in TRANSACTION_KINDS
+            if self._parts(kind) == (None, None)
+        ]
+        if missing:
+            raise refused(*missing)
+        return self
+
+    def _parts(self, kind: TransactionKind) -> tuple[Number | None, Number | None]:
+        return getattr(self, f"{kind}_bytes"), getattr(self, f"{kind}_bytes_per_axis")
+
+    def bytes_of(self, kind: TransactionKind, *, axes: Number) -> Number:
+        """Payload of a transaction with a node [bytes].
+
+        Parameters
+        ----------
+        kind
+            "read" or "write".
+        axes
+            Axes of the node; of any sort [1].
+        """
+        fixed, per_axis = self._parts(kind)
+        if per_axis is None:
+            return 0 if fixed is None else fixed
+        share = per_axis * axes
+        return share if fixed is None else fixed + share
+
+    @property
+    def follows_axes(self) -> bool:
+        """Whether more axes mean more bytes."""
+        return any(self._parts(kind)[1] is not None for kind in TRANSACTION_KINDS)
 
 
 class NodeSection(Section):

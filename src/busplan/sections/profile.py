@@ -4,7 +4,7 @@ Models are strict (no text for a number), frozen and closed (an unknown key is r
 for a float.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -15,6 +15,7 @@ from busplan.sections.cycle import BusSection, CycleSection, NodeSection, Payloa
 from busplan.sections.execution import TableExecution
 from busplan.sections.limits import Limits
 from busplan.sections.machine import CircleSection, DeliverySection, MechanicsSection, ServoSection, ToleranceSection
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 SCHEMA_VERSION: Final = 1
 
@@ -74,17 +75,22 @@ class Profile(Section):
         if isinstance(execution, TableExecution):
             unknown = [
                 Problem(
-                    f"is outside the execution table, {execution.range_bytes}: measure it and add it to "
+                    f"{sum_}is outside the execution table, {execution.range_bytes}: measure it and add it to "
                     'node.execution, or use kind = "linear"',
-                    key=f"payload.{key}",
+                    key=key,
                     kind="execution-unknown",
                 )
-                for key, size in (
-                    ("read_bytes", self.payload.read_bytes),
-                    ("write_bytes", self.payload.write_bytes),
-                )
+                for key, size, sum_ in self._payloads()
                 if not execution.covers(size)
             ]
             if unknown:
                 raise refused(*unknown)
         return self
+
+    def _payloads(self) -> Iterator[tuple[str, int, str]]:
+        """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
+        for kind in TRANSACTION_KINDS:
+            key, axes = f"payload.{kind}_bytes", self.node.axes
+            size = int(self.payload.bytes_of(kind, axes=axes))
+            per_axis = getattr(self.payload, f"{kind}_bytes_per_axis") is not None
+            yield (f"{key}_per_axis" if per_axis else key), size, (f"makes {size} bytes, which " if per_axis else "")

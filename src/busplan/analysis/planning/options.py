@@ -273,6 +273,8 @@ class _Planner:
         return self.fitting(title, {"cycle.slice_ratio": ratio}, bounded_by="time")
 
     def payload(self, title: str) -> Option | Impossible:
+        if self.goal.payload.follows_axes:
+            return Impossible(title, "the payload follows the axes of a node")
         size, bounded_by = largest_payload(self.goal)
         if not size:
             reason = (

@@ -8,8 +8,9 @@ import numpy as np
 
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
-from busplan.analysis.sweep.grid import Array
+from busplan.analysis.sweep.grid import Array, Grid
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure, by_key
 from busplan.forms.blocks import (
@@ -28,6 +29,7 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.numbers import nouns
+from busplan.sections.profile import Profile
 
 DEFAULT_COLUMNS: Final = (
     "required_us",
@@ -50,15 +52,20 @@ class Tally:
 
     Parameters
     ----------
-    bus
-        The kind of bus.
+    profile
+        The network.
+    grid
+        Values of its keys.
     timing_models
         The timing models, in the order of the rows of a point.
     """
 
-    def __init__(self, bus: Bus, timing_models: Sequence[str]) -> None:
+    def __init__(self, profile: Profile, grid: Grid, timing_models: Sequence[str]) -> None:
         self.points = 0
-        self.bus = bus
+        self.profile = profile
+        self.expected = grid.points
+        self.bus = bus_of(profile)
+        self._varied = frozenset(grid.axes)
         self._models = timing_models
         self._fits = [0] * len(timing_models)
         self._unsafe = 0
@@ -86,20 +93,12 @@ class Tally:
             before = self._passed or [0] * len(passed)
             self._passed = [old + new for old, new in zip(before, passed, strict=True)]
 
-    def sentences(self, name: str, *, expected: int) -> Iterator[Sentence]:
-        """Summary of the counts.
-
-        Parameters
-        ----------
-        name
-            Name of the profile.
-        expected
-            Points of the whole grid.
-        """
-        whole = count_value(expected, "points", at="/points", grouped=True)
-        found = whole if self.points == expected else count_value(self.points, grouped=True)
-        cut = Sentence(()) if self.points == expected else sentence(" of {} (interrupted)", whole)
-        head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(name), found)
+    def sentences(self) -> Iterator[Sentence]:
+        """Summary of the counts."""
+        whole = count_value(self.expected, "points", at="/points", grouped=True)
+        found = whole if self.points == self.expected else count_value(self.points, grouped=True)
+        cut = Sentence(()) if self.points == self.expected else sentence(" of {} (interrupted)", whole)
+        head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(self.profile.name), found)
         yield joined(head, cut, Sentence(("; ",)), self._fitting(), Sentence((".",)), by="")
         if self._passed is not None:
             yield joined(
@@ -108,6 +107,9 @@ class Tally:
                 Sentence((".",)),
                 by="",
             )
+        if "node.axes" in self._varied and not self.profile.payload.follows_axes:
+            keys = Code("payload.read_bytes_per_axis"), Code("payload.write_bytes_per_axis")
+            yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
         safety = self.bus.safety_figure
         if self._unsafe and safety is not None:
             words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
@@ -197,9 +199,7 @@ class TopRows:
         return f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first"
 
 
-def sweep_report(
-    top: TopRows, tally: Tally, *, name: str, expected: int, document: Callable[[], JsonDocument]
-) -> Report:
+def sweep_report(top: TopRows, tally: Tally, *, document: Callable[[], JsonDocument]) -> Report:
     """Report of `sweep` with its top rows.
 
     Parameters
@@ -208,16 +208,12 @@ def sweep_report(
         The rows to show.
     tally
         Counts of all points.
-    name
-        Name of the profile.
-    expected
-        Points of the whole grid.
     document
         Function that returns the document with all rows.
     """
     return Report(
-        Sentence(("Sweep of ", Code(name))),
-        lambda: (*tally.sentences(name, expected=expected), _shown(top, tally), top_table(top, tally.bus)),
+        Sentence(("Sweep of ", Code(tally.profile.name))),
+        lambda: (*tally.sentences(), _shown(top, tally), top_table(top, tally.bus)),
         document,
         lambda: document()["rows"],
     )

@@ -17,9 +17,10 @@ from busplan.buses.ieee1394.constants import (
 )
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of
-from busplan.buses.network import TRANSACTION_KINDS, Network
+from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, is_off, is_one, larger, named, plain, rounded_down, total
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 _OF_TRANSACTIONS: Final = (
     "cycle_arbitration_us",

@@ -25,8 +25,8 @@ from busplan.buses.ieee1394.constants import (
     padded_bytes,
 )
 from busplan.buses.ieee1394.idle import Answer, Gaps, IdleTime, gaps_added_up, gaps_as_thresholds
-from busplan.buses.network import TransactionKind
 from busplan.elementwise import Number, alike, choose, named, worded
+from busplan.sections.transactions import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
 

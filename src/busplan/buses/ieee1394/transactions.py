@@ -15,8 +15,9 @@ from busplan.buses.ieee1394.timing import (
     TimingModelName,
     transaction,
 )
-from busplan.buses.network import Group, Network, TransactionKind
+from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, SpecialNumber, alike, is_one, named, plain, worded
+from busplan.sections.transactions import TransactionKind
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.idle import Answer

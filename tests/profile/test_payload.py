@@ -1,0 +1,122 @@
+"""Payloads of a node: a fixed part, a part for each of its axes, or both."""
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from busplan.analysis.capacity.figures import capacity, figures
+from busplan.analysis.derivation.explain import explain
+from busplan.analysis.latency import latency
+from busplan.analysis.network import network_of
+from busplan.analysis.planning.options import plan
+from busplan.analysis.sweep.blocks import sweep
+from busplan.analysis.sweep.grid import Steps, checked_grid
+from busplan.errors import PlacedError
+from busplan.profile.shipped import load
+from busplan.profile.toml import decode, override, validate
+from busplan.sections.profile import Profile
+
+TEXT = """schema_version = 1
+name = "gantry"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+gap_count = 63
+nodes = 2
+[cycle]
+period_us = 4000
+[payload]
+{payload}
+[node]
+axes = 4
+[node.execution]
+{execution}
+"""
+LINE = 'kind = "linear"\nbase_us = 20\nper_byte_us = 0.1'
+
+
+def profile(payload: str, execution: str = LINE) -> Profile:
+    return validate(decode(TEXT.format(payload=payload, execution=execution).encode(), name="gantry.toml"))
+
+
+def refused(payload: str, execution: str = LINE) -> list[str]:
+    with pytest.raises(PlacedError) as caught:
+        profile(payload, execution)
+    return list(caught.value.problems)
+
+
+def figures_of(one: Profile) -> Any:
+    return capacity(one).results, latency(one).transactions
+
+
+@given(fixed=st.integers(0, 60), per_axis=st.integers(1, 30), axes=st.integers(1, 12))
+def test_what_each_axis_adds_is_as_if_it_stood_in_the_payload(fixed: int, per_axis: int, axes: int) -> None:
+    added = f"read_bytes_per_axis = {per_axis}\nwrite_bytes_per_axis = {per_axis}"
+    if fixed:
+        added += f"\nread_bytes = {fixed}\nwrite_bytes = {fixed}"
+    size = fixed + per_axis * axes
+    alike = (profile(added), profile(f"read_bytes = {size}\nwrite_bytes = {size}"))
+    first, second = (override(one, {"node.axes": axes}) for one in alike)
+    assert figures_of(first) == figures_of(second)
+
+
+def test_the_packet_limit_follows_the_axes() -> None:
+    own = profile("read_bytes = 12\nwrite_bytes = 8\nwrite_bytes_per_axis = 20")
+    # S400 carries 2,048 bytes: 8 + 102 x 20 is the last that fits.
+    last, over = (figures(override(own, {"node.axes": axes}), model="standard") for axes in (102, 103))
+    assert "payload" not in last.exceeded
+    assert "payload" in over.exceeded
+
+
+def test_a_payload_needs_one_of_both_keys() -> None:
+    assert refused("read_bytes_per_axis = 8") == [
+        "gantry.toml:10:2: payload.write_bytes: missing key; expected write_bytes, write_bytes_per_axis or both"
+    ]
+    assert "payload.read_bytes: missing key" in refused("")[0]
+    for wrong in ("0", "-1", "1.5", "true"):
+        assert "payload.read_bytes_per_axis = " in refused(f"read_bytes_per_axis = {wrong}\nwrite_bytes = 4")[0]
+
+
+def test_a_table_must_hold_what_all_axes_make() -> None:
+    table = 'kind = "table"\npayload_bytes = [4, 16]\ntime_us = [36.7, 36.3]'
+    assert profile("read_bytes_per_axis = 4\nwrite_bytes = 4", table)
+    (message,) = refused("read_bytes_per_axis = 5\nwrite_bytes = 4", table)
+    assert "payload.read_bytes_per_axis = 5: makes 20 bytes, which is outside the execution table, 4 to 16" in message
+
+
+def test_a_sweep_over_the_axes_is_what_each_profile_gives() -> None:
+    own = profile("read_bytes = 4\nread_bytes_per_axis = 8\nwrite_bytes_per_axis = 6")
+    grid = checked_grid(own, {"node.axes": Steps(1, 1, 1, 6)}, with_circle=False)
+    (block,) = sweep(own, grid, timing_models=("standard",))
+    swept = block.rows("required_us").tolist()
+    assert swept == [figures(override(own, {"node.axes": n}), model="standard").required_us for n in range(1, 7)]
+    assert len(set(swept)) == 6
+
+
+def test_explain_starts_from_the_payload_of_an_axis() -> None:
+    own = profile("read_bytes_per_axis = 8\nwrite_bytes = 12")
+    (one,) = explain(own, "required_us").derivations
+    names = {given.name for given in one.inputs}
+    assert {"payload.read_bytes_per_axis", "payload.write_bytes", "node.axes"} <= names
+    assert "payload.read_bytes" not in names
+    assert "node.axes" not in {
+        given.name for given in explain(load("paper-4ms").profile, "required_us").derivations[0].inputs
+    }
+
+
+def test_a_plan_leaves_a_payload_alone_that_follows_the_axes() -> None:
+    own = profile("read_bytes_per_axis = 8\nwrite_bytes_per_axis = 8")
+    (why,) = [one.reason for one in plan(own).impossible if one.title == "largest payload"]
+    assert why == "the payload follows the axes of a node"
+    assert not any("payload" in key for option in plan(own).options for key in option.changes)
+
+
+def test_another_payload_in_latency_is_the_whole_of_it() -> None:
+    own = profile("read_bytes_per_axis = 8\nwrite_bytes_per_axis = 8")
+    group = network_of(own).groups[0]
+    assert (group.read_bytes, group.write_bytes) == (32, 32)
+    asked = latency(own, payloads_bytes=[12]).transactions
+    plain = latency(profile("read_bytes = 12\nwrite_bytes = 12")).transactions
+    assert asked == plain
