@@ -215,7 +215,7 @@ def test_a_key_of_the_other_form_of_execution_is_unknown() -> None:
     "key",
     [
         *("name", "schema_version", "bus", "bus__kind", "bus__speed", "bus__nodes", "cycle", "cycle__period_us"),
-        *("payload", "payload__read_bytes", "payload__write_bytes", "node", "node__axes", "node__execution"),
+        *("payload", "node", "node__axes", "node__execution"),
         *("node__execution__base_us", "node__execution__per_byte_us"),
     ],
 )
