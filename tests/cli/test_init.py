@@ -2,7 +2,12 @@
 
 import errno
 import os
+import pty
+import re
+import select
 import stat
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -29,16 +34,77 @@ def name_in(path: Path) -> object:
 # --- as a process -----------------------------------------------------------------------------------------
 
 
-def test_init_writes_a_commented_profile_that_the_next_command_takes(run: Run, tmp_path: Path) -> None:
+GANTRY = ("--nodes", "6", "--axes", "24", "--period", "1ms", "--bytes-per-axis", "8")
+
+
+def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tmp_path: Path) -> None:
+    done = run("init", "gantry", *GANTRY, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "")
+    wrote, verdict, following = done.stderr.splitlines()
+    assert wrote == "wrote gantry.toml"
+    assert following == "next: busplan capacity gantry.toml"
+    assert list(files(tmp_path)) == ["gantry.toml"]
+    own = run("capacity", "gantry.toml", cwd=tmp_path)
+    assert own.stdout.splitlines()[0].startswith(verdict)
+    data = tomllib.loads((tmp_path / "gantry.toml").read_text(encoding="utf-8"))
+    assert (data["bus"]["nodes"], data["node"]["axes"], data["cycle"]["period_us"]) == (6, 4, 1000)
+    assert (data["payload"]["read_bytes_per_axis"], data["payload"]["write_bytes_per_axis"]) == (8, 8)
+    assert (data["limits"]["reserve"], data["circle"]["path"]) == (0.15, "iso230-4")
+    # Nobody invented how round its circle must be.
+    assert "tolerance" not in data
+    assert (data["node"]["execution"]["grade"], data["servo"]["grade"]) == ("assumed", "assumed")
+
+
+def test_a_profile_of_ones_own_is_neutral_and_no_command_stumbles_over_it(run: Run, tmp_path: Path) -> None:
+    run("init", "gantry", *GANTRY, cwd=tmp_path)
+    text = (tmp_path / "gantry.toml").read_text(encoding="utf-8")
+    assert "paper" not in text.lower()
+    assert "section" not in text
+    # Every number says that it is assumed, or is one that was asked for.
+    for line in text.splitlines():
+        if re.match(r"[a-z_]+ = ", line) and not re.match(
+            "(schema_version|name|description|nodes|period_us|axes)", line
+        ):
+            assert re.search("#|per_axis|grade|kind|reserve|radius|feed", line), line
+    checked = run("check", "gantry.toml", cwd=tmp_path)
+    assert (checked.returncode, sorted(set(re.findall("BP[0-9]+", checked.stdout)))) == (0, ["BP112", "BP113"])
+    circle = run("circle-test", "gantry.toml", cwd=tmp_path)
+    assert circle.returncode == 0
+    assert "NOT JUDGED" in circle.stdout
+    assert "The servo values behind these figures are assumed." in circle.stdout
+
+
+def test_init_takes_defaults_where_nobody_can_be_asked_and_says_them(run: Run, tmp_path: Path) -> None:
     done = run("init", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "wrote my-machine.toml; next: busplan capacity my-machine.toml\n"
-    assert list(files(tmp_path)) == ["my-machine.toml"]
-    text = (tmp_path / "my-machine.toml").read_text(encoding="utf-8")
-    assert text.count("#") >= 5
-    shipped = run("capacity", "paper-4ms")
-    own = run("capacity", "my-machine.toml", cwd=tmp_path)
-    assert own.stdout == shipped.stdout.replace("paper-4ms", "my-machine")
+    taken = "not given, so taken: --nodes 4 --axes 16 --period 1ms --bytes-per-axis 8"
+    assert done.stderr.splitlines()[:2] == [taken, "wrote my-machine.toml"]
+    some = run("init", "other", "--nodes", "3", "--period", "850us", cwd=tmp_path)
+    assert some.stderr.startswith("not given, so taken: --axes 12 --bytes-per-axis 8\n")
+    # The step of the simulation divides any period.
+    assert run("circle-test", "other.toml", cwd=tmp_path).returncode == 0
+
+
+def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
+    leader, follower = pty.openpty()
+    command = [sys.executable, "-m", "busplan", "init", "asked", "--axes", "10"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdin=follower, stdout=follower, stderr=follower)
+    os.close(follower)
+    said = ""
+    # A prompt ends in its default; what is no number is asked for again.
+    for answer in ("many", "0", "5", "", "12"):
+        while not said.rstrip().endswith("]:"):
+            assert select.select([leader], [], [], 30)[0]
+            said += os.read(leader, 10_000).decode()
+        said += "<"
+        os.write(leader, f"{answer}\n".encode())
+    assert process.wait(timeout=30) == 0
+    os.close(leader)
+    assert said.count("Nodes, the host not counted [4]") == 3
+    assert "must be 1 or more" in said
+    assert "Axes of all nodes" not in said
+    data = tomllib.loads((tmp_path / "asked.toml").read_text(encoding="utf-8"))
+    assert (data["bus"]["nodes"], data["node"]["axes"], data["payload"]["read_bytes_per_axis"]) == (5, 2, 12)
 
 
 def test_init_starts_from_the_shipped_profile_that_is_asked_for(run: Run, tmp_path: Path) -> None:
@@ -46,7 +112,9 @@ def test_init_starts_from_the_shipped_profile_that_is_asked_for(run: Run, tmp_pa
     done = run("init", "sub/press.toml", "--from", "paper-dma", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, "")
     assert name_in(tmp_path / "sub" / "press.toml") == "press"
-    assert "assumption" in (tmp_path / "sub" / "press.toml").read_text(encoding="utf-8")
+    text = (tmp_path / "sub" / "press.toml").read_text(encoding="utf-8")
+    assert text.startswith("# A copy of the shipped profile paper-dma: its values stay those until you change them.\n")
+    assert "assumption" in text
 
 
 @pytest.mark.parametrize("shipped", ["paper-4ms", "paper-dma"])
@@ -78,6 +146,14 @@ def test_init_overwrites_with_force_only(run: Run, refused: Refused, tmp_path: P
     ("arguments", "said"),
     [
         (("init", "x", "--from", "nope"), "--from nope: no shipped profile; shipped are paper-1ms, paper-4ms"),
+        (
+            ("init", "x", "--nodes", "6", "--axes", "25"),
+            "--axes 25: no multiple of --nodes 6, and all nodes of a profile",
+        ),
+        (("init", "x", "--nodes", "6", "--axes", "2"), "--axes 2: no multiple of --nodes 6"),
+        (("init", "x", "--period", "0us"), "--period 0us: must be between 0.001 and 1e+09 us"),
+        (("init", "x", "--period", "soon"), "--period soon: expected a time with its unit"),
+        (("init", "x", "--from", "paper-1ms", "--axes", "8"), "--from: goes without --axes: a copy has the values"),
         (("init", "a\nb"), r"'a\nb': no name for a profile; expected 1 to 100 printable characters"),
         (("init", "\x1b[31m"), r"'\x1b[31m': no name for a profile"),
         (("init", "x" * 101), "'xxx"),

@@ -190,7 +190,9 @@ def test_messages_of_a_file_call_it_as_it_was_called(work: Path) -> None:
 def test_a_starter_differs_from_its_source_in_the_name_and_in_what_the_gate_was_told(source: str, name: str) -> None:
     text = starter_text(source, name=name)
     source_text = text_of(source).removeprefix(SCHEMA_LINE)
-    changed = [line for line in difflib.ndiff(source_text.splitlines(), text.splitlines()) if line[:1] in "+-"]
+    copied, _, text_below = text.partition("\n")
+    assert copied == f"# A copy of the shipped profile {source}: its values stay those until you change them."
+    changed = [line for line in difflib.ndiff(source_text.splitlines(), text_below.splitlines()) if line[:1] in "+-"]
     # A new profile measures a whole turn; the shipped ones have the paper's move.
     turn = [line for line in changed if line.startswith('+ path = "iso230-4" ')]
     changed = [line for line in changed if line not in turn]

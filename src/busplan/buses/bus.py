@@ -273,6 +273,8 @@ class Bus(ABC):
     """In the order in which they are reported; at least one grows with the nodes."""
     limits_of: ClassVar[str] = "bus"
     """Who sets them, as a message says it."""
+    starter: ClassVar[str] = ""
+    """Section [bus] of a new profile, as TOML without its nodes."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""

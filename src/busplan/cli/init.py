@@ -1,14 +1,23 @@
 """`busplan init`."""
 
 import shlex
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from busplan.cli.options import complete_profile
+from busplan.cli.options import complete_profile, time_us
 from busplan.cli.output import say, write_file
 from busplan.errors import BusplanError
+
+if TYPE_CHECKING:
+    from busplan.profile.starter import Machine
+
+_NODES = 4
+_AXES_PER_NODE = 4
+_PERIOD = "1ms"
+_BYTES_PER_AXIS = 8
 
 
 def init_command(
@@ -16,30 +25,114 @@ def init_command(
         str,
         typer.Argument(help="Name of the new profile, or the path of its file; .toml is added where it is missing."),
     ] = "my-machine",
+    nodes: Annotated[
+        int | None,
+        typer.Option("--nodes", metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]"),
+    ] = None,
+    axes: Annotated[
+        int | None,
+        typer.Option(
+            "--axes", metavar="N", min=1, help="Axes of the whole machine, alike on each node.  [default: 4 a node]"
+        ),
+    ] = None,
+    period: Annotated[
+        str | None,
+        typer.Option(
+            "--period", metavar="TIME", help="Communication period with its unit, as 1ms or 500us.  [default: 1ms]"
+        ),
+    ] = None,
+    bytes_per_axis: Annotated[
+        int | None,
+        typer.Option(
+            "--bytes-per-axis",
+            metavar="N",
+            min=1,
+            help="Payload of each axis, in either direction [bytes].  [default: 8]",
+        ),
+    ] = None,
     source: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--from",
             metavar="SHIPPED",
-            help="Name of the shipped profile to start from (see `busplan profiles`).",
+            help="Copy a shipped profile instead, with its comments (see `busplan profiles`).",
             autocompletion=complete_profile,
         ),
-    ] = "paper-4ms",
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is already there.")] = False,
 ) -> None:
-    """Write a commented starter profile into the working directory.
+    """Write a commented profile of your machine, and say whether it fits.
 
-    It is the shipped profile of --from under a name of its own, with its comments: edit it, then run `busplan capacity`
-    on it. Exits 0 when the file is written; a file that is already there stays as it is, unless --force is given.
+    What is not known yet is assumed, graded so, and has a comment that says how to find it. In a terminal the command
+    asks for what is missing; otherwise it takes the defaults and says them. With --from it copies a shipped profile
+    under a name of its own. Exits 0 when the file is written, whatever the verdict is; a file that is already there
+    stays as it is, unless --force is given.
 
-    Example: busplan init press-line --from paper-1ms
+    Example: busplan init gantry --nodes 6 --axes 24 --period 1ms --bytes-per-axis 8
     """
-    from busplan.profile.starter import starter_text
-
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if not path.name.removesuffix(".toml").strip("."):
         raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
-    write_file(path, starter_text(source, name=path.stem).encode(), overwrite=force)
     # A name that begins with a dash would be an option.
-    shown = f"./{path}" if str(path).startswith("-") else str(path)
-    say(f"wrote {path}; next: busplan capacity {shlex.quote(shown)}")
+    shown = shlex.quote(f"./{path}" if str(path).startswith("-") else str(path))
+    asked = {"--nodes": nodes, "--axes": axes, "--period": period, "--bytes-per-axis": bytes_per_axis}
+    from busplan.profile.starter import machine_text, starter_text
+
+    if source is None:
+        machine, taken = _machine(nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis)
+        text = machine_text(machine, name=path.stem, file=shown)
+    else:
+        given = [option for option, value in asked.items() if value is not None]
+        if given:
+            raise BusplanError(f"--from: goes without {' and '.join(given)}: a copy has the values of its profile")
+        text, taken = starter_text(source, name=path.stem), []
+    write_file(path, text.encode(), overwrite=force)
+    defaults = [f"not given, so taken: {' '.join(taken)}"] if taken else []
+    say(*defaults, f"wrote {path}", *_verdict(text), f"next: busplan capacity {shown}")
+
+
+def _machine(
+    *, nodes: int | None, axes: int | None, period: str | None, bytes_per_axis: int | None
+) -> "tuple[Machine, list[str]]":
+    """Take what is given, ask for the rest in a terminal, and take defaults elsewhere, which come second."""
+    from busplan.profile.starter import Machine
+    from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+
+    asks = sys.stdin.isatty() and sys.stderr.isatty()
+    taken: list[str] = []
+
+    def number(given: int | None, option: str, words: str, default: int) -> int:
+        if given is not None:
+            return given
+        while asks:
+            answer = int(typer.prompt(words, default=default, type=int, err=True))
+            if answer > 0:
+                return answer
+            say("must be 1 or more")
+        taken.append(f"{option} {default}")
+        return default
+
+    count = number(nodes, "--nodes", "Nodes, the host not counted", _NODES)
+    total = number(axes, "--axes", "Axes of all nodes", _AXES_PER_NODE * count)
+    if period is None and asks:
+        period = str(typer.prompt("Communication period, with its unit", default=_PERIOD, err=True))
+    if period is None:
+        taken.append(f"--period {_PERIOD}")
+    period_us = time_us(period or _PERIOD, option="--period")
+    if not MIN_STEP_US <= period_us <= MAX_TIME_US:
+        raise BusplanError(f"--period {period}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
+    size = number(bytes_per_axis, "--bytes-per-axis", "Bytes for each axis, in either direction", _BYTES_PER_AXIS)
+    return Machine(count, total, period_us, size), taken
+
+
+def _verdict(text: str) -> list[str]:
+    """The verdict of a new profile, in sentences."""
+    from busplan.analysis.capacity.figures import capacity
+    from busplan.analysis.capacity.verdict import verdicts
+    from busplan.answers.verdict import verdict_sentences
+    from busplan.forms.columns import sentence_text
+    from busplan.profile.toml import decode, validate
+
+    profile = validate(decode(text.encode(), name="profile"))
+    headline, *_ = verdict_sentences(verdicts(capacity(profile))[0], profile)
+    return [sentence_text(headline)]

@@ -1,8 +1,10 @@
-"""A new profile from a shipped one, with its comments and layout."""
+"""A new profile: of a machine of one's own, or from a shipped one with its comments and layout."""
 
 import re
-from typing import Final
+from math import ceil
+from typing import Final, NamedTuple
 
+from busplan.buses import kind_named
 from busplan.errors import BusplanError
 from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
@@ -13,6 +15,122 @@ _TURN: Final = (
     'path = "iso230-4"          # one whole turn is measured, behind a lead-in; the paper has a "trapezoid"\n'
 )
 _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ignore\[.*", re.MULTILINE)
+
+
+_LONGEST_STEP_US: Final = 100.0
+"""Longest position-loop period of a new profile."""
+_MACHINE: Final = """\
+schema_version = 1
+name = {name}
+description = "{nodes} nodes, {axes} axes, {period} us, {bytes} bytes an axis each way: assumed until somebody measures"
+
+{bus}
+nodes = {nodes}                  # the host is not counted
+
+[cycle]
+period_us = {period}
+slice_ratio = 0.8          # assumed: the share of the period for communication; the rest is for the host's own work
+
+[payload]                  # assumed: see the register map of the nodes; a fixed part is read_bytes, write_bytes
+read_bytes_per_axis = {bytes}    # as position and status of an axis
+write_bytes_per_axis = {bytes}   # as set-point and control word of an axis
+
+[node]
+axes = {axes_per_node}
+
+[node.execution]           # measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv --apply
+kind = "linear"
+grade = "assumed"
+base_us = 20               # assumed: time in a node between a request and its response
+per_byte_us = 0.1          # assumed: what each byte adds
+
+[limits]
+reserve = 0.15             # share of the slice that must stay free for a plan to fit
+
+[servo]                    # take the values from the drives' commissioning, then grade them "measured"
+grade = "assumed"
+loop = "node"              # assumed: where the position loop is closed; "host" needs servo.update
+interpolation = "linear"   # assumed: what a node does between set-points
+step_us = {step}              # assumed: period of the position loop; it divides cycle.period_us
+position_gain_per_s = 50   # assumed: the Kv factor of the drives, 1/s; 1 m/min per mm is 16.7
+velocity_feedforward = 1   # assumed
+drive_lag_us = 1000        # assumed: time constant of the velocity loop, from its step response
+
+[circle]                   # the test circle of a ballbar
+path = "iso230-4"          # one whole turn is measured, behind a lead-in
+radius_mm = 100
+feed_mm_per_min = 3000
+
+# How round must it be? Without a tolerance the circle is not judged. From the drawing or ISO 230-4, for example:
+# [tolerance]
+# circular_deviation_mm = 0.02
+"""
+
+
+class Machine(NamedTuple):
+    """What a new profile starts from."""
+
+    nodes: int
+    axes: int
+    """Of all nodes."""
+    period_us: float
+    bytes_per_axis: int
+    """Payload of each axis, in either direction."""
+
+
+def machine_text(machine: Machine, *, name: str, file: str) -> str:
+    """Text of a profile of a machine that nobody has measured; every value that rests on nothing says so.
+
+    Parameters
+    ----------
+    machine
+        Nodes, axes, period and payload.
+    name
+        Name of the profile.
+    file
+        Its file, as a command line takes it.
+
+    Raises
+    ------
+    BusplanError
+        The axes cannot be shared out evenly, or an invalid name.
+    """
+    per_node, rest = divmod(machine.axes, machine.nodes)
+    if rest or not per_node:
+        even = [count * machine.nodes for count in (per_node, per_node + 1) if count]
+        raise BusplanError(
+            f"--axes {machine.axes}: no multiple of --nodes {machine.nodes}, and all nodes of a profile have the same "
+            f"axes; {' or '.join(map(str, even))} would be right"
+        )
+    step_us = machine.period_us / ceil(machine.period_us / _LONGEST_STEP_US)
+    text = _MACHINE.format(
+        name=value_text(name),
+        file=file,
+        bus=kind_named(STARTER_KIND).starter,
+        nodes=machine.nodes,
+        axes=machine.axes,
+        axes_per_node=per_node,
+        period=value_text(_whole(machine.period_us)),
+        bytes=machine.bytes_per_axis,
+        step=value_text(_whole(step_us)),
+    )
+    return _checked(text, name=name)
+
+
+STARTER_KIND: Final = "ieee1394"
+"""Kind of bus of a new profile."""
+
+
+def _whole(value: float) -> float:
+    return int(value) if value.is_integer() else value
+
+
+def _checked(text: str, *, name: str) -> str:
+    try:
+        validate(decode(text.encode(), name=name))
+    except (BusplanError, UnicodeEncodeError):  # UnicodeEncodeError: a file name that is not UTF-8
+        raise BusplanError(f"{name!r}: no name for a profile; expected 1 to 100 printable characters") from None
+    return text
 
 
 def starter_text(source: str, *, name: str) -> str:
@@ -40,8 +158,6 @@ def starter_text(source: str, *, name: str) -> str:
     text = before + value_text(name) + _CIRCLE.sub(rf"\1{_TURN}", _SUPPRESSION.sub("", after))
     # The path to the schema is valid only in the shipped folder.
     text = text.removeprefix("#:schema ./busplan.schema.json\n")
-    try:
-        validate(decode(text.encode(), name=source))
-    except (BusplanError, UnicodeEncodeError):  # UnicodeEncodeError: a file name that is not UTF-8
-        raise BusplanError(f"{name!r}: no name for a profile; expected 1 to 100 printable characters") from None
-    return text
+    return _checked(
+        f"# A copy of the shipped profile {source}: its values stay those until you change them.\n{text}", name=name
+    )

@@ -106,6 +106,10 @@ class PayloadSection(_Extended):
         share = per_axis * axes
         return share if fixed is None else fixed + share
 
+    def key_of(self, kind: TransactionKind) -> str:
+        """The dotted key that a payload is changed by first: what each axis adds, where it adds something."""
+        return f"payload.{kind}_bytes" if self._parts(kind)[1] is None else f"payload.{kind}_bytes_per_axis"
+
     @property
     def follows_axes(self) -> bool:
         """Whether more axes mean more bytes."""

@@ -90,7 +90,5 @@ class Profile(Section):
     def _payloads(self) -> Iterator[tuple[str, int, str]]:
         """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
         for kind in TRANSACTION_KINDS:
-            key, axes = f"payload.{kind}_bytes", self.node.axes
-            size = int(self.payload.bytes_of(kind, axes=axes))
-            per_axis = getattr(self.payload, f"{kind}_bytes_per_axis") is not None
-            yield (f"{key}_per_axis" if per_axis else key), size, (f"makes {size} bytes, which " if per_axis else "")
+            key, size = self.payload.key_of(kind), int(self.payload.bytes_of(kind, axes=self.node.axes))
+            yield key, size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")

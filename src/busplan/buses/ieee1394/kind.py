@@ -28,6 +28,7 @@ from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
+from busplan.sections.transactions import TRANSACTION_KINDS
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -65,6 +66,11 @@ class Ieee1394(Bus):
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     limits_of = "standard"
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    starter = """\
+[bus]
+kind = "ieee1394"
+speed = "S400"             # assumed: the slowest port on the way decides, S100, S200 or S400
+gap_count = "optimal"      # assumed: the smallest safe one; the bus manager must write it, until then it is 63"""
     command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     event_kinds = (
         EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
@@ -256,8 +262,16 @@ def _payload_repairs(network: Network) -> dict[str, Value]:
     if faster:
         return {"bus.speed": faster[0]}
     payload, most = network.profile.payload, int(MAX_PAYLOAD_BYTES[network.profile.bus.speed])
-    keys = ("read_bytes", "write_bytes")
-    return {f"payload.{key}": most for key in keys if getattr(payload, key) > most}
+    axes = network.profile.node.axes
+    repairs: dict[str, int] = {}
+    for kind in TRANSACTION_KINDS:
+        over = payload.bytes_of(kind, axes=axes) - most
+        if over > 0:
+            key = payload.key_of(kind)
+            each = axes if key.endswith("_per_axis") else 1
+            repairs[key] = getattr(payload, key.partition(".")[2]) - -(-over // each)
+    # A payload needs a byte; where nothing is left of it, it must be shared out.
+    return {**repairs} if all(value > 0 for value in repairs.values()) else {}
 
 
 BUS: Final = Ieee1394()

@@ -13,6 +13,7 @@ from busplan.buses.ieee1394.constants import (
     padded_bytes,
 )
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, microseconds, overrun
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Bus
@@ -88,9 +89,9 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
-    payload = subject.profile.payload
-    for key in ("read_bytes", "write_bytes"):
-        yield f"payload.{key}", getattr(payload, key)
+    payload, axes = subject.profile.payload, subject.profile.node.axes
+    for kind in TRANSACTION_KINDS:
+        yield payload.key_of(kind), int(payload.bytes_of(kind, axes=axes))
 
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
