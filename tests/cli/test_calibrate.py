@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from busplan.profile.shipped import load, locate
+from busplan.profile.shipped import load, locate, locate_measurements
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
@@ -88,20 +88,22 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
     run = busplan("calibrate", "bench.toml", "m.csv", "--timing", "standard", "--robust", "--apply", cwd=bench.parent)
     assert (run.returncode, run.stderr[:36]) == (0, "wrote [node.execution] of bench.toml")
     note = (
-        "# busplan calibrate: table (median) of 7 measurements in m.csv, packets by the standard model, rms residual "
+        "# busplan calibrate: table (median) of 6 measurements in m.csv, 1 outlier left out, packets by the "
+        "standard model, rms residual "
     )
     after = bench.read_text()
     old, new = before.splitlines(), after.splitlines()
     at = next(index for index, line in enumerate(new) if line.startswith(note))
     start = old.index("[node.execution]") + 1
-    # The note stands above the comments of the section, and all of them stay.
-    assert new[:at] + new[at + 1 : start + 1] == old[:start]
-    assert new[start + 1 :][:2] == [
+    # The note takes the place of the two lines that say where the old values are from.
+    assert new[:at] + new[at + 1 : start - 1] == [*old[: start - 3], old[start - 1]]
+    assert "Derived from Table I" in run.stderr
+    assert new[start - 1 :][:2] == [
         'grade = "measured"',
         'kind = "table"             # or "linear": base_us, per_byte_us',
     ]
     # Half of 0.5, 0.5 and 1 us off the median: 1.4826 * 0.5 us, whatever the outlier.
-    assert [new[start + 3], *new[start + 5 :]] == [
+    assert [new[start + 1], *new[start + 3 :]] == [
         "payload_bytes = [4, 64, 256]",
         *("uncertainty_us = 0.741", 'residual = "standard"', "measured_gap_count = 63"),
     ]
@@ -138,7 +140,7 @@ def test_apply_from_a_table_to_a_line_and_back(busplan: Run, bench: Path) -> Non
     fitted = {"residual", "measured_gap_count", "uncertainty_us"}
     assert set(execution) == {"grade", "kind", "base_us", "per_byte_us", *fitted}
     # The timing model that decides, whatever leads the tables of the profile.
-    assert "in <stdin>, packets by the standard model" in bench.read_text()
+    assert "in <stdin>, 1 outlier left out, packets by the standard model" in bench.read_text()
     content = bench.read_bytes()
     assert content.startswith(b"\xef\xbb\xbf")
     assert content.count(b"\n") == content.count(b"\r\n")
@@ -176,14 +178,36 @@ def test_a_new_fit_leaves_nothing_of_the_one_before(busplan: Run, bench: Path) -
     assert (execution["grade"], execution["residual"], execution["measured_gap_count"]) == ("derived", "none", 63)
 
 
-def test_a_comment_of_a_key_that_goes_is_kept_on_a_line_of_its_own(busplan: Run, bench: Path) -> None:
+def test_a_comment_of_a_key_that_goes_is_kept_but_for_its_origin(busplan: Run, bench: Path) -> None:
     text = bench.read_text().replace("payload_bytes = [4, 16", "payload_bytes = [  # from the bench\n4, # least\n16")
     assert "# from the bench" in text
     bench.write_text(text.replace("426.7]", "426.7]  # by Li"))
     run = busplan("calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply", cwd=bench.parent)
-    assert (run.returncode, run.stderr) == (0, "wrote [node.execution] of bench.toml; every comment of yours is kept\n")
+    assert run.returncode == 0
+    assert "; the new comment on their origin replaces 4 lines: # Derived from Table I, row by row: " in run.stderr
+    assert run.stderr.endswith(" # from the bench # by Li\n")
     lines = bench.read_text().splitlines()
-    assert {"# from the bench", "# least", "# by Li"} <= set(lines)
+    assert "# least" in lines
+    assert not {"# from the bench", "# by Li"} & set(lines)
+
+
+def test_an_outlier_is_no_entry_and_every_form_of_answer_says_so(busplan: Run, bench: Path) -> None:
+    wild = locate_measurements("table-1.csv").path.read_text(encoding="utf-8").replace("64,68.1", "64,200.0")
+    (bench.parent / "wild.csv").write_text(wild, encoding="utf-8")
+    run = busplan("calibrate", "bench.toml", "wild.csv", "--apply", "--format", "json", cwd=bench.parent)
+    document = json.loads(run.stdout)
+    (outlier,) = document["outliers"]
+    assert (outlier["line"], round(outlier["off_us"]), document["outliers_kept"]) == (8, 128, False)
+    assert [one["left_out"] for one in document["payloads"]] == [0, 0, 0, 1, 0, 0, 0, 0]
+    assert "in wild.csv, 1 outlier left out, T1+T2 as measured" in bench.read_text()
+    assert 64 not in load(str(bench)).document.data()["node"]["execution"]["payload_bytes"]
+    rows = csv.DictReader(
+        busplan("calibrate", "bench.toml", "wild.csv", "--format", "csv", cwd=bench.parent).stdout.splitlines()
+    )
+    assert [row["left_out"] for row in rows] == list("00010000")
+    busplan("calibrate", "bench.toml", "wild.csv", "--apply", "--keep-outliers", cwd=bench.parent)
+    assert "in wild.csv, 1 outlier kept, T1+T2 as measured" in bench.read_text()
+    assert load(str(bench)).profile.node.execution.grade == "assumed"
 
 
 def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan: Run, bench: Path) -> None:
@@ -196,7 +220,9 @@ def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan
     assert (run.returncode, run.stdout) == (2, "")
     first, note, header, *lines = run.stderr.splitlines()
     assert first.endswith(", so that it stays as it is; change these lines by hand:")
-    assert note.startswith("# busplan calibrate: linear (least squares) of 7 measurements in m.csv, ")
+    assert note.startswith(
+        "# busplan calibrate: linear (least squares) of 6 measurements in m.csv, 1 outlier left out, "
+    )
     assert header == "[node.execution]"
     assert [line.partition(" = ")[0] for line in lines] == [
         *("kind", "grade", "uncertainty_us", "base_us", "per_byte_us", "residual", "measured_gap_count"),
@@ -251,6 +277,6 @@ def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run,
         in run.stdout
     )
     assert (
-        "Warning: 1 outlier, more than 3.5 robust standard deviations off: line 7; with a pull on this fit"
+        "Warning: 1 outlier: line 7 (400 us at 256 bytes: T_exec +239.5 us off what the others say); left out "
         in run.stdout
     )

@@ -371,13 +371,13 @@ def test_what_is_no_value_never_reaches_the_text() -> None:
 
 
 def test_a_note_stands_above_and_takes_the_place_of_the_last_one() -> None:
-    notes = {"bus": "plan: by hand", "node.execution": "plan: T_exec"}
+    notes = {"bus": "plan: own", "node.execution": "plan: T_exec"}
     once = edited(PLAIN, {}, notes=notes)
-    assert once == PLAIN.replace("# the bus", "# plan: by hand\n# the bus").replace(
+    assert once == PLAIN.replace("# the bus", "# plan: own\n# the bus").replace(
         "  [node.e", "  # plan: T_exec\n  [node.e"
-    )
+    ).replace("     # by hand", "")
     again = edited(once, {}, notes={"bus": "plan: again\nand\x1b"})
-    assert again == once.replace("plan: by hand", "plan: again\\nand\\x1b")
+    assert again == once.replace("plan: own", "plan: again\\nand\\x1b")
     with pytest.raises(BusplanError, match=r"there is no line \[payload\], .*\n# a\n\[payload\]$"):
         edited(PLAIN, {}, notes={"payload": "a"})
 
@@ -410,3 +410,40 @@ def test_a_new_profile_can_be_edited() -> None:
     new = edited(text, {"bus.nodes": 3, "bus.gap_count": 10, "node.axes": 2})
     changed = [line for line in new.splitlines() if line not in text.splitlines()]
     assert [line.partition(" #")[0].rstrip() for line in changed] == ["gap_count = 10", "nodes = 3", "axes = 2"]
+
+
+ORIGINS = """
+[node]
+axes = 1
+# max_hops = 3, from the drawing
+
+# Measured on the bench, 2019;
+# nothing of it is published.
+# busplan: ignore[BP401] measured again in May
+# The section's heading
+# and its rest.
+[node.execution]
+grade = "measured"         # by Li
+# the same bench
+# as that of May, taken from bench.csv
+kind = "table"             # or "linear": from base_us
+payload_bytes = [4, 64]    # least and largest
+# derived: Table I
+time_us = [30, 40]         # busplan: ignore[BP401] from the bench
+worst_extra_us = 3.1       # measured, section IV
+"""
+
+
+def test_a_note_replaces_what_says_where_the_old_values_are_from_and_nothing_else() -> None:
+    text = PLAIN[: PLAIN.index("[node")].rstrip(" ") + ORIGINS
+    once = edited(text, {"node.execution.time_us": [30, 41]}, notes={"node.execution": "busplan plan: new"})
+    gone = {"# Measured on the bench, 2019;", "# nothing of it is published.", "# derived: Table I"}
+    expected = [line for line in text.replace("[30, 40]", "[30, 41]").splitlines() if line not in gone]
+    expected = [line.removesuffix("         # by Li") for line in expected]
+    expected.insert(expected.index("# busplan: ignore[BP401] measured again in May"), "# busplan plan: new")
+    assert once.splitlines() == expected
+    assert edited(once, {}, notes={"node.execution": "busplan plan: new"}) == once
+    heading = text.replace("# Measured on the bench, 2019;\n# nothing of it is published.\n", "# Section\n")
+    noted = edited(heading, {}, notes={"node.execution": "busplan plan: new"})
+    assert "# busplan plan: new\n# Section\n" in noted
+    assert edited(noted, {}, notes={"node.execution": "busplan plan: new"}) == noted

@@ -34,6 +34,7 @@ SECTION: Final = "node.execution"
 _COLUMNS: Final = {
     "payload_bytes": TableColumn("payload", "bytes"),
     "measurements": TableColumn("n"),
+    "left_out": TableColumn("left out"),
     "latency_us": TableColumn("T_lant", "us"),
     "packets_us": TableColumn("packets", "us"),
     "execution_us": TableColumn("T_exec", "us"),
@@ -73,9 +74,16 @@ def provenance(result: Calibration, *, source: str) -> str:
     taken = "T1+T2 as measured" if result.way == "measured-halves" else f"packets by the {result.timing_model} model"
     return (
         f"busplan calibrate: {result.execution.kind} ({result.method}) of "
-        f"{plural(len(result.residuals), 'measurement')} in {source}, {taken}, "
+        f"{plural(len(result.residuals), 'measurement')} in {source}, {_doubts(result)}{taken}, "
         f"rms residual {with_unit(time_value(result.rms_residual_us, 'rms_residual_us'))}"
     )
+
+
+def _doubts(result: Calibration) -> str:
+    """Outliers and contradictions, for a list in words."""
+    number, pairs = len(result.outliers), len(result.undecided)
+    outliers = f"{plural(number, 'outlier')} {'kept' if result.outliers_kept else 'left out'}, " if number else ""
+    return outliers + (f"{plural(pairs, 'pair')} in contradiction, " if pairs else "")
 
 
 def calibration_report(result: Calibration, *, source: str, applied_to: str | None) -> Report:
@@ -101,7 +109,7 @@ def calibration_report(result: Calibration, *, source: str, applied_to: str | No
 
 def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     """The fit in sentences, the figures by payload, and the section for the profile."""
-    measurements, sizes = len(result.residuals), len(result.payloads)
+    measurements, sizes = result.measurements, len(result.payloads)
     yield sentence(
         f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
         Code(result.profile.name),
@@ -118,6 +126,8 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
 
 def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
     shown = {**_COLUMNS, **(_MEASURED_COLUMNS if measured else {})}
+    if not any(fit.left_out for fit in payloads):
+        del shown["left_out"]
     rows = (
         TableRow(tuple(_cell(getattr(fit, key), key, f"/payloads/{number}/{key}") for key in shown))
         for number, fit in enumerate(payloads)
@@ -157,13 +167,16 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         form=result.execution.kind,
         method=result.method,
         robust=result.robust,
-        measurements=len(result.residuals),
+        measurements=result.measurements,
         execution=execution_keys(result),
         uncertainty_us=result.uncertainty_us,
         at_most_us=result.at_most_us,
         rms_residual_us=result.rms_residual_us,
         largest_residual=result.largest._asdict(),
         outliers=[one._asdict() for one in result.outliers],
+        outliers_kept=result.outliers_kept,
+        undecided=[[one._asdict() for one in pair] for pair in result.undecided],
+        unchecked_bytes=list(result.unchecked_bytes),
         payloads=calibration_records(result),
         warnings=calibration_warnings(result),
         applied_to=applied_to,

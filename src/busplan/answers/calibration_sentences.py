@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.analysis.calibration.calibrate import OUTLIER_DEVIATIONS, Calibration
+from busplan.analysis.calibration.calibrate import Calibration
+from busplan.analysis.calibration.outliers import PAYLOADS_TO_COMPARE, REPETITIONS_TO_COMPARE
 from busplan.analysis.network import bus_of, network_of
 from busplan.forms.blocks import Sentence, ShownValue, count_value, joined, sentence
 from busplan.forms.numbers import nouns
@@ -28,6 +29,20 @@ def fit_sentences(result: Calibration) -> Iterator[Sentence]:
     yield _form(result)
     yield _residual(result)
     yield from _unexplained(result)
+    if result.unchecked_bytes:
+        yield _unchecked(result)
+
+
+def _unchecked(result: Calibration) -> Sentence:
+    payloads = joined(*(sentence("{}", count_value(size, "payload_bytes")) for size in result.unchecked_bytes), by=", ")
+    return joined(
+        sentence("No outlier can be told at "),
+        payloads,
+        sentence(
+            f" bytes: it takes {REPETITIONS_TO_COMPARE} measurements of a payload, or {PAYLOADS_TO_COMPARE} payloads."
+        ),
+        by="",
+    )
 
 
 def _way(result: Calibration) -> Sentence:
@@ -49,6 +64,8 @@ def _form(result: Calibration) -> Sentence:
     execution = result.execution
     if execution.kind == "linear":
         meaning = "all measurements" if result.method == "least squares" else "the median at each payload"
+        if result.outliers and not result.outliers_kept:
+            meaning += ", without the outliers"
         return sentence(
             f"Line: {{}} + {{}} * payload, by {result.method} through {meaning}.",
             ShownValue(execution.base_us, "base_us", "us", digits=_LINE_DIGITS, at="/execution/base_us"),
@@ -108,6 +125,7 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
     """Say what to check before using these figures."""
     if result.outliers:
         yield _outliers(result)
+    yield from _undecided(result)
     execution, (group,) = result.execution, network_of(result.profile).groups
     if isinstance(execution, TableExecution):
         outside = [int(size) for size in (group.read_bytes, group.write_bytes) if not execution.covers(int(size))]
@@ -134,18 +152,42 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
 
 def _outliers(result: Calibration) -> Sentence:
     number = len(result.outliers)
-    shown = result.outliers[:_MOST_LINES]
-    lines = [sentence("{}", count_value(one.line, "line", at=f"/outliers/{at}/line")) for at, one in enumerate(shown)]
-    said = joined(
+    shown = [
         sentence(
-            f"{{}} {nouns(number, 'outlier')}, more than {{}} robust standard deviations off: line ",
-            count_value(number),
-            count_value(OUTLIER_DEVIATIONS),
-        ),
-        joined(*lines, by=", "),
-        by="",
-    )
+            "line {} ({} at {}: T_exec {} off what the others say)",
+            count_value(one.line, "line", at=f"/outliers/{at}/line"),
+            ShownValue(one.latency_us, "latency_us", "us", at=f"/outliers/{at}/latency_us"),
+            ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"/outliers/{at}/payload_bytes"),
+            time_value(one.off_us, "off_us", at=f"/outliers/{at}/off_us")._replace(signed=True, decimals=1),
+        )
+        for at, one in enumerate(result.outliers[:_MOST_LINES])
+    ]
+    said = joined(sentence(f"{{}} {nouns(number, 'outlier')}: ", count_value(number)), joined(*shown, by=", "), by="")
     if number > _MOST_LINES:
         said = joined(said, sentence("and {} more", count_value(number - _MOST_LINES)))
-    effect = "no pull on the robust fit" if result.robust else "with a pull on this fit: see --robust"
+    effect = (
+        "in the fit by --keep-outliers, so that the grade is assumed"
+        if result.outliers_kept
+        else "left out of the fit; measure again, or use --keep-outliers where they are real"
+    )
     return joined(said, sentence(f"; {effect}."), by="")
+
+
+def _undecided(result: Calibration) -> Iterator[Sentence]:
+    for at, (one, two) in enumerate(result.undecided[:_MOST_LINES]):
+        yield sentence(
+            "lines {} and {} contradict each other, T_exec {} and {} at {}, and no third measurement says which is "
+            "right: both are in the fit, and the grade is assumed.",
+            *(
+                count_value(each.line, "line", at=f"/undecided/{at}/{side}/line")
+                for side, each in enumerate((one, two))
+            ),
+            *(
+                time_value(each.execution_us, "execution_us", at=f"/undecided/{at}/{side}/execution_us")
+                for side, each in enumerate((one, two))
+            ),
+            ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"/undecided/{at}/0/payload_bytes"),
+        )
+    hidden = len(result.undecided) - _MOST_LINES
+    if hidden > 0:
+        yield sentence(f"{{}} more {nouns(hidden, 'pair')} contradict each other.", count_value(hidden))

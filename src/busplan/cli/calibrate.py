@@ -57,8 +57,15 @@ def calibrate_command(
         bool,
         typer.Option(
             "--robust",
-            help="Let no outlier pull: the median at each payload instead of the mean; the line of Theil and Sen "
-            "through these medians instead of least squares.",
+            help="Let no single measurement pull: the median at each payload instead of the mean; the line of Theil "
+            "and Sen through these medians instead of least squares.",
+        ),
+    ] = False,
+    keep_outliers: Annotated[
+        bool,
+        typer.Option(
+            "--keep-outliers",
+            help="Fit the outliers, too, with the grade assumed. They are left out otherwise, each named by its line.",
         ),
     ] = False,
     changes: KeyChanges = NO_CHANGES,
@@ -66,7 +73,8 @@ def calibrate_command(
         bool,
         typer.Option(
             "--apply",
-            help="Write [node.execution] into PROFILE, a file, with a comment where it is from; the rest stays.",
+            help="Write [node.execution] into PROFILE, a file, with a comment where it is from, which replaces "
+            "comments on the origin of the old values; the rest stays.",
         ),
     ] = False,
     format_: FormatOption = None,
@@ -80,8 +88,9 @@ def calibrate_command(
 
     T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
     where the bench was not as the profile. With a column request_and_acknowledge_us, the measured T1+T2, both halves
-    come from it, and the report shows how far the timing model is from it. Measurements far from the others are named
-    by their line. Times are in us. A report: it exits 0 whatever the figures are.
+    come from it, and the report shows how far the timing model is from it. Measurements that the others contradict
+    are named by their line and left out of the fit, in every form. Times are in us. A report: it exits 0 whatever the
+    figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """
@@ -92,6 +101,8 @@ def calibrate_command(
     with answer(format_, output, inputs=chain(profile_files(profile), _measurements_file(measurements))) as give:
         from busplan.analysis.calibration.calibrate import calibrate
         from busplan.answers import calibration as said
+        from busplan.forms.numbers import plural
+        from busplan.profile.edit import origin_comments
         from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
         from busplan.profile.shipped import load, locate_measurements
         from busplan.profile.toml import override, read_bytes
@@ -106,13 +117,18 @@ def calibrate_command(
             timing_model=None if timing is None else timing_model(timing, bench),
             form=form,
             robust=robust,
+            keep_outliers=keep_outliers,
             # The shipped example has published figures, so the result is derived.
             grade="derived" if shipped else "measured",
         )
         if apply:
             note = said.provenance(result, source=Path(name).name)
             apply_changes(loaded.document, said.execution_changes(result), notes={said.SECTION: note})
-            say(f"wrote [{said.SECTION}] of {profile}; every comment of yours is kept")
+            gone = origin_comments(loaded.document, said.SECTION)
+            kept = "every comment of yours is kept"
+            if gone:
+                kept = f"the new comment on their origin replaces {plural(len(gone), 'line')}: {' '.join(gone)}"
+            say(f"wrote [{said.SECTION}] of {profile}; {kept}")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
 

@@ -8,6 +8,7 @@ import re
 import tomllib
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Any, Final
 
 import tomli_w
@@ -22,6 +23,22 @@ from busplan.profile.write import value_text
 
 _HEADER_END: Final = re.compile(r"[ \t]*\]")
 _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
+
+_ORIGIN: Final = re.compile(
+    r"\b(derived|measur\w*|calibrat\w*|fit|fitted|from|by|table [IVX\d]\w*|paper\w*|bench|assum\w*|estimat\w*|"
+    r"guess\w*|source|data ?sheet|according|published|taken|oscilloscope|\S+\.csv|20\d\d)\b",
+    re.IGNORECASE,
+)
+"""Words of a comment that says where a value is from."""
+_OWN_NOTE: Final = re.compile(r"#\s*busplan \w+: ")
+"""A note of an earlier edit; it belongs to no paragraph of the user."""
+_ENDS_PARAGRAPH: Final = re.compile(r"#(:|\W*$|\s*busplan( \w+)?: |\s*[\w.]+ = )")
+"""A comment that is no prose: a directive, a rule, a suppression, a note, a key that is commented out."""
+_NUMBERS: Final = {
+    *("grade", "base_us", "per_byte_us", "payload_bytes", "time_us"),
+    *("uncertainty_us", "residual", "measured_gap_count"),
+}
+"""Keys whose values a fit gives."""
 
 
 class _LayoutError(Exception):
@@ -44,8 +61,9 @@ def edited_file(
     name
         Name of the file in messages.
     notes
-        One-line comment by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It replaces a
-        comment there with the same beginning, up to the colon.
+        One-line comment by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It says where
+        the section's values are from, and replaces every comment that said so of the old ones (see `origin_comments`),
+        and a comment there with the same beginning, up to the colon.
 
     Returns
     -------
@@ -136,6 +154,8 @@ def _edited(
     document: Document, changed: Mapping[str, str | None], notes: Mapping[str, str], *, wanted: dict[str, str]
 ) -> str:
     """Make the changes one after the other."""
+    for section in notes:
+        document = Document(document.name, _without_origins(document, section))
     for key, text in changed.items():
         path = tuple(key.split("."))
         if text is None:
@@ -181,6 +201,65 @@ def _without(document: Document, path: KeyPath) -> str:
         raise _LayoutError(f"{path[-1]} does not begin a line")
     comments = (text[at : _line_end(text, at)].rstrip() for at in document.comments if start <= at < end)
     return text[:start] + "".join(f"{_indent(text, start)}{one}\n" for one in comments) + text[end:]
+
+
+def origin_comments(document: Document, section: str) -> list[str]:
+    """Comments that say where the values of a section are from, as they stand in the file.
+
+    They are paragraphs above the section's header, and comments above and beside its numbers, that name an origin: a
+    measurement, a fit, a table, a paper, a date. Suppressions, keys that are commented out, and comments on other keys
+    are none.
+    """
+    return [document.text[start:end].strip() for start, end in _origins(document, tuple(section.split(".")))]
+
+
+def _without_origins(document: Document, section: str) -> str:
+    text = document.text
+    for start, end in reversed(_origins(document, tuple(section.split(".")))):
+        line = _line_start(text, start)
+        if text[line:start].strip():
+            text = text[:line] + text[line:start].rstrip() + text[end:]
+        else:
+            text = text[:line] + text[_line_end(text, end) :]
+    return text
+
+
+def _origins(document: Document, table: KeyPath) -> list[tuple[int, int]]:
+    """Start and end of each comment on the origin of a section's values, in the order of the file."""
+    text = document.text
+    whole = {_line_start(text, at): at for at in document.comments if not text[_line_start(text, at) : at].strip()}
+    anchors = [_header(document, table).key_start]
+    anchors += [
+        place.key_start
+        for key, place in document.places.items()
+        if key[:-1] == table and key[-1] in _NUMBERS and place.value_start > place.key_end
+    ]
+    found: set[int] = set()
+    for anchor in anchors:
+        line = _line_start(text, anchor)
+        if anchor != anchors[0]:
+            beside = (at for at in document.comments if line <= at < _line_end(text, anchor))
+            found.update(at for at in beside if _names_origin([text[at : _end(text, at)]]))
+        above: list[int] = []
+        while line and (line := _line_start(text, line - 1)) in whole:
+            above.append(whole[line])
+        for ends, group in groupby(above, lambda at: bool(_ENDS_PARAGRAPH.match(text, at, _end(text, at)))):
+            paragraph = list(group)
+            if ends:
+                found.update(at for at in paragraph if _OWN_NOTE.match(text, at))
+            elif _names_origin([text[at : _end(text, at)] for at in paragraph]):
+                found.update(paragraph)
+    return [(at, _end(text, at)) for at in sorted(found)]
+
+
+def _names_origin(comments: list[str]) -> bool:
+    return any(_ORIGIN.search(one) and not _ENDS_PARAGRAPH.match(one) for one in comments)
+
+
+def _end(text: str, offset: int) -> int:
+    """End of a line, without its line end."""
+    end = text.find("\n", offset)
+    return len(text) if end < 0 else end
 
 
 def _noted(document: Document, table: KeyPath, note: str) -> str:

@@ -1,6 +1,6 @@
 """From measured latencies to the execution time of a node: the inverse of equation (3)."""
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
@@ -8,12 +8,10 @@ from typing import Final, Literal, NamedTuple
 from busplan.analysis.calibration.execution_fit import (
     METHODS,
     ExecutionForm,
-    Groups,
     Method,
     fit_execution,
-    middles,
-    theil_sen,
 )
+from busplan.analysis.calibration.outliers import DEVIATION_PER_MAD, Sample, Screening, screen
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.bus import Halves, Value
 from busplan.elementwise import plain
@@ -24,14 +22,6 @@ from busplan.sections.profile import Profile
 
 Way = Literal["timing-model", "measured-halves"]
 """Source of the two halves that are subtracted from a latency."""
-
-OUTLIER_DEVIATIONS: Final = 3.5
-"""Robust standard deviations from the fit that make an outlier (Iglewicz and Hoaglin)."""
-OUTLIER_SHARE: Final = 0.01
-"""Least distance of an outlier from the fit, as a share of its latency: the steps of a timer are no outliers."""
-_DEVIATION_PER_MAD: Final = 1.4826
-"""Standard deviation of a normal distribution whose median absolute deviation is 1."""
-_FEWEST_FOR_OUTLIERS: Final = 3
 
 _EXACT_DECIMALS: Final = 6
 """A picosecond: smaller residuals are rounding of the subtraction."""
@@ -52,8 +42,28 @@ class Residual(NamedTuple):
     """T_exec minus that of the fit."""
 
 
+class Outlier(NamedTuple):
+    """One measurement that the others contradict, compared with them and with the fit."""
+
+    line: int
+    transaction: str
+    payload_bytes: int
+    latency_us: float
+    packets_us: float
+    execution_us: float
+    residual_us: float | None
+    """T_exec minus that of the fit; None outside a table."""
+    expected_us: float
+    """T_exec that the other measurements say."""
+    off_us: float
+    """`execution_us` minus `expected_us`."""
+
+
 class PayloadFit(NamedTuple):
-    """All measurements of one payload, times in us."""
+    """All measurements of one payload, times in us.
+
+    Times are of those in the fit; where none is, because all were left out, of all.
+    """
 
     payload_bytes: int
     measurements: int
@@ -66,9 +76,9 @@ class PayloadFit(NamedTuple):
     """Standard deviation of T_exec over the repetitions; None for a single measurement."""
     range_us: float
     """Largest minus smallest T_exec of the repetitions."""
-    fitted_us: float
-    """T_exec of the fit."""
-    residual_us: float
+    fitted_us: float | None
+    """T_exec of the fit; None outside a table."""
+    residual_us: float | None
     """`execution_us` minus `fitted_us`."""
     read_less_write_us: float | None
     """T_exec of the reads minus that of the writes, 0 in the timing model; None without both."""
@@ -78,6 +88,8 @@ class PayloadFit(NamedTuple):
     """T1 + T2 of the timing model, (13)."""
     unexplained_us: float | None
     """T1 + T2, measured minus modelled."""
+    left_out: int
+    """Outliers among the measurements that are not in the fit."""
 
 
 class Calibration(NamedTuple):
@@ -89,13 +101,22 @@ class Calibration(NamedTuple):
     way: Way
     method: Method
     execution: LinearExecution | TableExecution
+    measurements: int
+    """Number of all measurements, the outliers among them."""
     residuals: tuple[Residual, ...]
+    """Of the measurements in the fit."""
     payloads: tuple[PayloadFit, ...]
     rms_residual_us: float
     largest: Residual
     """The measurement farthest from the fit."""
-    outliers: tuple[Residual, ...]
-    """Measurements farther from the robust fit than the spread of the others explains."""
+    outliers: tuple[Outlier, ...]
+    """Measurements farther from the others than chance explains."""
+    outliers_kept: bool
+    """Whether the outliers are in the fit, because that was asked for."""
+    undecided: tuple[tuple[Residual, Residual], ...]
+    """Pairs of one payload that contradict each other, and nothing says which is right; both are in the fit."""
+    unchecked_bytes: tuple[int, ...]
+    """Payloads with too few measurements to tell an outlier."""
     uncertainty_us: float | None
     """Standard uncertainty of T_exec, the spread of the measurements about the fit; None where nothing is left over."""
     fit_keys: dict[str, Value]
@@ -114,6 +135,7 @@ def calibrate(
     timing_model: str | None = None,
     form: ExecutionForm | None = None,
     robust: bool = False,
+    keep_outliers: bool = False,
     grade: Literal["measured", "derived"] = "measured",
 ) -> Calibration:
     """Find the execution time of a node from measured latencies.
@@ -139,8 +161,11 @@ def calibrate(
         If True, use the median at each payload, and the Theil-Sen line through these medians: its slope is the median
         of the slopes between any two payloads, its base the median of the remainders. The line has no tuning constant
         and tolerates about 29 % of wrong payloads.
+    keep_outliers
+        If True, outliers are in the fit, too; by default they are left out of it, in every form.
     grade
-        How the execution time is known.
+        How the execution time is known. It is "assumed" where the fit holds an outlier, or a pair that contradict each
+        other: no measurement confirms such a time.
 
     Returns
     -------
@@ -156,31 +181,44 @@ def calibrate(
     References
     ----------
     Paper, equations (3), (13) and (14); Table I. P. K. Sen, "Estimates of the regression coefficient based on
-    Kendall's tau", JASA 63 (1968). B. Iglewicz, D. Hoaglin, "How to Detect and Handle Outliers" (1993).
+    Kendall's tau", JASA 63 (1968). Outliers: `outliers.screen`.
     """
     model = timing_model or bus_of(profile).deciding_model
     halves = _packets(profile, measurements, model)
     way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
-    second_us = _second_halves_us(measurements, halves)
-    raw = [(one, _packets_us(one, halves, second_us)) for one in measurements]
+    raw = _with_packets(measurements, measurements, halves)
     _require_possible(profile, raw, source=source, way=way, model=model)
+    screening = screen(
+        [Sample(one.transaction, one.payload_bytes, one.latency_us, one.latency_us - us) for one, us in raw]
+    )
+    left_out = frozenset() if keep_outliers else frozenset(screening.expected_us)
+    kept = [place for place in range(len(raw)) if place not in left_out]
+    if left_out:
+        # The smallest payload gives T4 + T5 to all others: that of an outlier would stay in them.
+        raw = _with_packets(measurements, [measurements[place] for place in kept], halves)
     groups: defaultdict[int, list[float]] = defaultdict(list)
-    for one, packets_us in raw:
+    for one, packets_us in (raw[place] for place in kept):
         groups[one.payload_bytes].append(one.latency_us - packets_us)
     chosen = form or profile.node.execution.kind
-    fit = fit_execution(groups, chosen, robust=robust, grade=grade, source=source)
-    residuals = _residuals(raw, fit)
+    doubtful = screening.undecided or (keep_outliers and screening.expected_us)
+    fit = fit_execution(groups, chosen, robust=robust, grade="assumed" if doubtful else grade, source=source)
+    compared = _compared(raw, fit)
+    residuals = tuple(_residual(compared[place]) for place in kept)
     return Calibration(
         profile=profile,
         timing_model=model,
         way=way,
         method=METHODS[chosen, robust],
         execution=fit,
+        measurements=len(measurements),
         residuals=residuals,
-        payloads=tuple(_payload_fits(residuals, measurements, halves, fit, robust=robust)),
+        payloads=tuple(_payload_fits(compared, halves, left_out=left_out, robust=robust)),
         rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
         largest=max(residuals, key=lambda one: abs(one.residual_us)),
-        outliers=_outliers(residuals, groups, chosen),
+        outliers=_outliers(compared, screening),
+        outliers_kept=keep_outliers,
+        undecided=tuple((_residual(compared[one]), _residual(compared[two])) for one, two in screening.undecided),
+        unchecked_bytes=screening.unchecked_bytes,
         uncertainty_us=_uncertainty_us(residuals, fit, robust=robust),
         fit_keys=bus_of(profile).fit_keys(network_of(profile), model=model if way == "timing-model" else None),
         at_most_us=max(one.shortest_us for one in halves.values()),
@@ -200,17 +238,28 @@ def _packets(profile: Profile, measurements: Sequence[Measurement], model: str) 
     }
 
 
-def _second_halves_us(measurements: Sequence[Measurement], halves: _Halves) -> dict[tuple[str, int], float]:
+def _with_packets(
+    measurements: Sequence[Measurement], trusted: Sequence[Measurement], halves: _Halves
+) -> list[tuple[Measurement, float]]:
+    """Each measurement with its latency minus T_exec [us]."""
+    second_us = _second_halves_us(measurements, trusted, halves)
+    return [(one, _packets_us(one, halves, second_us)) for one in measurements]
+
+
+def _second_halves_us(
+    measurements: Sequence[Measurement], trusted: Sequence[Measurement], halves: _Halves
+) -> dict[tuple[str, int], float]:
     """T4 + T5 of each transaction and payload whose T1 + T2 was measured [us].
 
-    It is the T1 + T2 of the smallest payload, where the two packets differ least, and what the sizes of the packets
-    change. Two equal halves would charge the payload of a write to its response, too.
+    It is the T1 + T2 of the smallest payload that is trusted, where the two packets differ least, and what the sizes of
+    the packets change. Two equal halves would charge the payload of a write to its response, too.
     """
     found: dict[tuple[str, int], float] = {}
     for kind in {one.transaction for one in measurements}:
         own = [one for one in measurements if one.transaction == kind]
-        smallest = min(one.payload_bytes for one in own)
-        measured_us = [one.request_and_acknowledge_us for one in own if one.payload_bytes == smallest]
+        sure = [one for one in trusted if one.transaction == kind] or own
+        smallest = min(one.payload_bytes for one in sure)
+        measured_us = [one.request_and_acknowledge_us for one in sure if one.payload_bytes == smallest]
         first_us = median(us for us in measured_us if us is not None) if None not in measured_us else 0.0
         for size in {one.payload_bytes for one in own}:
             second, first = halves[kind, size], halves[kind, smallest]
@@ -235,10 +284,16 @@ def _uncertainty_us(
     if free <= 0:
         return None
     if robust:
-        spread_us = _DEVIATION_PER_MAD * median(abs(one.residual_us) for one in residuals)
+        spread_us = DEVIATION_PER_MAD * median(abs(one.residual_us) for one in _telling(residuals, fit))
     else:
         spread_us = (sum(one.residual_us**2 for one in residuals) / free) ** 0.5
     return round(max(spread_us, float(MEASURED_UNCERTAINTY_US)), 3)
+
+
+def _telling(residuals: Sequence[Residual], fit: LinearExecution | TableExecution) -> list[Residual]:
+    """Those that say how far measurements scatter: in a table, not the only one of a payload."""
+    counts = Counter(one.payload_bytes for one in residuals)
+    return [one for one in residuals if isinstance(fit, LinearExecution) or counts[one.payload_bytes] > 1]
 
 
 def _require_possible(
@@ -274,83 +329,106 @@ def _more(source: str, hidden: int) -> list[str]:
     return [f"{source}: and {hidden} more problems"] if hidden > 0 else []
 
 
-def _residuals(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> tuple[Residual, ...]:
-    fitted_us = {size: plain(fit.execution_us(size)) for size in {one.payload_bytes for one, _ in raw}}
+class _Compared(NamedTuple):
+    """One measurement with its T_exec and, where the fit covers its payload, that of the fit [us]."""
+
+    measured: Measurement
+    packets_us: float
+    execution_us: float
+    fitted_us: float | None
+
+    @property
+    def residual_us(self) -> float | None:
+        """T_exec minus that of the fit."""
+        return None if self.fitted_us is None else round(self.execution_us - self.fitted_us, _EXACT_DECIMALS)
+
+
+def _compared(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> list[_Compared]:
+    sizes = {one.payload_bytes for one, _ in raw}
+    fitted_us = {
+        size: plain(fit.execution_us(size)) for size in sizes if isinstance(fit, LinearExecution) or fit.covers(size)
+    }
+    return [
+        _Compared(
+            one, packets_us, round(one.latency_us - packets_us, _EXACT_DECIMALS), fitted_us.get(one.payload_bytes)
+        )
+        for one, packets_us in raw
+    ]
+
+
+def _residual(one: _Compared) -> Residual:
+    """Comparison of a measurement in the fit, which covers it."""
+    measured, residual_us = one.measured, one.residual_us
+    assert residual_us is not None  # noqa: S101 - for mypy: a fit covers its own payloads
+    return Residual(
+        line=measured.line,
+        transaction=measured.transaction,
+        payload_bytes=measured.payload_bytes,
+        latency_us=measured.latency_us,
+        packets_us=one.packets_us,
+        execution_us=one.execution_us,
+        residual_us=residual_us,
+    )
+
+
+def _outliers(compared: Sequence[_Compared], screening: Screening) -> tuple[Outlier, ...]:
     found = []
-    for one, packets_us in raw:
-        execution_us = round(one.latency_us - packets_us, _EXACT_DECIMALS)
+    for place, expected_us in sorted(screening.expected_us.items()):
+        one, us = compared[place], round(expected_us, _EXACT_DECIMALS)
         found.append(
-            Residual(
-                line=one.line,
-                transaction=one.transaction,
-                payload_bytes=one.payload_bytes,
-                latency_us=one.latency_us,
-                packets_us=packets_us,
-                execution_us=execution_us,
-                residual_us=round(execution_us - fitted_us[one.payload_bytes], _EXACT_DECIMALS),
+            Outlier(
+                line=one.measured.line,
+                transaction=one.measured.transaction,
+                payload_bytes=one.measured.payload_bytes,
+                latency_us=one.measured.latency_us,
+                packets_us=one.packets_us,
+                execution_us=one.execution_us,
+                residual_us=one.residual_us,
+                expected_us=us,
+                off_us=round(one.execution_us - us, _EXACT_DECIMALS),
             )
         )
     return tuple(found)
 
 
-def _outliers(residuals: Sequence[Residual], groups: Groups, form: ExecutionForm) -> tuple[Residual, ...]:
-    """Measurements far from the robust fit; the spread is that of the payload (table) or of all payloads (line)."""
-    sturdy_us = middles(groups, robust=True)
-    if form == "linear":
-        base_us, per_byte_us = theil_sen(groups)
-        sturdy_us = {size: base_us + per_byte_us * size for size in groups}
-    pools: defaultdict[int, list[tuple[Residual, float]]] = defaultdict(list)
-    for one in residuals:
-        away_us = abs(one.execution_us - sturdy_us[one.payload_bytes])
-        pools[one.payload_bytes if form == "table" else 0].append((one, away_us))
-    found = []
-    for group in pools.values():
-        deviation_us = _DEVIATION_PER_MAD * median(away_us for _, away_us in group)
-        found += [
-            one
-            for one, away_us in group
-            if len(group) >= _FEWEST_FOR_OUTLIERS
-            and away_us > max(OUTLIER_DEVIATIONS * deviation_us, OUTLIER_SHARE * one.latency_us)
-        ]
-    return tuple(sorted(found))
-
-
 def _payload_fits(
-    residuals: Sequence[Residual],
-    measurements: Sequence[Measurement],
+    compared: Sequence[_Compared],
     halves: _Halves,
-    fit: LinearExecution | TableExecution,
     *,
+    left_out: frozenset[int],
     robust: bool,
 ) -> list[PayloadFit]:
     middle = median if robust else fmean
-    groups: defaultdict[int, list[tuple[Residual, Measurement]]] = defaultdict(list)
-    for one, measured in zip(residuals, measurements, strict=True):
-        groups[one.payload_bytes].append((one, measured))
+    groups: defaultdict[int, list[int]] = defaultdict(list)
+    for place, one in enumerate(compared):
+        groups[one.measured.payload_bytes].append(place)
 
-    def of_payload(size: int, group: Sequence[tuple[Residual, Measurement]]) -> PayloadFit:
-        times_us = [one.execution_us for one, _ in group]
+    def of_payload(size: int, places: Sequence[int]) -> PayloadFit:
+        group = [compared[place] for place in places if place not in left_out] or [compared[one] for one in places]
+        times_us = [one.execution_us for one in group]
         by_kind = {
-            kind: [one.execution_us for one, _ in group if one.transaction == kind] for kind in ("read", "write")
+            kind: [one.execution_us for one in group if one.measured.transaction == kind] for kind in ("read", "write")
         }
-        measured_us = [one.request_and_acknowledge_us for _, one in group if one.request_and_acknowledge_us is not None]
-        fitted_us = plain(fit.execution_us(size))
+        halves_us = (one.measured.request_and_acknowledge_us for one in group)
+        measured_us = [us for us in halves_us if us is not None]
+        fitted_us = group[0].fitted_us
         half_us = middle(measured_us) if measured_us else None
-        model_us = middle([halves[one.transaction, size].request_and_acknowledge_us for one, _ in group])
+        model_us = middle([halves[one.measured.transaction, size].request_and_acknowledge_us for one in group])
         return PayloadFit(
             payload_bytes=size,
-            measurements=len(group),
-            latency_us=middle([one.latency_us for one, _ in group]),
-            packets_us=middle([one.packets_us for one, _ in group]),
+            measurements=len(places),
+            latency_us=middle([one.measured.latency_us for one in group]),
+            packets_us=middle([one.packets_us for one in group]),
             execution_us=middle(times_us),
             deviation_us=stdev(times_us) if len(group) > 1 else None,
             range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),
             fitted_us=fitted_us,
-            residual_us=round(middle(times_us) - fitted_us, _EXACT_DECIMALS),
+            residual_us=None if fitted_us is None else round(middle(times_us) - fitted_us, _EXACT_DECIMALS),
             read_less_write_us=middle(by_kind["read"]) - middle(by_kind["write"]) if all(by_kind.values()) else None,
             request_and_acknowledge_us=half_us,
             model_request_and_acknowledge_us=model_us,
             unexplained_us=None if half_us is None else half_us - model_us,
+            left_out=len(left_out.intersection(places)),
         )
 
     return [of_payload(size, groups[size]) for size in sorted(groups)]

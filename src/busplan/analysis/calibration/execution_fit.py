@@ -27,7 +27,7 @@ _PER_BYTE_DECIMALS: Final = 6
 
 
 def fit_execution(
-    groups: Groups, form: ExecutionForm, *, robust: bool, grade: Literal["measured", "derived"], source: str
+    groups: Groups, form: ExecutionForm, *, robust: bool, grade: Literal["measured", "derived", "assumed"], source: str
 ) -> LinearExecution | TableExecution:
     """Fit an execution time to T_exec by payload, in whole nanoseconds.
 
