@@ -26,6 +26,7 @@ def network_of(profile: Profile) -> Network:
     read_bytes, write_bytes = (payload.bytes_of(kind, axes=node.axes) for kind in TRANSACTION_KINDS)
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     group = Group(
+        node=node,
         nodes=profile.bus.nodes,
         axes=node.axes,
         read_bytes=read_bytes,

@@ -9,6 +9,8 @@ from busplan.elementwise import Number, larger, total
 class Group(NamedTuple):
     """Nodes that are alike. The numbers may be of any sort."""
 
+    node: Any
+    """What the profile says of one of them, of its kind's own model: how it executes and answers."""
     nodes: Number
     """How many [1]."""
     axes: Number
@@ -27,6 +29,18 @@ class Group(NamedTuple):
     """Standard uncertainty of the execution time of a read [us]."""
     write_uncertainty_us: Number = 0.0
     """Standard uncertainty of the execution time of a write [us]."""
+    name: str = ""
+    """Name of the group; empty for the nodes of [node]."""
+
+    def key(self, name: str) -> str:
+        """Dotted key of what the profile says of its nodes.
+
+        Parameters
+        ----------
+        name
+            The key within it, as "execution.worst_extra_us".
+        """
+        return f"group.{self.name}.{name}" if self.name else f"node.{name}"
 
 
 class Network(NamedTuple):

@@ -91,7 +91,7 @@ class Case(NamedTuple):
                 "node": {"axes": 1, "execution": execution, **answers},
             }
         )
-        network = network_of(profile)._replace(groups=self.groups)
+        network = network_of(profile)._replace(groups=tuple(one._replace(node=profile.node) for one in self.groups))
         return float(Ieee1394Cycle(network, "standard").required_us)
 
     def starts_us(self, *, cycles: int = CYCLES) -> Sequence[float]:
@@ -133,6 +133,7 @@ def group(
 ) -> Group:
     write_us = read_us if write_us is None else write_us
     return Group(
+        None,
         nodes,
         axes=1,
         read_bytes=size,
@@ -156,6 +157,7 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
 
     def one_group(nodes: int) -> Group:
         return Group(
+            None,
             nodes,
             axes=1,
             read_bytes=draw(sizes),

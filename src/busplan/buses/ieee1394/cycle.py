@@ -257,14 +257,16 @@ class Ieee1394Cycle(BusCycle):
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """What the cycle could have and does not say."""
-        profile = self.network.profile
-        is_split = any(one.responder.answer == "split" for one in self.exchanges)
-        found = []
-        if not profile.host.transaction_us:
-            found.append(LeftOut("host time", "host.transaction_us"))
-        if is_split and not profile.node.execution.worst_extra_us:
-            found.append(LeftOut("the slowest execution", "node.execution.worst_extra_us"))
-        return tuple(found)
+        host = () if self.network.profile.host.transaction_us else (LeftOut("host time", "host.transaction_us"),)
+        split = {id(one.group) for one in self.exchanges if one.responder.answer == "split"}
+        return (
+            *host,
+            *(
+                LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
+                for group in self.network.groups
+                if id(group) in split and not group.worst_extra_us
+            ),
+        )
 
 
 def _sum(parts_us: Sequence[Number]) -> Number:

@@ -9,6 +9,7 @@ JCGM 100 (GUM), 5.1; paper, Table I.
 
 from collections.abc import Sequence
 from math import sqrt
+from typing import Any
 
 from busplan.buses.bus import Doubt
 from busplan.buses.ieee1394.constants import (
@@ -45,9 +46,12 @@ def bias_us(exchanges: Sequence[Exchange], network: Network, *, gap_count: Numbe
         Gap count in force [1].
     """
     mean_us = residual().mean_us
-    of_split = choose(_is_fitted(network), 0.0, mean_us) + _gap_term_us(_measured_at(network), gap_count, "d_split")
+    of_split = total(
+        halves * (choose(_is_fitted(node), 0.0, mean_us) + _gap_term_us(_measured_at(node), gap_count, "d_split"))
+        for node, halves in _split_halves(exchanges)
+    )
     of_others = mean_us + _gap_term_us(MAX_GAP_COUNT, gap_count, "d")
-    return _split_halves(exchanges) * of_split + _other_halves(exchanges, network) * of_others
+    return of_split + _other_halves(exchanges, network) * of_others
 
 
 def of_cycle(
@@ -71,9 +75,8 @@ def of_cycle(
     host, split, others = network.profile.host, _split_halves(exchanges), _other_halves(exchanges, network)
     spread_us = residual().uncertainty_us
     # One reading is wrong by the same share in all: signs count.
-    gap_term_us = split * _gap_term_us(_measured_at(network), link.gap_count, "d_split") + others * _gap_term_us(
-        MAX_GAP_COUNT, link.gap_count, "d"
-    )
+    of_split_us = total(halves * _gap_term_us(_measured_at(node), link.gap_count, "d_split") for node, halves in split)
+    gap_term_us = of_split_us + others * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
     of_packets = total(one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) for one in exchanges)
     half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
 
@@ -103,13 +106,20 @@ def of_cycle(
         Doubt(
             "residual",
             "residual of Table I",
-            split * choose(_is_fitted(network), 0.0, spread_us) + others * spread_us,
+            total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split) + others * spread_us,
         ),
         Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
-        Doubt(
-            "node.execution",
-            "execution time",
-            total(one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0) for one in exchanges),
+        *(
+            Doubt(
+                group.key("execution"),
+                f"execution time of {group.name}" if group.name else "execution time",
+                total(
+                    one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0)
+                    for one in exchanges
+                    if one.group is group
+                ),
+            )
+            for group in network.groups
         ),
         Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays) * link.hops * half_width_us / _RECTANGULAR),
         Doubt(
@@ -120,9 +130,13 @@ def of_cycle(
     )
 
 
-def _split_halves(exchanges: Sequence[Exchange]) -> Number:
-    """How often half a split transaction stands in the cycle: a packet that is acknowledged [1]."""
-    return named(total(2 * one.nodes for one in exchanges if one.responder.answer == "split"), "split_halves", "halves")
+def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ...]:
+    """How often half a split transaction stands in the cycle, a packet that is acknowledged: by sort of node [1]."""
+    counts: dict[int, tuple[Any, list[Number]]] = {}
+    for one in exchanges:
+        if one.responder.answer == "split":
+            counts.setdefault(id(one.group.node), (one.group.node, []))[1].append(2 * one.nodes)
+    return tuple((node, named(total(each), "split_halves", "halves")) for node, each in counts.values())
 
 
 def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
@@ -132,15 +146,15 @@ def _other_halves(exchanges: Sequence[Exchange], network: Network) -> Number:
     return named(halves + network.profile.cycle.retries, "other_halves", "halves_other")
 
 
-def _is_fitted(network: Network) -> Number:
-    """Whether the execution time holds the error of the model, because it was fitted against it: a truth."""
-    truth: Number = network.profile.node.execution.residual == "standard"
+def _is_fitted(node: Any) -> Number:
+    """Whether an execution time holds the error of the model, because it was fitted against it: a truth."""
+    truth: Number = node.execution.residual == "standard"
     return truth
 
 
-def _measured_at(network: Network) -> Number:
+def _measured_at(node: Any) -> Number:
     """Gap count at which the error of split transactions is known [1]."""
-    return choose(_is_fitted(network), network.profile.node.execution.measured_gap_count, MAX_GAP_COUNT)
+    return choose(_is_fitted(node), node.execution.measured_gap_count, MAX_GAP_COUNT)
 
 
 def _gap_term_us(measured: Number, gap_count: Number, symbol: str) -> Number:

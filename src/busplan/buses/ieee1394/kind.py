@@ -149,10 +149,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
-            "node.read_response": profile.node.read_response != "split",
-            "node.write_response": profile.node.write_response != "split",
-            "node.execution.worst_extra_us": profile.node.execution.worst_extra_us,
         }
+        for group in network.groups:
+            own[group.key("read_response")] = group.node.read_response != "split"
+            own[group.key("write_response")] = group.node.write_response != "split"
+            own[group.key("execution.worst_extra_us")] = group.node.execution.worst_extra_us
         return tuple(key for key, is_set in own.items() if is_set) if model == "paper" else ()
 
     def latency_subject(self, network: Network) -> str:
@@ -168,7 +169,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         BusplanError
             Nodes do not answer such a transaction split: then no execution time is on the bus.
         """
-        answer = getattr(network.profile.node, f"{kind}_response")
+        (group,) = network.groups
+        answer = getattr(group.node, f"{kind}_response")
         if answer != "split":
             raise BusplanError(
                 f'node.{kind}_response = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
@@ -191,7 +193,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def has_execution(self, network: Network) -> bool:
         """Whether a transaction is split: other answers keep the execution off the bus."""
-        return "split" in (network.profile.node.read_response, network.profile.node.write_response)
+        return any("split" in (one.node.read_response, one.node.write_response) for one in network.groups)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count: one register in each node."""

@@ -69,7 +69,7 @@ class Exchange(NamedTuple):
     """The same transaction with each node of a group."""
 
     kind: TransactionKind
-    nodes: Number
+    group: Group
     payload_bytes: Number
     responder: Responder
     execution_uncertainty_us: Number
@@ -80,6 +80,11 @@ class Exchange(NamedTuple):
 
     The idle bus of the gaps is one part here; `events` divides it.
     """
+
+    @property
+    def nodes(self) -> Number:
+        """Nodes of the group [1]."""
+        return self.group.nodes
 
 
 def exchange(
@@ -111,7 +116,7 @@ def exchange(
     suffix
         What tells its symbols from those of other transactions in a derivation.
     """
-    is_read, node = kind == "read", network.profile.node
+    is_read, node = kind == "read", group.node
     size = group.read_bytes if is_read else group.write_bytes
     answer: Answer = node.read_response if is_read else node.write_response
     responder = Responder(
@@ -133,7 +138,7 @@ def exchange(
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
     phases = _with_names(phases, suffix)
-    return Exchange(kind, group.nodes, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
+    return Exchange(kind, group, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
 
 
 def _with_names(phases: Phases, suffix: str) -> Phases:
