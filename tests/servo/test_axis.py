@@ -3,7 +3,8 @@
 import math
 import tracemalloc
 import warnings
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from busplan.servo import axis as axis_module
 from busplan.servo.axis import MAX_STEPS, simulate_axis
 from busplan.servo.delivery import Arrivals, arrivals
 from busplan.servo.parameters import Axis, Delivery, LoopTiming
+from busplan.servo.rows import KernelRows, kernel_rows
 
 Floats = NDArray[np.float64]
 
@@ -340,3 +342,16 @@ def test_on_time_is_the_default() -> None:
     setpoints = ramp(10.0, cycles=30)
     expected = simulate_axis(setpoints, axis=an_axis(), timing=TIMING, arrivals=Arrivals.punctual(30))
     np.testing.assert_array_equal(simulate_axis(setpoints, axis=an_axis(), timing=TIMING), expected)
+
+
+@pytest.mark.parametrize("name", ["python", "auto"])
+def test_rows_that_store_beyond_the_end_are_refused_before_compiled_code_writes_there(
+    monkeypatch: pytest.MonkeyPatch, name: Literal["python", "auto"]
+) -> None:
+    def too_many(*arguments: Any, **options: Any) -> Iterator[KernelRows]:
+        for rows in kernel_rows(*arguments, **options):
+            yield rows._replace(substeps=rows.substeps + 1)
+
+    monkeypatch.setattr("busplan.servo.axis.kernel_rows", too_many)
+    with pytest.raises(ValueError, match="store more positions than the move has steps"):
+        simulate_axis(ramp(10.0, cycles=20), axis=an_axis(), timing=TIMING, engine=name)

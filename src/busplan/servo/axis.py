@@ -11,7 +11,7 @@ from busplan.servo.delivery import Arrivals
 from busplan.servo.engine import Engine, compiled_kernel
 from busplan.servo.kernel import ROUND, Constants, run_rows
 from busplan.servo.parameters import Axis, LoopTiming
-from busplan.servo.rows import KernelRows, kernel_rows, stored_targets_mm
+from busplan.servo.rows import KernelRows, kernel_rows, stored_steps, stored_targets_mm
 
 if TYPE_CHECKING:
     from collections.abc import MutableSequence
@@ -105,6 +105,9 @@ def simulate_axis(
     state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
     for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
         out = position_mm[done:]
+        # Compiled code checks no bounds.
+        if stored_steps(rows) > len(out):
+            raise ValueError("rows that store more positions than the move has steps")
         # Plain Python is twice as fast with Python floats as with numpy floats.
         done += compiled.run_rows(state, constants, out, *rows) if compiled else _run_plain(state, constants, rows, out)
         if progress is not None:

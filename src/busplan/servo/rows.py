@@ -114,6 +114,25 @@ def kernel_rows(
         yield make(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, cycles=some)
 
 
+def stored_steps(rows: KernelRows) -> int:
+    """Count the positions that the kernel stores for some rows.
+
+    Parameters
+    ----------
+    rows
+        Rows of one axis.
+
+    Examples
+    --------
+    >>> axis = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0)
+    >>> timing = LoopTiming(period_us=1000.0, step_us=500.0)
+    >>> rows, = kernel_rows(np.zeros(3), axis=axis, timing=timing, arrivals=Arrivals.punctual(2), chunk_steps=1000)
+    >>> stored_steps(rows)
+    4
+    """
+    return int(rows.substeps[(rows.action & STORE) != 0].sum())
+
+
 def stored_targets_mm(rows: KernelRows) -> Floats:
     """Targets at the end of every stored sub-step.
 
