@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file
 from busplan.cli.output import document_bytes, emit_document, emit_text, is_styled, new_file, say
-from busplan.errors import BusplanError
+from busplan.errors import BusplanError, PlacedError, WorkerLostError
 from busplan.forms import ENDINGS, Form, render
 from busplan.profile.changes import NO_CHANGES, SET, KeyChanges
 
@@ -85,7 +85,7 @@ def naming(changes: KeyChanges) -> Iterator[None]:
     try:
         yield
     except BusplanError as error:
-        if not changes.words or type(error) is not BusplanError:
+        if not changes.words or isinstance(error, PlacedError | WorkerLostError):
             raise
         raise BusplanError(*(_naming(problem, changes) for problem in error.problems)) from None
 

@@ -96,9 +96,10 @@ GAP_COUNT: Final = ShortForm("--gap-count", "bus.gap_count", GapCountOption, _ga
 
 def _set_option(words: str) -> Any:
     help_ = (
-        f"Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
-        """'node.execution={kind="linear", base_us=30, per_byte_us=0.1}': VALUE is TOML, and checked as in the file. """
-        f"May be given several times.{words and ' '}{words}"
+        "Compute with another value of a key of the profile, as cycle.nonperiodic_us=50, bus.speed=S200 or "
+        "node.execution.time_us=[30,40]. VALUE is TOML, a number without its unit, and is checked as in the file; "
+        f"a table replaces the section. May be given several times.{words and ' '}{words}  "
+        "[default: the profile as it is]"
     )
     option = typer.Option(SET, metavar="KEY=VALUE", help=help_, show_default=False)
     return Annotated[list[str] | None, option]

@@ -125,21 +125,21 @@ def circle_test_command(
             if trace_file is not None:
                 _write_trace(test, trace_file, every=every or 10)
             if plot_file is not None and file_format is not None:
-                _draw(test, plot_file, file_format=file_format)
+                _draw(test, plot_file, changes, file_format=file_format)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
         give(circle_report(test, with_contributions=contributions))
     if test.passed is False:
         raise PlanFailsError
 
 
-def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
+def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, *, file_format: str) -> None:
     """Draw the simulated periods; without any, an old file stays unchanged."""
     if all(run is None for run in test.runs):
         file.abandon()
         return
     from busplan.drawings.circle_plot import circle_figure
 
-    file.write(circle_figure(test, file_format=file_format))
+    file.write(circle_figure(test, file_format=file_format, note=changes.words))
 
 
 def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
