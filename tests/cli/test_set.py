@@ -200,7 +200,7 @@ def test_a_short_form_is_the_key_it_stands_for(
         ),
         (
             ("circle-test", "mine.toml", "--set", "cycle.period_us=1050"),
-            "step_us = 100.0: the period of 1050 us is no multiple of it; 105 or 95.4545 us would fit (with --set cycle.",
+            "step_us = 100.0: the period of 1050 us is no multiple of it; 105 or 95.4545 us would fit (with --set",
         ),
         (("timeline", "mine.toml", "--set", "name=x", "--transaction", "x:1"), "--transaction x:1: expected read or"),
     ],
@@ -223,6 +223,7 @@ def test_apply_of_a_plan_writes_the_changes_with_the_recommendation(run: Run, fo
     assert re.search(r"^nodes = 3 +# as built$", text, re.MULTILINE)
     assert data["node"]["execution"] == {"kind": "table", "payload_bytes": [4, 64], "time_us": [20, 40]}
     assert data["limits"] == {"reserve": 0.05}
+    assert 'node.execution.kind = "table", node.execution.payload_bytes = [4, 64], ' in done.stderr
     for key, value in document["recommended_changes"].items():
         section, _, name = key.partition(".")
         assert key == "node.execution" or data[section][name] == value

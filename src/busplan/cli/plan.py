@@ -192,6 +192,7 @@ def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> Key
 def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     """Write the recommended values into the profile's file."""
     from busplan.answers.plan import settings
+    from busplan.profile.keys import flat
 
     if result.recommended is None:
         return
@@ -200,11 +201,12 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
     # Write whole floats without a fraction.
-    values = {
+    values: dict[str, Any] = {
         key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
     }
     apply_changes(loaded.document, values)
-    say(f"changed {loaded.document.name}: {settings(loaded.profile, changes)}")
+    written: dict[str, Any] = dict(flat(values))
+    say(f"changed {loaded.document.name}: {settings(loaded.profile, written)}")
 
 
 def _write_profile(result: "Plan", file: NewFile | None) -> None:
