@@ -315,8 +315,9 @@ def test_a_picture_says_the_changes(run: Run, folder: Path) -> None:
         assert "With --set bus.speed" in picture
     run("circle-test", "mine.toml", "--set", "bus.speed=S200", "--plot", "c.svg", cwd=folder)
     run("sweep", "mine.toml", "--vary", "bus.nodes=1:3", "--set", "bus.speed=S200", "--plot", "s.svg", cwd=folder)
-    for name, said in (("c.svg", "--set bus.speed=S200"), ("s.svg", "mine, --set bus.speed=S200")):
-        assert f"<!-- {said}".replace("--set", "- - set") or said in (folder / name).read_text(encoding="utf-8")
+    # matplotlib draws text as outlines, and writes it into a comment, where two dashes cannot stand.
+    for name, said in (("c.svg", "- -set bus.speed=S200"), ("s.svg", "mine, - -set bus.speed=S200")):
+        assert said in (folder / name).read_text(encoding="utf-8")
 
 
 def test_rows_of_a_sweep_keep_their_form_and_the_change_is_said_beside_them(run: Run, folder: Path) -> None:
