@@ -56,7 +56,7 @@ def changed(**changes: object) -> Profile:
 
 
 def made(*profiles: Profile, title: str | None = None) -> Report:
-    subjects = [ReportedProfile(f"{number}.toml", all_answers(one, with_circle=False), other_period=False)
+    subjects = [ReportedProfile(f"{number}.toml", all_answers(one, with_circle=False))
                 for number, one in enumerate(profiles)]  # fmt: skip
     return page_report(subjects, title=title)
 
@@ -129,7 +129,7 @@ def test_a_shell_gives_back_any_path(raw: bytes) -> None:
 
 
 def test_a_page_is_whole_in_itself_and_the_same_each_time() -> None:
-    one = ReportedProfile("paper-4ms", simulated(), other_period=False)
+    one = ReportedProfile("paper-4ms", simulated())
     html = render(page_report([one, one], title=None), "html")
     assert html == render(page_report([one, one], title=None), "html")
     assert re.findall(r"https?://(?!www\.w3\.org/2000/svg)", html) == []
@@ -153,7 +153,7 @@ def test_headings_go_down_one_by_one_and_tables_have_scopes() -> None:
 
 
 def whole() -> tuple[ReportedProfile, Report]:
-    subject = ReportedProfile("paper-4ms", simulated(), other_period=False)
+    subject = ReportedProfile("paper-4ms", simulated())
     return subject, page_report([subject])
 
 
@@ -162,7 +162,7 @@ def parts(report: Report) -> dict[str, Chapter]:
 
 
 def documents(subject: ReportedProfile) -> dict[str, Any]:
-    found = sources(subject.answer, argument=subject.argument, key="p1", other_period=subject.other_period)
+    found = sources(subject.answer, argument=subject.argument, key="p1", changes=subject.changes)
     return {source.command.key: source.document for source in found.values()}
 
 
@@ -252,7 +252,7 @@ def test_all_forms_say_the_same() -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_drawn_is_said(profile: Profile, words: str) -> None:
-    content = page_report([ReportedProfile("x", all_answers(profile), other_period=False)], title=None)
+    content = page_report([ReportedProfile("x", all_answers(profile))], title=None)
     assert words in Tags(render(content, "html")).text
     assert "nan" not in render(content, "html").lower().replace("nano", "")
     assert words.partition(":")[0] in render(content, "markdown").replace("\\", "")
@@ -270,7 +270,7 @@ def test_the_page_stays_small_however_many_nodes_there_are(nodes: int, bars: int
     profile = changed(bus__nodes=nodes, bus__max_hops=16, cycle__period_us=100_000.0, circle__radius_mm=700.0)
     # A long circle is drawn no larger for more nodes: once is enough.
     results = all_answers(profile, with_circle=nodes == 16)
-    html = render(page_report([ReportedProfile("x", results, other_period=False)], title=None), "html")
+    html = render(page_report([ReportedProfile("x", results)], title=None), "html")
     assert len(html.encode()) < 300_000
     assert said in Tags(html).text
     lanes = re.findall(r"by node</text>.*?</svg>", html, re.DOTALL)

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.cli.options import bus_changes, complete_profile, parse_sizes, periods_us, time_us, timing_models
+from busplan.cli.changes import GAP_COUNT, periods_us
+from busplan.cli.options import complete_profile, parse_sizes, time_us, timing_models
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.sections.profile import Profile
@@ -185,17 +186,13 @@ def test_what_are_no_sizes_is_refused_with_an_example(text: str) -> None:
     )
 
 
-def test_options_that_are_not_given_change_nothing() -> None:
-    assert bus_changes(nodes=None, gap_count=None) == {}
-
-
 @pytest.mark.parametrize(
     ("gap_count", "value"), [("5", 5), ("+5", 5), ("-5", -5), ("optimal", "optimal"), ("5.0", "5.0"), ("", "")]
 )
 def test_a_gap_count_that_is_no_number_goes_on_as_text(gap_count: str, value: object) -> None:
-    changes = bus_changes(nodes=3, gap_count=gap_count)
-    assert changes == {"bus.nodes": 3, "bus.gap_count": value}
-    assert type(changes["bus.gap_count"]) is type(value)
+    change = GAP_COUNT.change(gap_count)
+    assert (change.key, change.value, change.typed) == ("bus.gap_count", value, f"--gap-count {gap_count}")
+    assert type(change.value) is type(value)
 
 
 def test_both_models_are_paper_first() -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from busplan.answers.documents import document
+from busplan.answers.documents import changed_document, document
 from busplan.answers.gate.plain import finding_parts
 from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
 from busplan.forms.numbers import nouns
@@ -67,4 +67,4 @@ def check_document(report: CheckReport) -> JsonDocument:
             "findings": [finding._asdict() for finding in one.findings],
         }
         files.append(content if one.failure is None else {**content, "failure": one.failure})
-    return document("check", files=files, summary=report.summary._asdict())
+    return changed_document(document("check", files=files, summary=report.summary._asdict()), report.changes)

@@ -3,10 +3,11 @@
 Keys carry their units and are stable between releases; new ones may be added.
 """
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
-from busplan.forms.blocks import JsonDocument, Record
+from busplan.forms.blocks import Code, JsonDocument, Record, Sentence, joined
+from busplan.profile.changes import KeyChanges
 
 JSON_SCHEMA: Final = 1
 
@@ -19,3 +20,18 @@ def document(command: str, **content: object) -> JsonDocument:
 def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
     """Rows for CSV with the profile's name in front, so that tables of several runs can be joined."""
     return [{"profile": name, **record} for record in records]
+
+
+def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDocument:
+    """Add the new values by --set to a document, as `changes`; `diff` has other `changes` already."""
+    if not changes.by_set:
+        return dict(content)
+    name = "changes" if "changes" not in content else "changes_of_both"
+    head = {key: content[key] for key in ("schema", "command")}
+    return {**head, name: {one.key: one.value for one in changes.by_set}, **content}
+
+
+def changes_sentences(changes: KeyChanges) -> list[Sentence]:
+    """Name the --set options in a sentence, because what is computed is not what the file says; empty without them."""
+    options = [Sentence((Code(one.typed),)) for one in changes.by_set]
+    return [joined(Sentence(("With ",)), joined(*options, by=" and "), Sentence((".",)), by="")] if options else []

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from busplan.buses import bus
 from busplan.forms.blocks import Part, Sentence, ShownValue, joined
+from busplan.profile.write import value_text
 
 NewValues = Mapping[str, bus.Value]
 """New values of a profile by dotted key."""
@@ -32,11 +33,13 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: st
     )
 
 
-def key_value(key: str, value: bus.Value, *, at: str) -> ShownValue:
+def key_value(key: str, value: object, *, at: str) -> ShownValue:
     """The new value of one key, with its place in the JSON document."""
     return ShownValue(value, key, at=f"{at}/{key}" if at else "")
 
 
-def _part(key: str, value: bus.Value, at: str, quotes: bool) -> tuple[Part, ...]:
+def _part(key: str, value: object, at: str, quotes: bool) -> tuple[Part, ...]:
+    if isinstance(value, list):
+        return (value_text(value),)
     found = key_value(key, value, at=at)
     return ('"', found, '"') if quotes and isinstance(value, str) else (found,)

@@ -26,6 +26,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns, period_value
+from busplan.profile.keys import flat
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
@@ -187,7 +188,7 @@ def plan_records(plan: Plan) -> list[Record]:
     return [
         {
             **record,
-            "changes": [f"{key}={value}" for key, value in record["changes"].items()],
+            "changes": [f"{key}={value}" for key, value in flat(record["changes"])],
             "circle_failures": "; ".join(record["circle_failures"]),
         }
         for record in _options(plan)

@@ -1,5 +1,6 @@
 """Write the answer of a command: in the requested form, to standard output or a file."""
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,12 +11,14 @@ from typing import TYPE_CHECKING, Final
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file
 from busplan.cli.output import document_bytes, emit_document, emit_text, is_styled, new_file, say
-from busplan.errors import BusplanError
+from busplan.errors import BusplanError, PlacedError, WorkerLostError
 from busplan.forms import ENDINGS, Form, render
+from busplan.profile.changes import NO_CHANGES, SET, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
+_KEY_AND_VALUE: Final = re.compile(r"\b[a-z][a-z_.]* = \S")
 NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
 
 
@@ -25,6 +28,7 @@ def answer(
     output: Path | None,
     *,
     inputs: Iterable[Path] = (),
+    changes: KeyChanges = NO_CHANGES,
     default: Form = "table",
     refused: Mapping[Form, str] = NOTHING_REFUSED,
 ) -> "Iterator[Callable[[Report], None]]":
@@ -38,6 +42,8 @@ def answer(
         Value of --output.
     inputs
         Files that the command reads.
+    changes
+        KeyChanges of the profile; the answer names those by --set.
     default
         Form on standard output without --format.
     refused
@@ -52,12 +58,42 @@ def answer(
     if chosen in refused:
         raise BusplanError(f"--format {chosen}: {refused[chosen]}")
     if output is None:
-        yield lambda report: give(report, chosen)
+        with naming(changes):
+            yield lambda report: give(report_with(changes, report), chosen)
         return
     require_apart({"--output": output}, inputs=inputs)
-    with new_file(output, overwrite=True) as file:
-        yield lambda report: _write(file.write, report, chosen)
+    with new_file(output, overwrite=True) as file, naming(changes):
+        yield lambda report: _write(file.write, report_with(changes, report), chosen)
     say(f"wrote {output}")
+
+
+def report_with(changes: KeyChanges, report: "Report") -> "Report":
+    """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
+    if not changes.by_set:
+        return report
+    from busplan.answers.documents import changed_document, changes_sentences
+
+    return report._replace(
+        blocks=lambda: (*changes_sentences(changes), *report.blocks()),
+        document=lambda: changed_document(report.document(), changes),
+    )
+
+
+@contextmanager
+def naming(changes: KeyChanges) -> Iterator[None]:
+    """Name the --set options in errors about values of the profile."""
+    try:
+        yield
+    except BusplanError as error:
+        if not changes.words or isinstance(error, PlacedError | WorkerLostError):
+            raise
+        raise BusplanError(*(_naming(problem, changes) for problem in error.problems)) from None
+
+
+def _naming(problem: str, changes: KeyChanges) -> str:
+    keys = (one.sections[-1] for one in changes.by_set)
+    is_of_profile = _KEY_AND_VALUE.search(problem) or any(key in problem for key in keys if "_" in key)
+    return f"{problem} (with {changes.words})" if is_of_profile and SET not in problem else problem
 
 
 def _write(write: Callable[[bytes], object], report: "Report", form: Form) -> None:

@@ -10,22 +10,20 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.apply import apply_changes, require_own_file
+from busplan.cli.changes import GAP_COUNT, NODES, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
-    BUS_OPTIONS,
-    NO_CHANGES,
     FormatOption,
-    KeyChanges,
     OutputOption,
     ProfileArgument,
-    takes_bus_options,
     timing_model,
 )
 from busplan.cli.output import say
 from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 
-@takes_bus_options
+@takes_changes(NODES, GAP_COUNT, words="--apply writes it, too.")
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -87,10 +85,10 @@ def calibrate_command(
     column transaction says read or write (write without it).
 
     T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
-    where the bench was not as the profile. With a column request_and_acknowledge_us, the measured T1+T2, both halves
-    come from it, and the report shows how far the timing model is from it. Measurements that the others contradict
-    are named by their line and left out of the fit, in every form. Times are in us. A report: it exits 0 whatever the
-    figures are.
+    where the bench was not as the profile; --apply does not write these two. With a column request_and_acknowledge_us,
+    the measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements
+    that the others contradict are named by their line and left out of the fit, in every form. Times are in us. A
+    report: it exits 0 whatever the figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """
@@ -98,17 +96,18 @@ def calibrate_command(
         raise BusplanError("only one of PROFILE and MEASUREMENTS can be standard input")
     if apply:
         require_own_file(profile)
-    with answer(format_, output, inputs=chain(profile_files(profile), _measurements_file(measurements))) as give:
+    files = chain(profile_files(profile), _measurements_file(measurements))
+    with answer(format_, output, inputs=files, changes=changes) as give:
         from busplan.analysis.calibration.calibrate import calibrate
         from busplan.answers import calibration as said
         from busplan.forms.numbers import plural
         from busplan.profile.edit import origin_comments
         from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
         from busplan.profile.shipped import load, locate_measurements
-        from busplan.profile.toml import override, read_bytes
+        from busplan.profile.toml import read_bytes
 
         loaded = load(profile)
-        bench = override(loaded.profile, changes, origin=BUS_OPTIONS)
+        bench = changes.applied(loaded.profile)
         path, name, shipped = locate_measurements(measurements)
         result = calibrate(
             bench,
@@ -123,12 +122,17 @@ def calibrate_command(
         )
         if apply:
             note = said.provenance(result, source=Path(name).name)
-            apply_changes(loaded.document, said.execution_changes(result), notes={said.SECTION: note})
+            found = said.execution_changes(result)
+            for one in changes.by_set:
+                for key in found:
+                    require_separate(one, key, typed="--apply")
+            asked = {one.key: one.value for one in changes.by_set}
+            apply_changes(loaded.document, {**asked, **found}, notes={said.SECTION: note})
             gone = origin_comments(loaded.document, said.SECTION)
             kept = "every comment of yours is kept"
             if gone:
                 kept = f"the new comment on their origin replaces {plural(len(gone), 'line')}: {' '.join(gone)}"
-            say(f"wrote [{said.SECTION}] of {profile}; {kept}")
+            say(f"wrote {', '.join((f'[{said.SECTION}]', *asked))} of {profile}; {kept}")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
 

@@ -1,23 +1,19 @@
 """`busplan capacity`."""
 
 from busplan.cli.answering import answer
+from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
-    NO_CHANGES,
     FormatOption,
-    KeyChanges,
     OutputOption,
-    PeriodsOption,
     ProfileArgument,
     TimingOption,
-    load_changed,
-    periods_us,
-    takes_bus_options,
     timing_models,
 )
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 
-@takes_bus_options
+@takes_changes(NODES, GAP_COUNT)
 def capacity_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
@@ -34,7 +30,7 @@ def capacity_command(
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
-    with answer(format_, output, inputs=profile_files(profile)) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
         from busplan.analysis.capacity.figures import capacity
         from busplan.analysis.capacity.verdict import verdicts
         from busplan.answers.capacity import capacity_report

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.answers.gate import FORMATS, gate_format
+from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, emit_text, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -29,6 +31,10 @@ else:
 _BUILD_FORMATS: Final = [name for name, one in FORMATS.items() if one.reader == "builds"]
 
 
+@takes_changes(
+    words="Of all files, each of which must be valid without it; a finding is at the key's place in the file, or at "
+    "its section."
+)
 def check_command(
     paths: Annotated[
         list[str],
@@ -40,6 +46,7 @@ def check_command(
             show_default=False,
         ),
     ],
+    changes: KeyChanges = NO_CHANGES,
     format_: Annotated[
         FormatName,
         typer.Option(
@@ -101,9 +108,12 @@ def check_command(
     if circle_steps is not None and not circle:
         raise BusplanError("--circle-steps: goes without --no-circle")
     _require_baseline(baseline, update=update_baseline)
+    if update_baseline and changes.each:
+        raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
     from busplan.profile.collect import collect
     from busplan.rules.circle import MOST_STEPS
     from busplan.rules.gate import check_source
+    from busplan.rules.report import CheckReport
 
     collection = collect(paths, stdin_name=stdin_filename)
     _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
@@ -121,9 +131,10 @@ def check_command(
         recorded=before,
         with_circle=circle,
         circle_steps=circle_steps or MOST_STEPS,
+        changes=changes,
         record=update_baseline,
     )
-    report = _check(collection.sources, one, jobs=jobs)
+    report = CheckReport(_check(collection.sources, one, jobs=jobs), changes)
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if verbose:
@@ -133,9 +144,10 @@ def check_command(
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
         from busplan.answers.check import summary_sentence
+        from busplan.answers.documents import changes_sentences
         from busplan.forms.columns import sentence_text
 
-        say(sentence_text(summary_sentence(report)))
+        say(*map(sentence_text, (*changes_sentences(changes), summary_sentence(report))))
     if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
@@ -161,12 +173,10 @@ def _require_apart(
 
 def _check(
     sources: "Sequence[ProfileSource]", one: "Callable[[ProfileSource], FileResult]", *, jobs: int
-) -> "CheckReport":
-    from busplan.rules.report import CheckReport
-
+) -> "tuple[FileResult, ...]":
     number = min(jobs, len(sources))
     if number <= 1:
-        return CheckReport(tuple(map(one, sources)))
+        return tuple(map(one, sources))
     from busplan.cli.workers import workers
 
     # Only this process has standard input.
@@ -174,7 +184,7 @@ def _check(
     others = [source for source in sources if source not in own]
     with workers(number) as map_:
         found = own | dict(zip(others, map_(one, others), strict=True))
-    return CheckReport(tuple(found[source] for source in sources))
+    return tuple(found[source] for source in sources)
 
 
 def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":

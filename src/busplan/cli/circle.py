@@ -7,44 +7,60 @@ from typing import TYPE_CHECKING, Annotated, BinaryIO
 import typer
 
 from busplan.cli.answering import answer
+from busplan.cli.changes import (
+    GAP_COUNT,
+    NODES,
+    PeriodsOption,
+    ShortForm,
+    load_changed,
+    periods_us,
+    takes_changes,
+)
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import FormatOption, OutputOption, PeriodsOption, ProfileArgument, periods_us, plot_format
+from busplan.cli.options import FormatOption, OutputOption, ProfileArgument, plot_format
 from busplan.cli.output import NewFile, PlanFailsError, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleTest
 
-_OPTIONS = {"circle.feed_mm_per_min": "--feed", "circle.radius_mm": "--radius", "delivery.seed": "--seed"}
+_FeedOption = Annotated[
+    float | None,
+    typer.Option(
+        "--feed",
+        metavar="MM_PER_MIN",
+        help="Speed along the circle [mm/min].  [default: the profile's circle.feed_mm_per_min]",
+    ),
+]
+_RadiusOption = Annotated[
+    float | None,
+    typer.Option(
+        "--radius", metavar="MM", help="Radius of the circle [mm].  [default: the profile's circle.radius_mm]"
+    ),
+]
+_SeedOption = Annotated[
+    int | None,
+    typer.Option(
+        "--seed",
+        metavar="N",
+        help="Seed of jitter and lost set-points: the same seed, the same run.  [default: the profile's delivery.seed]",
+    ),
+]
 
 
+@takes_changes(
+    NODES,
+    GAP_COUNT,
+    ShortForm("--feed", "circle.feed_mm_per_min", _FeedOption),
+    ShortForm("--radius", "circle.radius_mm", _RadiusOption),
+    ShortForm("--seed", "delivery.seed", _SeedOption),
+)
 def circle_test_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
-    feed: Annotated[
-        float | None,
-        typer.Option(
-            "--feed",
-            metavar="MM_PER_MIN",
-            help="Speed along the circle [mm/min].  [default: the profile's circle.feed_mm_per_min]",
-        ),
-    ] = None,
-    radius: Annotated[
-        float | None,
-        typer.Option(
-            "--radius", metavar="MM", help="Radius of the circle [mm].  [default: the profile's circle.radius_mm]"
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(
-            "--seed",
-            metavar="N",
-            help="Seed of jitter and lost set-points: the same seed, the same run.  "
-            "[default: the profile's delivery.seed]",
-        ),
-    ] = None,
+    changes: KeyChanges = NO_CHANGES,
     contributions: Annotated[
         bool, typer.Option("--contributions", help="Rank the error sources: test again without each in turn.")
     ] = False,
@@ -90,15 +106,11 @@ def circle_test_command(
         raise BusplanError(f"--every {every}: must be 1 or more")
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
-    with answer(format_, output, inputs=profile_files(profile)) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
         from busplan.analysis.circle.roundness import circle_test
         from busplan.answers.circle import circle_report
-        from busplan.profile.shipped import load
-        from busplan.profile.toml import override
 
-        asked = {"circle.feed_mm_per_min": feed, "circle.radius_mm": radius, "delivery.seed": seed}
-        changes: dict[str, object] = {key: value for key, value in asked.items() if value is not None}
-        plan = override(load(profile).profile, changes, origin=_OPTIONS)
+        plan = load_changed(profile, changes)
         with ExitStack() as files:
             # Opened before the simulation, so that a path that cannot be written fails at once.
             trace_file = files.enter_context(new_file(trace, overwrite=True)) if trace else None
@@ -113,21 +125,21 @@ def circle_test_command(
             if trace_file is not None:
                 _write_trace(test, trace_file, every=every or 10)
             if plot_file is not None and file_format is not None:
-                _draw(test, plot_file, file_format=file_format)
+                _draw(test, plot_file, changes, file_format=file_format)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
         give(circle_report(test, with_contributions=contributions))
     if test.passed is False:
         raise PlanFailsError
 
 
-def _draw(test: "CircleTest", file: NewFile, *, file_format: str) -> None:
+def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, *, file_format: str) -> None:
     """Draw the simulated periods; without any, an old file stays unchanged."""
     if all(run is None for run in test.runs):
         file.abandon()
         return
     from busplan.drawings.circle_plot import circle_figure
 
-    file.write(circle_figure(test, file_format=file_format))
+    file.write(circle_figure(test, file_format=file_format, note=changes.words))
 
 
 def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.answering import answer
+from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
@@ -20,6 +21,7 @@ from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from busplan.sections.profile import Profile
 
 
+@takes_changes(words="Of both profiles.")
 def diff_command(
     a: Annotated[
         str,
@@ -46,6 +49,7 @@ def diff_command(
             metavar="B", help="The profile to judge, likewise.", autocompletion=complete_profile, show_default=False
         ),
     ],
+    changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
     circle: Annotated[
         bool,
@@ -78,13 +82,13 @@ def diff_command(
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
-    with answer(format_, output, inputs=profile_files(a, b)) as give:
+    with answer(format_, output, inputs=profile_files(a, b), changes=changes) as give:
         from busplan.analysis.comparison.difference import difference
         from busplan.answers.diff import diff_report
         from busplan.answers.diff_headline import regression_words
         from busplan.profile.revision import load_revision
 
-        one, other = load_each((a, b), lambda argument: load_revision(argument).profile)
+        one, other = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
         with progress_bar("circle tests") as progress:
             test = _circle(progress) if circle else None
             found = difference(one, other, timing_models=_models(timing, one, other), circle=test)

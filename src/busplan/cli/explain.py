@@ -5,21 +5,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.answering import answer
+from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
-    NO_CHANGES,
     FormatOption,
-    KeyChanges,
     OutputOption,
-    PeriodsOption,
     ProfileArgument,
-    load_changed,
-    periods_us,
-    takes_bus_options,
     timing_models,
 )
 from busplan.errors import BusplanError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,7 +36,7 @@ def complete_figure(incomplete: str) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
-@takes_bus_options
+@takes_changes(NODES, GAP_COUNT)
 def explain_command(
     profile: ProfileArgument,
     figure: Annotated[
@@ -86,7 +82,7 @@ def explain_command(
     """
     if figure is None:
         _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
-    with answer(format_, output, inputs=profile_files(profile)) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
         plan = load_changed(profile, changes)
         if figure is None:
             give(_list(plan))

@@ -5,22 +5,20 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
+from busplan.cli.changes import GAP_COUNT, NODES, load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
-    NO_CHANGES,
     FormatOption,
-    KeyChanges,
     OutputOption,
     ProfileArgument,
     TimingOption,
-    load_changed,
     parse_sizes,
-    takes_bus_options,
     timing_models,
 )
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 
-@takes_bus_options
+@takes_changes(NODES, GAP_COUNT)
 def latency_command(
     profile: ProfileArgument,
     payload: Annotated[
@@ -45,7 +43,7 @@ def latency_command(
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
-    with answer(format_, output, inputs=profile_files(profile)) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
         from busplan.analysis.latency import latency
         from busplan.answers.latency import latency_report
 

@@ -1,10 +1,7 @@
 """Arguments and options of several commands, and parsers of their values."""
 
 import re
-from collections.abc import Callable
 from decimal import Decimal
-from functools import wraps
-from inspect import Parameter, signature
 from math import isinf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
@@ -42,35 +39,6 @@ ProfileArgument = Annotated[
         show_default=False,
     ),
 ]
-PeriodsOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--period",
-        metavar="TIME",
-        help="Communication period with its unit, as 4ms, 250us or 0.001s. May be given several times.  "
-        "[default: the profile's cycle.period_us]",
-        show_default=False,
-    ),
-]
-NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        help="Number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
-        show_default=False,
-    ),
-]
-GapCountOption = Annotated[
-    str | None,
-    typer.Option(
-        "--gap-count",
-        metavar="0..63|optimal",
-        help="Gap count of all nodes; optimal is the smallest safe one for the hops.  "
-        "[default: the profile's bus.gap_count]",
-        show_default=False,
-    ),
-]
 TimingOption = Annotated[
     str,
     typer.Option(
@@ -82,88 +50,8 @@ TimingOption = Annotated[
 ]
 
 
-def bus_changes(*, nodes: int | None, gap_count: str | None) -> dict[str, object]:
-    """Changes of a profile by --nodes and --gap-count, by dotted key."""
-    changes: dict[str, object] = {}
-    if nodes is not None:
-        changes["bus.nodes"] = nodes
-    if gap_count is not None:
-        # Other text is passed on: the profile's schema accepts or refuses it.
-        changes["bus.gap_count"] = int(gap_count) if re.fullmatch(r"[+-]?[0-9]{1,9}", gap_count) else gap_count
-    return changes
-
-
 ALL_MODELS: Final = "both"
 """Value of --timing for all timing models."""
-BUS_OPTIONS: Final = {"bus.nodes": "--nodes", "bus.gap_count": "--gap-count"}
-"""Options by profile key."""
-
-
-KeyChanges = dict[str, object]
-"""New values of a profile by dotted key."""
-NO_CHANGES: Final[KeyChanges] = {}
-
-
-def takes_bus_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Replace the parameter `changes` of a command by the options --nodes and --gap-count, whose values it gets.
-
-    Parameters
-    ----------
-    command
-        A command with a parameter `changes`.
-    """
-    options = {"nodes": NodesOption, "gap_count": GapCountOption}
-    own = signature(command)
-    parameters: list[Parameter] = []
-    for one in own.parameters.values():
-        if one.name == "changes":
-            kinds = options.items()
-            parameters += [Parameter(name, one.kind, default=None, annotation=option) for name, option in kinds]
-        else:
-            parameters.append(one)
-
-    @wraps(command)
-    def with_changes(*arguments: Any, nodes: int | None, gap_count: str | None, **others: Any) -> None:
-        command(*arguments, changes=bus_changes(nodes=nodes, gap_count=gap_count), **others)
-
-    with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
-    kept = {name: one for name, one in command.__annotations__.items() if name != "changes"}
-    with_changes.__annotations__ = {**kept, **options}
-    return with_changes
-
-
-def load_changed(argument: str, changes: KeyChanges) -> "Profile":
-    """Read a profile and apply the values of options.
-
-    Raises
-    ------
-    BusplanError
-        Not a profile, or a value that its schema refuses.
-    """
-    from busplan.profile.shipped import load
-    from busplan.profile.toml import override
-
-    return override(load(argument).profile, changes, origin=BUS_OPTIONS)
-
-
-def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | None:
-    """Parse the values of --period, such as 4ms, 250us or 0.001s [us]; None if it is not given.
-
-    Raises
-    ------
-    BusplanError
-        Not a number with a unit, or out of the profile's range.
-    """
-    if not texts:
-        return None
-    from busplan.profile.toml import override
-
-    found = []
-    for text in texts:
-        period_us = time_us(text, option="--period")
-        override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": f"--period {text}, in us"})
-        found.append(period_us)
-    return found
 
 
 def time_us(text: str, *, option: str) -> float:

@@ -1,31 +1,25 @@
 """`busplan plan`."""
 
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from busplan.cli.answering import answer
+from busplan.cli.answering import answer, report_with
 from busplan.cli.apply import apply_changes, require_own_file
+from busplan.cli.changes import GAP_COUNT, NODES, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import (
-    BUS_OPTIONS,
-    STANDARD_OUTPUT,
-    FormatOption,
-    GapCountOption,
-    ProfileArgument,
-    bus_changes,
-    periods_us,
-)
+from busplan.cli.options import STANDARD_OUTPUT, FormatOption, ProfileArgument
 from busplan.cli.output import NewFile, PlanFailsError, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
+from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.planning.options import Plan
-    from busplan.buses.bus import Value
     from busplan.forms.blocks import Report
     from busplan.profile.toml import LoadedProfile
     from busplan.sections.profile import Profile
@@ -34,16 +28,28 @@ _PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
 
 
+_NodesOption = Annotated[
+    int | None,
+    typer.Option(
+        "--nodes",
+        metavar="N",
+        help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
+    ),
+]
+
+
+@takes_changes(
+    NODES._replace(annotation=_NodesOption),
+    period_form(
+        " with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
+        "[default: the profile's cycle.period_us, which may be changed]"
+    ),
+    GAP_COUNT,
+    words="Part of the goal: it is kept, and --apply and -o write it.",
+)
 def plan_command(
     profile: ProfileArgument,
-    nodes: Annotated[
-        int | None,
-        typer.Option(
-            "--nodes",
-            metavar="N",
-            help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
-        ),
-    ] = None,
+    changes: KeyChanges = NO_CHANGES,
     axes: Annotated[
         int | None,
         typer.Option(
@@ -55,16 +61,6 @@ def plan_command(
             "[default: those of the nodes]",
         ),
     ] = None,
-    period: Annotated[
-        str | None,
-        typer.Option(
-            "--period",
-            metavar="TIME",
-            help="Communication period with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
-            "[default: the profile's cycle.period_us, which may be changed]",
-        ),
-    ] = None,
-    gap_count: GapCountOption = None,
     circle: Annotated[
         bool,
         typer.Option(
@@ -126,10 +122,10 @@ def plan_command(
             "report"
         )
     new = None if report_file is not None else output
-    _check_options(nodes=nodes, axes=axes, apply=apply, new=new, force=force, format_=format_)
+    _check_options(changes, axes=axes, apply=apply, new=new, force=force, format_=format_)
     piped = new == STANDARD_OUTPUT
     require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
-    with answer(format_, report_file, inputs=profile_files(profile)) as give:
+    with answer(format_, report_file, inputs=profile_files(profile), changes=changes) as give:
         from busplan.analysis.planning.options import plan
         from busplan.answers.plan import plan_report
         from busplan.profile.shipped import load
@@ -137,8 +133,9 @@ def plan_command(
         if apply:
             require_own_file(profile)
         loaded = load(profile)
-        wanted = _wanted(loaded.profile, nodes=nodes, axes=axes, period=period, gap_count=gap_count)
-        with_circle = circle and loaded.profile.asks_for_circle
+        wanted = _wanted(loaded.profile, changes, axes=axes)
+        with_circle = wanted.applied(loaded.profile).asks_for_circle and circle
+        values: dict[str, Any] = wanted.values
         with ExitStack() as files:
             # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
@@ -148,7 +145,7 @@ def plan_command(
                     from busplan.analysis.circle.check import CircleCheck
 
                     check = CircleCheck(progress=progress, expected=max_circles)
-                result = plan(loaded.profile, wanted=wanted, circle=check, max_circles=max_circles)
+                result = plan(loaded.profile, wanted=values, circle=check, max_circles=max_circles)
             if new is not None:
                 _write_profile(result, file)
         if result.recommended is None:
@@ -159,17 +156,18 @@ def plan_command(
         elif file is not None:
             say(f"wrote {new}")
         report = plan_report(result, with_circle=with_circle)
-        (_say_report if piped else give)(report)
+        (partial(_say_report, changes) if piped else give)(report)
     if result.recommended is None:
         raise PlanFailsError
 
 
 def _check_options(
-    *, nodes: int | None, axes: int | None, apply: bool, new: Path | None, force: bool, format_: Form | None
+    changes: KeyChanges, *, axes: int | None, apply: bool, new: Path | None, force: bool, format_: Form | None
 ) -> None:
     problems = []
-    if nodes is not None and axes is not None:
-        problems.append(f"--nodes {nodes} and --axes {axes}: give one of them")
+    if axes is not None:
+        nodes = [one.typed for one in changes.each if one.key == "bus.nodes"]
+        problems += [f"{typed} and --axes {axes}: give one of them" for typed in nodes]
     if apply and new is not None:
         problems.append(f"--apply and -o {new}: give one of them; -o leaves PROFILE as it is")
     if new == STANDARD_OUTPUT and format_ not in (None, "table"):
@@ -180,28 +178,21 @@ def _check_options(
         raise BusplanError(*problems)
 
 
-def _wanted(
-    profile: "Profile", *, nodes: int | None, axes: int | None, period: str | None, gap_count: str | None
-) -> "dict[str, Value]":
-    """Wanted values of the options by dotted key, validated."""
+def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> KeyChanges:
+    """The changes, with the nodes that --axes needs."""
+    if axes is None:
+        return changes
     from busplan.analysis.planning.options import nodes_for_axes
-    from busplan.profile.toml import override
 
-    origin = dict(BUS_OPTIONS)
-    if axes is not None:
-        nodes = nodes_for_axes(profile, axes)
-        origin["bus.nodes"] = f"--axes {axes}, nodes"
-    wanted = bus_changes(nodes=nodes, gap_count=gap_count)
-    override(profile, wanted, origin=origin)
-    periods = periods_us([period] if period is not None else None, profile)
-    if periods:
-        wanted["cycle.period_us"] = periods[0]
-    return wanted  # type: ignore[return-value]
+    of_nodes = KeyChanges(tuple(one for one in changes.each if one.key in ("node", "node.axes")))
+    nodes = nodes_for_axes(of_nodes.applied(profile), axes)
+    return KeyChanges((KeyChange("bus.nodes", nodes, "--axes", str(axes), f", nodes {nodes}"), *changes.each))
 
 
 def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     """Write the recommended values into the profile's file."""
     from busplan.answers.plan import settings
+    from busplan.profile.keys import flat
 
     if result.recommended is None:
         return
@@ -210,11 +201,12 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
     # Write whole floats without a fraction.
-    values = {
+    values: dict[str, Any] = {
         key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
     }
     apply_changes(loaded.document, values)
-    say(f"changed {loaded.document.name}: {settings(loaded.profile, changes)}")
+    written: dict[str, Any] = dict(flat(values))
+    say(f"changed {loaded.document.name}: {settings(loaded.profile, written)}")
 
 
 def _write_profile(result: "Plan", file: NewFile | None) -> None:
@@ -228,8 +220,8 @@ def _write_profile(result: "Plan", file: NewFile | None) -> None:
         file.abandon()
 
 
-def _say_report(report: "Report") -> None:
+def _say_report(changes: KeyChanges, report: "Report") -> None:
     """Write the report to standard error: standard output has the profile."""
     from busplan.forms.terminal import block_lines
 
-    say(*(line.text for line in block_lines(report.blocks())))
+    say(*(line.text for line in block_lines(report_with(changes, report).blocks())))

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from busplan.cli.answering import answer
+from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
 from busplan.cli.destinations import profile_files
-from busplan.cli.options import OutputOption, complete_profile, format_option, time_us
+from busplan.cli.options import OutputOption, complete_profile, format_option
 from busplan.cli.progress import progress_bar
 from busplan.cli.several import load_each, part_of
 from busplan.errors import BusplanError
 from busplan.forms import Form
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +26,12 @@ _REFUSED: Final[dict[Form, str]] = {
 }
 
 
+@takes_changes(
+    period_form(" of all profiles with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"),
+    NODES,
+    GAP_COUNT,
+    words="Of all profiles.",
+)
 def report_command(
     profiles: Annotated[
         list[str],
@@ -45,16 +53,7 @@ def report_command(
             show_default=False,
         ),
     ] = None,
-    period: Annotated[
-        str | None,
-        typer.Option(
-            "--period",
-            metavar="TIME",
-            help="Communication period of all profiles with its unit, as 4ms, 250us or 0.001s.  "
-            "[default: the profile's cycle.period_us]",
-            show_default=False,
-        ),
-    ] = None,
+    changes: KeyChanges = NO_CHANGES,
     circle: Annotated[
         bool, typer.Option("--circle/--no-circle", help="Run the circle test of profiles that ask for one.")
     ] = True,
@@ -72,24 +71,14 @@ def report_command(
 
     if title is not None and (has_controls(title) or not title.strip()):
         raise BusplanError(f"--title {title!r}: expected words in one line, without control characters")
-    with answer(format_, output, inputs=profile_files(*profiles), default="html", refused=_REFUSED) as give:
-        plans = load_each(profiles, partial(_plan, period=period))
-        give(_page(profiles, plans, title, period=period, circle=circle))
-
-
-def _plan(argument: str, *, period: str | None) -> "Profile":
-    from busplan.profile.shipped import load
-    from busplan.profile.toml import override
-
-    plan = load(argument).profile
-    if period is None:
-        return plan
-    asked_us = time_us(period, option="--period")
-    return override(plan, {"cycle.period_us": asked_us}, origin={"cycle.period_us": f"--period {period}, in us"})
+    files = profile_files(*profiles)
+    with answer(format_, output, inputs=files, changes=changes, default="html", refused=_REFUSED) as give:
+        plans = load_each(profiles, partial(load_changed, changes=changes))
+        give(_page(profiles, plans, title, changes=changes, circle=circle))
 
 
 def _page(
-    arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, period: str | None, circle: bool
+    arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, changes: KeyChanges, circle: bool
 ) -> "Report":
     from busplan.analysis.all_answers import all_answers
     from busplan.answers.page.report import ReportedProfile, page_report
@@ -99,5 +88,5 @@ def _page(
         for number, (argument, plan) in enumerate(zip(arguments, plans, strict=True)):
             own = part_of(progress, number=number, of=len(plans))
             found = all_answers(plan, with_circle=circle, progress=own)
-            subjects.append(ReportedProfile(argument, found, other_period=period is not None))
+            subjects.append(ReportedProfile(argument, found, changes))
     return page_report(subjects, title=title)

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ALL_MODELS, ProfileArgument, TimingOption, form_of_file, output_option, plot_format
 from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS
+from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
@@ -23,6 +25,7 @@ _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "safe_axes"
 
 
+@takes_changes(words="Not of a key that varies.")
 def sweep_command(
     profile: ProfileArgument,
     vary: Annotated[
@@ -37,6 +40,7 @@ def sweep_command(
             show_default=False,
         ),
     ] = None,
+    changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
     format_: Annotated[
         SweepForm | None,
@@ -133,10 +137,12 @@ def sweep_command(
     file_format = None if plot is None else plot_format(plot)
     from busplan.analysis.sweep.grid import checked_grid, grid_models
     from busplan.cli.sweep_run import available_processors, run_sweep
-    from busplan.profile.shipped import load
 
-    loaded = load(profile).profile
+    loaded = load_changed(profile, changes)
     axes = parse_axes(vary or [], kind=loaded.bus.kind)
+    for one in changes.each:
+        for key in axes:
+            require_separate(one, key, typed=f"--vary {key}")
     grid = checked_grid(loaded, axes, with_circle=circle)
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
@@ -146,6 +152,7 @@ def sweep_command(
     run_sweep(
         SweepJob(
             profile=loaded,
+            changes=changes,
             grid=grid,
             timing_models=grid_models(loaded, grid, None if timing == ALL_MODELS else [timing], name="--timing"),
             columns=_columns(loaded, columns, grid, circle=circle, short=form in TOP_FORMS, sort_by=sort_by),

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
 from busplan.forms import Form
+from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
@@ -21,6 +22,8 @@ class SweepJob(NamedTuple):
     """The checked options of a sweep."""
 
     profile: "Profile"
+    changes: KeyChanges
+    """KeyChanges of the profile, applied."""
     grid: "Grid"
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]

@@ -37,6 +37,7 @@ def run_sweep(job: "SweepJob") -> None:
     StoppedError
         Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
+    from busplan.answers.documents import changes_sentences
     from busplan.answers.sweep.top import Tally
     from busplan.forms.columns import sentence_text
 
@@ -56,14 +57,18 @@ def run_sweep(job: "SweepJob") -> None:
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.form not in TOP_FORMS or file is not None:
-            say(*map(sentence_text, tally.sentences()))
+            say(*map(sentence_text, (*changes_sentences(job.changes), *tally.sentences())))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
             say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
             signal = noted()
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_format is not None:
-            plot_file.write(drawing.draw(job.profile.name, file_format=job.plot_format))
+            plot_file.write(
+                drawing.draw(
+                    ", ".join(filter(None, (job.profile.name, job.changes.words))), file_format=job.plot_format
+                )
+            )
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol
 
-from busplan.cli.answering import give
+from busplan.cli.answering import give, report_with
 from busplan.cli.output import document_bytes, emit_document
 from busplan.errors import BusplanError
 from busplan.forms import Form, render
@@ -56,7 +56,7 @@ class _TopSink:
         """Write the answer."""
         from busplan.answers.sweep.top import sweep_report
 
-        report = sweep_report(self._rows, self._tally, document=_not_kept)
+        report = report_with(self._job.changes, sweep_report(self._rows, self._tally, document=_not_kept))
         if self._file is None:
             give(report, self._form)
         else:
@@ -74,7 +74,10 @@ class _LinesSink:
         from busplan.answers.sweep.rows import csv_header, jsonl_header
 
         self._columns, self._form, self._write = job.columns, form, write
-        write(csv_header(job.columns) if form == "csv" else jsonl_header(job.profile.name, job.grid, job.timing_models))
+        if form == "csv":
+            write(csv_header(job.columns))
+        else:
+            write(jsonl_header(job.profile.name, job.grid, job.timing_models, changes=job.changes))
 
     def add(self, block: "SweepBlock") -> None:
         """Write a block."""
@@ -93,7 +96,7 @@ class _JsonSink:
         from busplan.answers.sweep.rows import json_header
 
         self._columns, self._write = job.columns, write
-        write(json_header(job.profile.name, job.grid, job.timing_models))
+        write(json_header(job.profile.name, job.grid, job.timing_models, changes=job.changes))
 
     def add(self, block: "SweepBlock") -> None:
         """Write a block."""

@@ -8,23 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, assert_never
 
 import typer
 
-from busplan.cli.answering import answer
+from busplan.cli.answering import answer, naming
+from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
-    NO_CHANGES,
-    KeyChanges,
     ProfileArgument,
     form_of_file,
-    load_changed,
     output_option,
-    periods_us,
-    takes_bus_options,
     time_us,
     timing_model,
 )
 from busplan.cli.output import refuse_terminal, write_document
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.timeline.schedule import Schedule
@@ -39,7 +36,9 @@ _ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType(
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
-@takes_bus_options
+@takes_changes(
+    period_form(" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"), NODES, GAP_COUNT
+)
 def timeline_command(
     profile: ProfileArgument,
     from_: Annotated[
@@ -68,16 +67,6 @@ def timeline_command(
             metavar="read:N|write:N",
             help="Show one transaction of one node (from 1) with its gaps, as read:1; --from and --to may narrow it "
             "further.  [default: all of them]",
-            show_default=False,
-        ),
-    ] = None,
-    period: Annotated[
-        str | None,
-        typer.Option(
-            "--period",
-            metavar="TIME",
-            help="Communication period with its unit, as 4ms, 250us or 0.001s.  "
-            "[default: the profile's cycle.period_us]",
             show_default=False,
         ),
     ] = None,
@@ -121,7 +110,7 @@ def timeline_command(
     def shown() -> "Schedule":
         from busplan.analysis.timeline.schedule import schedule, zoom
 
-        plan = _network(profile, changes, period)
+        plan = load_changed(profile, changes)
         one = None if transaction is None else _transaction(transaction, plan)
         model = None if timing is None else timing_model(timing, plan)
         return zoom(schedule(plan, model=model), from_us=from_us, to_us=to_us, transaction=one)
@@ -129,9 +118,10 @@ def timeline_command(
     match chosen:
         case "mermaid" | "svg" | "png":
             require_apart({"--output": output}, inputs=profile_files(profile))
-            write_document(_picture(shown(), chosen), output)
+            with naming(changes):
+                write_document(_picture(shown(), chosen, changes), output)
         case _:
-            with answer(chosen, output, inputs=profile_files(profile)) as give:
+            with answer(chosen, output, inputs=profile_files(profile), changes=changes) as give:
                 from busplan.answers.timeline import timeline_report
 
                 give(timeline_report(shown()))
@@ -149,14 +139,6 @@ def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
     return chosen
 
 
-def _network(profile: str, changes: KeyChanges, period: str | None) -> "Profile":
-    from busplan.profile.toml import override
-
-    plan = load_changed(profile, changes)
-    asked_us = None if period is None else periods_us([period], plan)
-    return plan if asked_us is None else override(plan, {"cycle.period_us": asked_us[0]})
-
-
 def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
     from busplan.analysis.network import bus_of
 
@@ -171,12 +153,13 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
     return match["kind"], int(match["node"])
 
 
-def _picture(shown: "Schedule", form: Picture) -> str | bytes:
+def _picture(shown: "Schedule", form: Picture, changes: KeyChanges) -> str | bytes:
     """The drawing as a file of its own."""
+    from busplan.answers.documents import changes_sentences
     from busplan.answers.timeline import headline
     from busplan.forms.columns import sentence_text
 
-    title = sentence_text(headline(shown))
+    title = " ".join(map(sentence_text, (headline(shown), *changes_sentences(changes))))
     match form:
         case "mermaid":
             from busplan.drawings.timeline.mermaid import timeline_mermaid

@@ -45,7 +45,7 @@ def require_matplotlib(option: str = "--plot") -> None:
         ) from None
 
 
-def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
+def circle_figure(test: "CircleTest", *, file_format: str, note: str = "") -> bytes:
     """Draw the circle test into a file.
 
     Parameters
@@ -54,6 +54,8 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
         The circle test.
     file_format
         One of `PLOT_FORMATS`.
+    note
+        What the title says besides the profile's name.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def circle_figure(test: "CircleTest", *, file_format: str) -> bytes:
     buffer = BytesIO()
     # A fixed salt makes the ids of an SVG reproducible.
     with rc_context({"svg.hashsalt": "busplan"}):
-        draw_test(test).savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
+        draw_test(test, note=note).savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
     return buffer.getvalue()
 
 
@@ -80,13 +82,15 @@ def metadata(file_format: str) -> dict[str, None]:
     return {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(file_format, {})
 
 
-def draw_test(test: "CircleTest") -> "Figure":
+def draw_test(test: "CircleTest", *, note: str = "") -> "Figure":
     """Draw a row for each simulated period: the magnified circle, the error over time, and error sources if ranked.
 
     Parameters
     ----------
     test
         The circle test.
+    note
+        What the title says besides the profile's name.
 
     Returns
     -------
@@ -115,7 +119,7 @@ def draw_test(test: "CircleTest") -> "Figure":
         figure = Figure(figsize=(15.5 if ranked else 11.0, 4.6 * len(rows) + 1.0), layout="constrained")
         ratios = (1, 1.4, 0.8) if ranked else (1, 1.4)
         panels = figure.subplots(len(rows), len(ratios), squeeze=False, width_ratios=ratios)
-        figure.suptitle(_title(test))
+        figure.suptitle(_title(test, note))
         for (polar, over_time, *ranking), row in zip(panels, rows, strict=True):
             draw_circle(polar, row, scales)
             draw_errors(over_time, row, scales)
@@ -125,13 +129,13 @@ def draw_test(test: "CircleTest") -> "Figure":
     return figure
 
 
-def _title(test: "CircleTest") -> str:
-    """Name, grade of the servo values, and the periods that are not drawn."""
+def _title(test: "CircleTest", note: str) -> str:
+    """Name, note, grade of the servo values, and the periods that are not drawn."""
     first = test.results[0]
     servo = "ideal drive" if first.ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(one.period_us) for one, run in zip(test.results, test.runs, strict=True) if run is None]
     without = f"not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
-    lines = (fill(line, _TITLE_WIDTH) for line in (f"circle test, {servo}", without) if line)
+    lines = (fill(line, _TITLE_WIDTH) for line in (note, f"circle test, {servo}", without) if line)
     return "\n".join((fill(test.profile.name, _NAME_WIDTH), *lines))
 
 

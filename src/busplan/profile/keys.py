@@ -48,8 +48,17 @@ def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, o
             yield f"{prefix}{name}", value
 
 
-def holder(data: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
+def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[dict[str, Any], str]:
     """Find the table of a dotted key, created if it is missing, and the name of the key in it.
+
+    Parameters
+    ----------
+    data
+        The tables.
+    key
+        The dotted key.
+    name
+        What messages call the key; by default the key.
 
     Raises
     ------
@@ -57,8 +66,8 @@ def holder(data: dict[str, Any], key: str) -> tuple[dict[str, Any], str]:
         A part of the key is a value.
     """
     *tables, last = key.split(".")
-    for name in tables:
-        data = data.setdefault(name, {})
+    for table in tables:
+        data = data.setdefault(table, {})
         if not isinstance(data, dict):
-            raise BusplanError(f"{key}: no such key; {name} is a value, not a section")
+            raise BusplanError(f"{name or key}: no such key; {table} is a value, not a section")
     return data, last

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from difflib import get_close_matches
+from operator import eq
 from typing import Any, Final, NamedTuple, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -213,9 +214,19 @@ def _shortened(written: str, limit: int = 40) -> str:
 def refused_changes(
     error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:
-    """Make the error for changes of a profile; each problem names its option or key."""
-    messages = []
-    for found in _unknown_kind(data) if error is None else findings(error, data):
-        value = f" {changes[found.key]}" if found.key in changes else ""
-        messages.append(f"{origin.get(found.key, found.key)}{value}: {found.message}")
-    return BusplanError(*messages)
+    """Make the error for changes of a profile; each problem names what set its key."""
+    found = _unknown_kind(data) if error is None else findings(error, data)
+    sources: dict[KeyPath, str] = {
+        tuple(key.split(".")): origin.get(key, f"{key} {value}") for key, value in changes.items()
+    }
+    return BusplanError(*(_of_changes(one, sources) for one in found))
+
+
+def _of_changes(found: KeyFinding, sources: dict[KeyPath, str]) -> str:
+    """Message for a problem of a changed key, of one around or inside it, or of one that the changes do not suit."""
+    if found.path in sources:
+        return f"{sources[found.path]}: {found.message}"
+    near = [source for path, source in sources.items() if all(map(eq, path, found.path))]
+    if near:
+        return f"{' and '.join(near)}: {found.key}: {found.message}"
+    return f"with {' and '.join(sources.values())}, {found.key}: {found.message}"

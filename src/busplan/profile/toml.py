@@ -124,7 +124,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     changes
         New value by dotted key: {"bus.nodes": 3}.
     origin
-        Name of a key in messages, if it is not the key: {"bus.nodes": "--nodes"}.
+        What set a key, for messages, if it is not key and value: {"bus.nodes": "--nodes 3"}.
 
     Raises
     ------
@@ -133,16 +133,18 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     """
     if not changes:
         return profile
+    origin = origin or {}
     data = profile.model_dump(exclude_unset=True)
     for key, value in changes.items():
-        table, last = holder(data, key)
+        table, last = holder(data, key, name=origin.get(key))
         table[last] = value
     kind, problem = kind_of(data), None
     try:
-        if kind is not None:
-            return profile_model(kind).model_validate(data)
+        found = profile_model(kind).model_validate(data)
     except ValidationError as error:
         problem = error
+    if kind is not None and problem is None:
+        return found
     from busplan.profile.problems import refused_changes  # as above
 
-    raise refused_changes(problem, data, changes, origin or {})
+    raise refused_changes(problem, data, changes, origin)

@@ -9,6 +9,7 @@ from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.cures import Change, change_for_room, change_to_fit, changeable, listed
 from busplan.buses.rule import Severity
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.toml import LoadedProfile, override
 
 
@@ -27,9 +28,11 @@ class Finding(NamedTuple):
 class Subject:
     """A profile with the figures that rules need, each computed once, at first use."""
 
-    def __init__(self, loaded: LoadedProfile) -> None:
+    def __init__(self, loaded: LoadedProfile, changes: KeyChanges = NO_CHANGES) -> None:
         self.profile = loaded.profile
         self.document = loaded.document
+        self.origin = f" (with {changes.words})" if changes.words else ""
+        """End of the messages: the changes, which the document does not show."""
 
     @cached_property
     def deciding(self) -> CapacityFigures:

@@ -5,6 +5,7 @@ from typing import Literal, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
@@ -46,6 +47,7 @@ def check_source(
     *,
     with_circle: bool = True,
     circle_steps: int = circle.MOST_STEPS,
+    changes: KeyChanges = NO_CHANGES,
     recorded: Mapping[str, Recorded] | None = None,
     record: bool = False,
 ) -> FileResult:
@@ -59,6 +61,8 @@ def check_source(
         Whether to run the circle test of profiles that ask for one.
     circle_steps
         Most simulated steps of each axis of a circle: a longer one is not run.
+    changes
+        Changes of the profile; if its schema refuses them, the result has a failure.
     recorded
         Baseline figures by file name; None for no baseline.
     record
@@ -75,7 +79,14 @@ def check_source(
     except PlacedError as error:
         return unreadable(source.name, error, content)
     before = None if recorded is None else recorded.get(source.name, {})
-    return check_document(document, with_circle=with_circle, circle_steps=circle_steps, baseline=before, record=record)
+    return check_document(
+        document,
+        with_circle=with_circle,
+        circle_steps=circle_steps,
+        changes=changes,
+        baseline=before,
+        record=record,
+    )
 
 
 def check_document(
@@ -83,6 +94,7 @@ def check_document(
     *,
     with_circle: bool = True,
     circle_steps: int = circle.MOST_STEPS,
+    changes: KeyChanges = NO_CHANGES,
     baseline: Recorded | None = None,
     record: bool = True,
 ) -> FileResult:
@@ -96,6 +108,8 @@ def check_document(
         Whether to run the circle test of profiles that ask for one.
     circle_steps
         Most simulated steps of each axis of a circle: a longer one is not run.
+    changes
+        Changes of the profile; if its schema refuses them, the result has a failure.
     baseline
         Baseline figures of the profile; None for no baseline.
     record
@@ -111,7 +125,12 @@ def check_document(
     except PlacedError as error:
         # These cannot be suppressed: nothing else of the file was checked.
         return _result(document, None, list(_of_file(error)), {})
-    subject = Subject(LoadedProfile(profile, document))
+    try:
+        profile = changes.applied(profile)
+    except BusplanError as error:
+        failure = f"{document.name}: {'; '.join(error.problems)}"
+        return FileResult(document.name, profile.name, (), {}, failure=failure)
+    subject = Subject(LoadedProfile(profile, document), changes)
     own = cycle_rules(profile.bus.kind)
     found = list(_findings(subject, own))
     ran = {rule.code for rule in own}
@@ -123,6 +142,9 @@ def check_document(
         lost = regressions(figures_of(subject), baseline)
         found += [_placed(subject, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
+    if changes.each:
+        # What a comment suppresses is of the file as it is.
+        ran = set()
     figures = figures_of(subject) if record else {}
     return _result(document, profile.name, suppress(found, document, ran=ran), figures)
 
@@ -153,7 +175,7 @@ def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Make a finding at the line of the problem's key, or of the table that should have it."""
     document = subject.document
     line, column = document.lines.line_and_column(document.nearest(tuple(problem.key.split("."))))
-    message = f"{problem.key}: {problem.message}"
+    message = f"{problem.key}: {problem.message}{subject.origin}"
     return Finding(rule.code, rule.name, rule.severity, message, problem.key, line, column)
 
 

@@ -5,6 +5,7 @@ from hashlib import sha256
 from typing import NamedTuple
 
 from busplan.buses.rule import Severity
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.rules.finding import Finding
 from busplan.rules.gate import FileResult
 
@@ -29,8 +30,9 @@ class Located(NamedTuple):
 class CheckReport:
     """Result of one run of the gate."""
 
-    def __init__(self, files: tuple[FileResult, ...]) -> None:
+    def __init__(self, files: tuple[FileResult, ...], changes: KeyChanges = NO_CHANGES) -> None:
         self.files = files
+        self.changes = changes
 
     @cached_property
     def summary(self) -> Summary:

@@ -128,7 +128,8 @@ def capacity(
     periods = [profile.cycle.period_us] if periods_us is None else periods_us
     models = model_names(profile) if timing_models is None else timing_models
     variants = [
-        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
+        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": f"period {period}"})
+        for period in periods
     ]
     return Capacity(
         profile,

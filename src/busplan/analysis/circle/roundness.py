@@ -172,7 +172,8 @@ def circle_test(
     """
     periods = [profile.cycle.period_us] if periods_us is None else periods_us
     variants = [
-        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": "period"}) for period in periods
+        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": f"period {period}"})
+        for period in periods
     ]
     counter = _Counter(progress)
     # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus

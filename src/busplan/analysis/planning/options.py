@@ -20,6 +20,7 @@ from busplan.analysis.planning.best_values import (
 )
 from busplan.analysis.planning.cures import changes_to_fit, safe_required_us
 from busplan.buses.bus import Setting, Value
+from busplan.profile.keys import flat
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
@@ -138,7 +139,7 @@ def plan(
     planner = _Planner(goal, circle=circle, max_circles=max_circles)
     found = list(planner.options())
     options = [one for one in found if isinstance(one, Option)]
-    recommended = planner.recommended(keep={"bus.nodes", *asked})
+    recommended = planner.recommended(keep={"bus.nodes", *dict(flat(asked))})
     if recommended is not None:
         same = next((number for number, one in enumerate(options) if one.changes == recommended.changes), None)
         if same is None:

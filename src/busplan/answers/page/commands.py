@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
@@ -10,10 +10,12 @@ from busplan.analysis.capacity.verdict import verdicts
 from busplan.answers.assumptions import assumptions_document
 from busplan.answers.capacity import capacity_document
 from busplan.answers.circle import circle_document
+from busplan.answers.documents import changed_document
 from busplan.answers.latency import latency_document
 from busplan.answers.timeline import timeline_document
 from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
 from busplan.printable import has_controls
+from busplan.profile.changes import KeyChanges
 
 
 class Source(NamedTuple):
@@ -69,7 +71,13 @@ def period_option(period_us: float) -> tuple[str, str]:
     return "--period", f"{repr(period_us).removesuffix('.0')}us"
 
 
-def sources(answer: AllAnswers, *, argument: str, key: str, other_period: bool) -> dict[str, Source]:
+def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
+    """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
+    for one in changes.each:
+        yield from period_option(period_us) if one.option == "--period" else (one.option, shell_word(one.text))
+
+
+def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges) -> dict[str, Source]:
     """The commands behind one profile's figures, by a short name.
 
     Parameters
@@ -80,25 +88,30 @@ def sources(answer: AllAnswers, *, argument: str, key: str, other_period: bool) 
         The PROFILE argument.
     key
         Prefix of the keys.
-    other_period
-        Whether its period differs from that of its file.
+    changes
+        KeyChanges of its file, which the commands repeat.
     """
-    own = period_option(answer.profile.cycle.period_us) if other_period else ()
     each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
     found: dict[str, Source] = {}
 
-    def add(name: str, purpose: str, document: JsonDocument, *options: str) -> None:
-        words = ("busplan", str(document["command"]), shell_word(argument), *options, "--format", "json")
-        found[name] = Source(Command(" ".join(words), purpose, f"{key}-{name}"), document)
+    def add(name: str, purpose: str, document: JsonDocument, *options: str, own: KeyChanges = changes) -> None:
+        changed = change_options(own, period_us=answer.profile.cycle.period_us)
+        words = ("busplan", str(document["command"]), shell_word(argument), *options, *changed, "--format", "json")
+        line = " ".join(words)
+        found[name] = Source(Command(line, purpose, f"{key}-{name}"), changed_document(document, own))
 
+    # Neither latency nor the list of explain takes --period.
+    elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
     bus, periods = answer.capacity, answer.periods
-    add("capacity", "verdict, timing models, terms", capacity_document(bus, (answer.verdict,)), *own)
-    add("latency", "latencies, part by part", latency_document(answer.latency))
+    add("capacity", "verdict, timing models, terms", capacity_document(bus, (answer.verdict,)))
+    add("latency", "latencies, part by part", latency_document(answer.latency), own=elsewhere)
     if answer.schedule is not None:
-        add("timeline", "the cycle event by event", timeline_document(answer.schedule), *own)
-    add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each)
+        add("timeline", "the cycle event by event", timeline_document(answer.schedule))
+    others = changes.without(key="cycle.period_us")
+    add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
     if answer.circle is not None:
         document = circle_document(answer.circle, with_contributions=True)
-        add("circle", "the circle and its error sources", document, "--contributions", *own)
-    add("explain", "what the figures rest on", assumptions_document(answer.profile, answer.assumptions))
+        add("circle", "the circle and its error sources", document, "--contributions")
+    document = assumptions_document(answer.profile, answer.assumptions)
+    add("explain", "what the figures rest on", document, own=elsewhere)
     return found

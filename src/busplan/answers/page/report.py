@@ -43,6 +43,7 @@ from busplan.forms.blocks import (
     attribute_value,
 )
 from busplan.forms.numbers import MISSING, plural
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 _MEASURES: Final = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")
 
@@ -53,8 +54,8 @@ class ReportedProfile(NamedTuple):
     argument: str
     """The PROFILE argument."""
     answer: AllAnswers
-    other_period: bool
-    """Whether its period differs from that of its file."""
+    changes: KeyChanges = NO_CHANGES
+    """KeyChanges of its file."""
 
 
 class _Subject(NamedTuple):
@@ -85,7 +86,7 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
             f"p{number}",
             shell_word(one.argument),
             one.answer,
-            sources(one.answer, argument=one.argument, key=f"p{number}", other_period=one.other_period),
+            sources(one.answer, argument=one.argument, key=f"p{number}", changes=one.changes),
         )
         for number, one in enumerate(profiles, start=1)
     ]

@@ -11,10 +11,11 @@ import numpy as np
 
 from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
-from busplan.answers.documents import document
+from busplan.answers.documents import changed_document, document
 from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
+from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 Style = Literal["csv", "jsonl"]
 TEXT_POINTS: Final = 4096
@@ -26,15 +27,15 @@ def csv_header(columns: Sequence[str]) -> str:
     return ",".join(columns) + "\n"
 
 
-def jsonl_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
+def jsonl_header(profile: str, grid: Grid, timing_models: Sequence[str], *, changes: KeyChanges = NO_CHANGES) -> str:
     """First line of a sweep's JSON lines: what the rows are, and how many a complete sweep has."""
-    facts = {**_facts(profile, grid, timing_models), "rows": grid.points * len(timing_models)}
+    facts = {**_facts(profile, grid, timing_models, changes), "rows": grid.points * len(timing_models)}
     return json_text(facts) + "\n"
 
 
-def json_header(profile: str, grid: Grid, timing_models: Sequence[str]) -> str:
+def json_header(profile: str, grid: Grid, timing_models: Sequence[str], *, changes: KeyChanges = NO_CHANGES) -> str:
     """Start of a sweep's JSON document, up to its first row."""
-    facts = json_text(_facts(profile, grid, timing_models))
+    facts = json_text(_facts(profile, grid, timing_models, changes))
     return facts.removesuffix("}") + ', "rows": [\n'
 
 
@@ -49,15 +50,16 @@ def json_footer(*, complete: bool) -> str:
     return f'\n], "complete": {json_text(complete)}}}\n'
 
 
-def _facts(profile: str, grid: Grid, timing_models: Sequence[str]) -> JsonDocument:
+def _facts(profile: str, grid: Grid, timing_models: Sequence[str], changes: KeyChanges) -> JsonDocument:
     """Common beginning of the JSON forms of a sweep."""
-    return document(
+    facts = document(
         "sweep",
         profile=profile,
         varied={key: axis.size for key, axis in grid.axes.items()},
         timing_models=list(timing_models),
         points=grid.points,
     )
+    return changed_document(facts, changes)
 
 
 def block_text(block: SweepBlock, columns: Sequence[str], *, style: Style) -> str:

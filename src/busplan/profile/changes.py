@@ -1,0 +1,165 @@
+"""Changes of a profile by options: `--set KEY=VALUE` and its short forms, such as --nodes."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from busplan.errors import BusplanError, PlacedError
+
+if TYPE_CHECKING:
+    from busplan.sections.profile import Profile
+
+SET: Final = "--set"
+_KEY: Final = re.compile(r"[A-Za-z0-9_-]{1,100}(?:\.[A-Za-z0-9_-]{1,100}){0,9}")
+_WORD: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_VALUE: Final = "value"
+_MOST_SAID: Final = 100
+"""Longest option repeated in full in a message."""
+
+
+class KeyChange(NamedTuple):
+    """A new value of one key, and the option that sets it."""
+
+    key: str
+    value: object
+    option: str = SET
+    text: str = ""
+    """Value of the option as typed."""
+    note: str = ""
+    """The profile's value, if it is not what was typed: ", in us 500.0"."""
+
+    @property
+    def typed(self) -> str:
+        """The option with its value as typed, shortened if it is long."""
+        text = self.text if len(self.text) <= _MOST_SAID else f"{self.text[:_MOST_SAID]}..."
+        return f"{self.option} {text}"
+
+    @property
+    def sections(self) -> tuple[str, ...]:
+        """Parts of the key."""
+        return tuple(self.key.split("."))
+
+
+@dataclass(frozen=True)
+class KeyChanges:
+    """Changes that are applied together; their order does not matter.
+
+    Parameters
+    ----------
+    each
+        The changes.
+
+    Raises
+    ------
+    BusplanError
+        Two of them set the same key, or one sets a key inside the table of another.
+    """
+
+    each: tuple[KeyChange, ...] = ()
+
+    def __post_init__(self) -> None:
+        for one, other in combinations(self.each, 2):
+            require_separate(one, other.key, typed=other.typed)
+
+    @property
+    def values(self) -> dict[str, object]:
+        """New value by dotted key."""
+        return {one.key: one.value for one in self.each}
+
+    @property
+    def by_set(self) -> tuple[KeyChange, ...]:
+        """Changes by --set; those by a short form show in every answer."""
+        return tuple(one for one in self.each if one.option == SET)
+
+    @property
+    def words(self) -> str:
+        """The --set options as typed; empty without them."""
+        return " and ".join(one.typed for one in self.by_set)
+
+    def without(self, *, key: str) -> "KeyChanges":
+        """Leave out the change of a key."""
+        return KeyChanges(tuple(one for one in self.each if one.key != key))
+
+    def applied(self, profile: "Profile") -> "Profile":
+        """Return the profile with all changes, validated once.
+
+        Raises
+        ------
+        BusplanError
+            The profile's schema refuses them; each problem names its option.
+        """
+        from busplan.profile.toml import override  # noqa: PLC0415 - loads pydantic, which --help does not need
+
+        return override(profile, self.values, origin={one.key: f"{one.typed}{one.note}" for one in self.each})
+
+
+NO_CHANGES: Final = KeyChanges()
+
+
+def require_separate(change: KeyChange, key: str, *, typed: str) -> None:
+    """Refuse to give a value to one key in two ways.
+
+    Parameters
+    ----------
+    change
+        A change.
+    key
+        Key that another option sets.
+    typed
+        The other option with its value.
+
+    Raises
+    ------
+    BusplanError
+        The keys are the same, or one is a section of the other.
+    """
+    one, other = change.sections, tuple(key.split("."))
+    shared = min(len(one), len(other))
+    if one[:shared] != other[:shared]:
+        return
+    inner, outer = (change.key, key) if len(one) > len(other) else (key, change.key)
+    why = f"both set {key}" if one == other else f"{inner} is inside {outer}"
+    raise BusplanError(f"{change.typed} and {typed}: {why}; give one of them")
+
+
+def parse_set(texts: Sequence[str]) -> tuple[KeyChange, ...]:
+    """Parse the values of --set, each KEY=VALUE.
+
+    Raises
+    ------
+    BusplanError
+        Not KEY=VALUE, or not a TOML value.
+
+    Examples
+    --------
+    >>> [(one.key, one.value) for one in parse_set(["bus.speed=S200", "node.execution.time_us=[30, 40.5]"])]
+    [('bus.speed', 'S200'), ('node.execution.time_us', [30, 40.5])]
+    """
+    return tuple(map(_parsed, texts))
+
+
+def _parsed(text: str) -> KeyChange:
+    key, equals, written = (part.strip() for part in text.partition("="))
+    if not equals or not written or not _KEY.fullmatch(key):
+        raise BusplanError(f"{SET} {text}: expected KEY=VALUE with a dotted key of the profile, as cycle.period_us=500")
+    return KeyChange(key, _value(written, name=f"{SET} {text}"), text=f"{key}={written}")
+
+
+def _value(written: str, *, name: str) -> object:
+    """Read a TOML value; a word that TOML has not is text."""
+    from busplan.profile.document import Document  # noqa: PLC0415 - as above
+
+    try:
+        data = Document(SET, f"{_VALUE} = {written}").data()
+    except PlacedError:
+        data = {}
+    if set(data) == {_VALUE}:
+        return data[_VALUE]
+    if _WORD.fullmatch(written):
+        return written
+    raise BusplanError(
+        f"{name}: {written} is not a TOML value; expected a number without its unit, true or false, a word, "
+        'text in quotes, as "two words", an array, as [4, 16], or a table, as {kind = "linear", base_us = 30}'
+    )

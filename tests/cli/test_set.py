@@ -1,0 +1,329 @@
+"""`--set KEY=VALUE` on every command that reads a profile: computed, said, refused, written, and repeated by a page."""
+
+import json
+import re
+import tomllib
+from collections.abc import Callable
+from html import unescape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from busplan.cli.lazy import COMMANDS
+from busplan.profile.shipped import locate
+
+if TYPE_CHECKING:
+    import subprocess
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Refused = Callable[..., str]
+
+PROFILE = """\
+schema_version = 1
+name = "mine"
+[bus]
+kind = "ieee1394"
+speed = "S400"
+nodes = 2        # as built
+gap_count = 10   # busplan: ignore[BP110] chosen with the drive's maker
+[cycle]
+period_us = 2000 # as the drives
+[payload]
+read_bytes = 12
+write_bytes = 12
+[node]
+axes = 4
+[node.execution]
+kind = "linear"
+base_us = 30
+per_byte_us = 0.35
+[servo]
+position_gain_per_s = 50
+velocity_feedforward = 0
+[circle]
+radius_mm = 25
+feed_mm_per_min = 3000
+ramp_periods = 20
+"""
+SET = ("--set", "node.axes=3", "--set", "bus.speed=S200")
+SAID = "With --set node.axes=3 and --set bus.speed=S200."
+VALUES = {"node.axes": 3, "bus.speed": "S200"}
+EVERY = {
+    "capacity": ("mine.toml",),
+    "latency": ("mine.toml",),
+    "circle-test": ("mine.toml",),
+    "explain": ("mine.toml", "required_us"),
+    "timeline": ("mine.toml",),
+    "report": ("mine.toml", "--no-circle"),
+    "plan": ("mine.toml", "--no-circle"),
+    "sweep": ("mine.toml", "--vary", "bus.nodes=1:3"),
+    "diff": ("mine.toml", "paper-1ms", "--no-circle"),
+    "calibrate": ("mine.toml", "table-1.csv"),
+    "check": ("mine.toml", "--no-circle"),
+}
+WITHOUT_PROFILE = {"rule", "schema", "manual", "paper", "profiles", "init"}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "mine.toml").write_text(PROFILE, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Path:
+    """The profile with the changes in its file, under the same name."""
+    folder = tmp_path / "edited"
+    folder.mkdir()
+    text = PROFILE.replace("axes = 4", "axes = 3").replace("S400", "S200")
+    (folder / "mine.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_every_command_that_reads_a_profile_is_tried_here() -> None:
+    assert {*EVERY, *WITHOUT_PROFILE} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("command", EVERY)
+def test_every_answer_is_that_of_the_edited_file_and_says_so(
+    run: Run, folder: Path, edited: Path, command: str
+) -> None:
+    form = "--format=json"
+    # The other side of a diff gets the changes, too.
+    other = SET if command == "diff" else ()
+    changed = run(command, *EVERY[command], *SET, form, cwd=folder)
+    file = run(command, *EVERY[command], *other, form, cwd=edited)
+    assert changed.returncode == file.returncode
+    document, expected = json.loads(changed.stdout), json.loads(file.stdout)
+    assert list(document)[:3] == ["schema", "command", "changes_of_both" if command == "diff" else "changes"]
+    assert document["changes_of_both" if command == "diff" else "changes"] == VALUES
+    assert without_changes(document) == without_changes(expected)
+    if command != "diff":
+        assert "changes" not in expected
+
+
+def without_changes(item: Any) -> Any:
+    """A document without what names the options: the keys of --set, and the end of a finding."""
+    if isinstance(item, dict):
+        kept = {key: one for key, one in item.items() if one != VALUES}
+        return {key: without_changes(one) for key, one in kept.items() if key not in ("recommended_changes", "changes")}
+    if isinstance(item, list):
+        return [without_changes(one) for one in item]
+    return item.removesuffix(f" ({SAID[0].lower()}{SAID[1:-1]})") if isinstance(item, str) else item
+
+
+@pytest.mark.parametrize("command", [name for name in EVERY if name not in ("report", "check")])
+@pytest.mark.parametrize("form", ["table", "markdown", "html"])
+def test_answers_for_people_name_the_changes_once_at_the_top(run: Run, folder: Path, command: str, form: str) -> None:
+    text = unescape(
+        re.sub(r"<[^>]*>|[`\\]", "", run(command, *EVERY[command], *SET, "--format", form, cwd=folder).stdout)
+    )
+    assert text.count(SAID) == 1
+    assert text.index(SAID) < 100 if form == "table" else text.index(SAID) < len(text)
+    plain = run(command, *EVERY[command], "--format", form, cwd=folder).stdout
+    assert "--set" not in plain
+
+
+@pytest.mark.parametrize("command", EVERY)
+def test_every_command_refuses_what_the_file_may_not_say(refused: Refused, folder: Path, command: str) -> None:
+    said = refused(command, *EVERY[command], "--set", "cycle.perod_us=1", "--set", "bus.nodes=0", cwd=folder).split(
+        "\n"
+    )[0]
+    if command == "check":
+        both = "--set bus.nodes=0: must be 1 or more; --set cycle.perod_us=1: unknown key; did you mean period_us?"
+        assert said == f"mine.toml: {both}"
+    else:
+        assert said == "--set bus.nodes=0: must be 1 or more"
+
+
+@pytest.mark.parametrize(
+    ("short", "long"),
+    [
+        (("capacity", "--nodes", "3", "--gap-count", "optimal"), ("bus.nodes=3", "bus.gap_count=optimal")),
+        (("latency", "--nodes", "3", "--gap-count", "7"), ("bus.nodes=3", "bus.gap_count=7")),
+        (("timeline", "--period", "1ms", "--nodes", "3"), ("cycle.period_us=1000", "bus.nodes=3")),
+        (("circle-test", "--feed", "2000", "--radius", "20"), ("circle.feed_mm_per_min=2000", "circle.radius_mm=20")),
+        (("circle-test", "--nodes", "3", "--gap-count", "8"), ("bus.nodes=3", "bus.gap_count=8")),
+        (("circle-test", "--seed", "5"), ("delivery.seed=5",)),
+        (("report", "--no-circle", "--period", "1ms", "--nodes", "3"), ("cycle.period_us=1000", "bus.nodes=3")),
+        (("report", "--no-circle", "--gap-count", "optimal"), ("bus.gap_count=optimal",)),
+        (("plan", "--no-circle", "--period", "1ms", "--nodes", "3"), ("cycle.period_us=1000", "bus.nodes=3")),
+    ],
+)
+def test_a_short_form_is_the_key_it_stands_for(
+    run: Run, folder: Path, short: tuple[str, ...], long: tuple[str, ...]
+) -> None:
+    command, *rest = short
+    flags = [one for one in rest if one == "--no-circle"]
+    form = ("mine.toml", "--format", "json")
+    by_short = json.loads(run(*short, *form, cwd=folder).stdout)
+    by_set = json.loads(run(command, *flags, *(f"--set={one}" for one in long), *form, cwd=folder).stdout)
+    assert "changes" not in by_short
+    assert len(by_set.pop("changes")) == len(long)
+    if command == "report":
+        for one in by_set["profiles"][0]["answers"].values():
+            one.pop("changes", None)
+    assert by_short == by_set
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("capacity", "mine.toml", "--set", "bus.nodes=3", "--nodes", "4"),
+            "--nodes 4 and --set bus.nodes=3: both set bus.nodes; give one of them",
+        ),
+        (
+            ("capacity", "mine.toml", "--set", "cycle.period_us=500", "--period", "4ms"),
+            "--set cycle.period_us=500 and --period 4ms: both set cycle.period_us; give one of them",
+        ),
+        (
+            ("timeline", "mine.toml", "--set", "cycle.period_us=500", "--period", "4ms"),
+            "--period 4ms and --set cycle.period_us=500: both set cycle.period_us; give one of them",
+        ),
+        (
+            ("sweep", "mine.toml", "--vary", "bus.nodes=1:3", "--set", "bus.nodes=3"),
+            "--set bus.nodes=3 and --vary bus.nodes: both set bus.nodes; give one of them",
+        ),
+        (
+            ("plan", "mine.toml", "--axes", "8", "--set", "bus.nodes=3"),
+            "--set bus.nodes=3 and --axes 8: give one of them",
+        ),
+        (
+            ("check", "mine.toml", "--baseline", "b.json", "--update-baseline", *SET),
+            "--update-baseline: goes without --set node.axes=3 and --set bus.speed=S200: it records the files",
+        ),
+        (
+            ("calibrate", "mine.toml", "table-1.csv", "--apply", "--set", "node.execution.base_us=3"),
+            "--set node.execution.base_us=3 and --apply: both set node.execution.base_us; give one of them",
+        ),
+        (
+            ("circle-test", "mine.toml", "--set", "cycle.period_us=1050"),
+            "step_us = 100.0: the period of 1050 us is no multiple of it; 105 or 95.4545 us would fit (with --set",
+        ),
+        (("timeline", "mine.toml", "--set", "name=x", "--transaction", "x:1"), "--transaction x:1: expected read or"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_the_file_stays(
+    refused: Refused, folder: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    assert refused(*arguments, cwd=folder).startswith(said)
+    assert (folder / "mine.toml").read_text(encoding="utf-8") == PROFILE
+
+
+def test_apply_of_a_plan_writes_the_changes_with_the_recommendation(run: Run, folder: Path) -> None:
+    execution = 'node.execution={kind="table", payload_bytes=[4, 64], time_us=[20, 40]}'
+    asked = ("--set", "cycle.period_us=400", "--set", execution, "--set", "limits.reserve=0.05", "--nodes", "3")
+    done = run("plan", "mine.toml", "--no-circle", "--apply", *asked, "--format", "json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    text = (folder / "mine.toml").read_text(encoding="utf-8")
+    data, document = tomllib.loads(text), json.loads(done.stdout)
+    assert re.search(r"^period_us = 400 +# as the drives$", text, re.MULTILINE)
+    assert re.search(r"^nodes = 3 +# as built$", text, re.MULTILINE)
+    assert data["node"]["execution"] == {"kind": "table", "payload_bytes": [4, 64], "time_us": [20, 40]}
+    assert data["limits"] == {"reserve": 0.05}
+    assert 'node.execution.kind = "table", node.execution.payload_bytes = [4, 64], ' in done.stderr
+    for key, value in document["recommended_changes"].items():
+        section, _, name = key.partition(".")
+        assert key == "node.execution" or data[section][name] == value
+    assert set(document["recommended_changes"]) > {"cycle.period_us", "bus.nodes", "node.execution", "limits.reserve"}
+
+
+def test_a_new_profile_has_the_changes_and_a_plan_keeps_them(run: Run, folder: Path) -> None:
+    asked = ("--set", "cycle={period_us=300, slice_ratio=0.5}", "--set", "node.axes=2", "--axes", "6")
+    done = run("plan", "mine.toml", "--no-circle", "-o", "-", *asked, cwd=folder)
+    assert "With --set cycle={period_us=300, slice_ratio=0.5} and --set node.axes=2." in done.stderr
+    assert "3 nodes (6 axes) at 300 us" in done.stderr
+    # Neither the period nor the slice ratio may change, and nothing else helps.
+    assert (done.returncode, done.stdout) == (1, "")
+    asked = ("--set", "cycle={period_us=900, slice_ratio=0.5}", *asked[2:])
+    new = tomllib.loads(run("plan", "mine.toml", "--no-circle", "-o", "-", *asked, cwd=folder).stdout)
+    assert (new["cycle"], new["node"]["axes"], new["bus"]["nodes"]) == ({"period_us": 900.0, "slice_ratio": 0.5}, 2, 3)
+
+
+def test_apply_of_a_calibration_writes_the_changes_but_not_the_bench(run: Run, tmp_path: Path) -> None:
+    bench = tmp_path / "bench.toml"
+    bench.write_bytes(locate("paper-two-node")[0].read_bytes())
+    asked = ("--apply", "--set", "cycle.nonperiodic_us=5", "--nodes", "2")
+    done = run("calibrate", "bench.toml", "table-1.csv", *asked, cwd=tmp_path)
+    assert done.stderr.startswith("wrote [node.execution], cycle.nonperiodic_us of bench.toml")
+    data = tomllib.loads(bench.read_text(encoding="utf-8"))
+    assert (data["cycle"]["nonperiodic_us"], data["bus"]["nodes"]) == (5, 1)
+
+
+def test_findings_are_at_the_place_of_the_key_and_say_the_change(run: Run, folder: Path) -> None:
+    done = run("check", "mine.toml", "--no-circle", "--set", "cycle.period_us=200", cwd=folder)
+    assert done.returncode == 1
+    (line,) = done.stdout.splitlines()
+    assert line.startswith("mine.toml:9:1: BP101 cycle.period_us: the cycle needs ")
+    assert line.endswith(" (with --set cycle.period_us=200)")
+    assert done.stderr == "With --set cycle.period_us=200.\nchecked 1 profile: 1 error, 0 warnings\n"
+
+
+def test_a_suppression_works_and_is_not_idle_for_another_value(run: Run, folder: Path) -> None:
+    def findings(*options: str) -> str:
+        return run("check", "mine.toml", "--no-circle", *options, cwd=folder).stdout
+
+    (folder / "mine.toml").write_text(PROFILE.replace("gap_count = 10", "gap_count = 7"), encoding="utf-8")
+    assert "BP902 BP110 has nothing to suppress" in findings()
+    assert findings("--set", "bus.gap_count=optimal") == ""
+    # A larger one is the finding that the comment suppresses.
+    assert findings("--set", "bus.gap_count=63") == ""
+    uncommented = PROFILE.replace("busplan: ignore[BP110]", "")
+    (folder / "mine.toml").write_text(uncommented, encoding="utf-8")
+    assert "BP110 bus.gap_count" in findings("--set", "bus.gap_count=63")
+
+
+def test_a_key_that_one_file_refuses_does_not_stop_the_others(run: Run, folder: Path) -> None:
+    done = run(
+        "check", "mine.toml", "paper-1ms", "--no-circle", "-j", "2", "--set", "node.execution.base_us=40", cwd=folder
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("paper-1ms.toml: --set node.execution.base_us=40: unknown key; known here: ")
+    assert "checked 1 profile: 0 errors, 0 warnings; 1 could not be checked" in done.stderr
+
+
+def test_figures_of_the_changed_profile_are_compared_with_the_baseline(run: Run, folder: Path) -> None:
+    run("check", "mine.toml", "--no-circle", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    kept = (folder / "b.json").read_bytes()
+    done = run("check", "mine.toml", "--no-circle", "--baseline", "b.json", "--set", "node.axes=3", cwd=folder)
+    assert done.returncode == 1
+    assert "BP301 bus.nodes: max_axes under the paper timing fell to" in done.stdout
+    assert (folder / "b.json").read_bytes() == kept
+
+
+def test_the_commands_of_a_page_repeat_the_changes(run: Run, shell: Run, folder: Path) -> None:
+    asked = ("--set", 'node.execution={kind="linear", base_us=30, per_byte_us=0.1}', "--set=cycle.period_us=1000")
+    done = run("report", "mine.toml", *asked, "--gap-count", "9", "--format", "json", cwd=folder)
+    answers = json.loads(done.stdout)["profiles"][0]["answers"]
+    page = run("report", "mine.toml", *asked, "--gap-count", "9", cwd=folder).stdout
+    lines = dict(re.findall(r'<code id="p1-([a-z]+)"[^>]*>(.*?)</code>', page, re.DOTALL))
+    assert set(lines) == set(answers) >= {"capacity", "latency", "timeline", "axes", "circle", "explain"}
+    for name, document in answers.items():
+        line = unescape(re.sub(r"<[^>]*>", "", lines[name]))
+        assert json.loads(shell(line, cwd=folder).stdout) == document
+        assert document["changes"] == {
+            "node.execution": {"kind": "linear", "base_us": 30, "per_byte_us": 0.1},
+            **({} if name == "axes" else {"cycle.period_us": 1000}),
+        }
+
+
+def test_a_picture_says_the_changes(run: Run, folder: Path) -> None:
+    for form in ("svg", "mermaid"):
+        picture = run("timeline", "mine.toml", "--set", "bus.speed=S200", "--format", form, cwd=folder).stdout
+        assert "With --set bus.speed" in picture
+    run("circle-test", "mine.toml", "--set", "bus.speed=S200", "--plot", "c.svg", cwd=folder)
+    run("sweep", "mine.toml", "--vary", "bus.nodes=1:3", "--set", "bus.speed=S200", "--plot", "s.svg", cwd=folder)
+    # matplotlib draws text as outlines, and writes it into a comment, where two dashes cannot stand.
+    for name, said in (("c.svg", "- -set bus.speed=S200"), ("s.svg", "mine, - -set bus.speed=S200")):
+        assert said in (folder / name).read_text(encoding="utf-8")
+
+
+def test_rows_of_a_sweep_keep_their_form_and_the_change_is_said_beside_them(run: Run, folder: Path) -> None:
+    asked = ("sweep", "mine.toml", "--vary", "bus.nodes=1:2", "--set", "bus.speed=S200")
+    rows = run(*asked, "--format", "csv", "--columns", "margin_us", cwd=folder)
+    assert rows.stdout.startswith("bus.nodes,timing_model,margin_us\n1,paper,")
+    assert rows.stderr.startswith("With --set bus.speed=S200.\nmine: 2 points;")
+    first = run(*asked, "--format", "jsonl", cwd=folder).stdout.partition("\n")[0]
+    assert json.loads(first)["changes"] == {"bus.speed": "S200"}

@@ -1,0 +1,160 @@
+"""`--set KEY=VALUE`: how it is read, which two options exclude each other, and what a refusal names."""
+
+from functools import cache
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.errors import BusplanError
+from busplan.profile.changes import KeyChange, KeyChanges, parse_set
+from busplan.profile.shipped import load
+from busplan.sections.execution import LinearExecution, TableExecution
+from busplan.sections.profile import Profile
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("4000", 4000),
+        ("0.5", 0.5),
+        ("-1", -1),
+        ("1e3", 1000.0),
+        ("1_000", 1000),
+        ("true", True),
+        ('"S200"', "S200"),
+        ("'S200'", "S200"),
+        ("S200", "S200"),
+        ("iso230-4", "iso230-4"),
+        ("optimal", "optimal"),
+        ("True", "True"),
+        ("[1, 2]", [1, 2]),
+        ('{kind = "linear", base_us = 30}', {"kind": "linear", "base_us": 30}),
+        ('"a=b"', "a=b"),
+        ("4 # a comment of TOML", 4),
+    ],
+)
+def test_a_value_is_toml_and_a_word_is_text(written: str, value: object) -> None:
+    (change,) = parse_set([f" bus.key = {written} "])
+    assert (change.key, change.value, change.typed) == ("bus.key", value, f"--set bus.key={written}")
+    assert type(change.value) is type(value)
+
+
+@pytest.mark.parametrize("written", ["4ms", "S200 S400", "[1, 2", "{a = 1", "4\nbus.nodes = 3", "3\n[bus]", "-", "µ"])
+def test_what_is_neither_toml_nor_a_word_is_refused(written: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        parse_set([f"bus.key={written}"])
+    assert str(caught.value).startswith(f"--set bus.key={written}: {written} is not a TOML value; expected a number")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "bus.nodes", "=3", "bus.nodes=", " = ", "bus..nodes=3", ".nodes=3", "bus nodes=3"]
+)
+def test_what_is_not_key_and_value_is_refused(text: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        parse_set([text])
+    assert str(caught.value).startswith(f"--set {text}: expected KEY=VALUE")
+
+
+@settings(deadline=None)
+@given(text=st.text(max_size=30), key=st.sampled_from(["bus.nodes", "name", "node.execution", "cycle.period_us"]))
+def test_anything_typed_is_a_valid_change_or_refused_by_its_option(text: str, key: str) -> None:
+    try:
+        KeyChanges(parse_set([f"{key}={text}"])).applied(shipped())
+    except BusplanError as error:
+        unnamed = [problem for problem in error.problems or [""] if "--set" not in problem]
+        assert unnamed == []
+
+
+def test_values_that_no_parser_should_be_given_are_refused_in_time() -> None:
+    for written in ("[" * 100_000, "9" * 10_000, "{a" + ".a" * 30_000 + " = 1}"):
+        with pytest.raises(BusplanError, match="is not a TOML value"):
+            parse_set([f"bus.nodes={written}"])
+
+
+@cache
+def shipped() -> Profile:
+    return load("paper-1ms").profile
+
+
+def changes(*texts: str) -> KeyChanges:
+    return KeyChanges(parse_set(texts))
+
+
+def test_a_key_is_set_once() -> None:
+    with pytest.raises(BusplanError, match=r"\A--set a\.b=1 and --set a\.b=2: both set a\.b; give one of them\Z"):
+        changes("a.b=1", "c=3", "a.b=2")
+    with pytest.raises(BusplanError, match=r"\A--nodes 4 and --set bus\.nodes=3: both set bus\.nodes; give one"):
+        KeyChanges((KeyChange("bus.nodes", 4, "--nodes", "4"), *parse_set(["bus.nodes=3"])))
+
+
+@pytest.mark.parametrize("texts", [("a.b={c=1}", "a.b.c=1"), ("a.b.c=1", "a.b={c=1}")])
+def test_a_key_inside_a_table_that_is_set_is_refused_in_either_order(texts: tuple[str, str]) -> None:
+    with pytest.raises(BusplanError, match=r": a\.b\.c is inside a\.b; give one of them\Z"):
+        changes(*texts)
+
+
+def test_keys_that_only_go_together_do_so_in_any_order() -> None:
+    texts = ("node.execution.payload_bytes=[4, 64]", "node.execution.time_us=[30, 50]")
+    for one in texts:
+        with pytest.raises(BusplanError):
+            changes(one).applied(shipped())
+    both = changes(*texts).applied(shipped())
+    assert both == changes(*reversed(texts)).applied(shipped())
+    assert isinstance(both.node.execution, TableExecution)
+    assert (both.node.execution.payload_bytes, both.node.execution.time_us) == ((4, 64), (30.0, 50.0))
+
+
+def test_a_table_replaces_its_section_and_may_be_of_another_kind() -> None:
+    found = changes("node.execution={kind='linear', base_us=30, per_byte_us=0.1}").applied(shipped()).node.execution
+    assert isinstance(found, LinearExecution)
+    assert (found.base_us, found.per_byte_us, found.grade) == (30.0, 0.1, None)
+
+
+@pytest.mark.parametrize(
+    ("texts", "problems"),
+    [
+        (["cycle.period_us=-1"], ["--set cycle.period_us=-1: must be 0.001 or more"]),
+        (["cycle.perod_us=1"], ["--set cycle.perod_us=1: unknown key; did you mean period_us?"]),
+        (["cycel.period_us=1"], ["--set cycel.period_us=1: cycel: unknown key; did you mean cycle?"]),
+        (["bus=3"], ["--set bus=3: expected a table"]),
+        (["bus.kind=can"], ['--set bus.kind=can: expected "ieee1394"']),
+        (["bus.nodes.x=3"], ["--set bus.nodes.x=3: no such key; nodes is a value, not a section"]),
+        (
+            ["node.execution.time_us=[1, -2, 3]"],
+            ["--set node.execution.time_us=[1, -2, 3]: node.execution.time_us[1]: must"],
+        ),
+        (
+            ["bus.nodes=0", "name=3"],
+            ["--set name=3: expected a text in quotes", "--set bus.nodes=0: must be 1 or more"],
+        ),
+        (
+            ["node.execution={kind='linear', base_us=1}"],
+            ["--set node.execution={kind='linear', base_us=1}: node.execution.per_byte_us: missing key. What each"],
+        ),
+    ],
+)
+def test_a_refusal_names_the_option(texts: list[str], problems: list[str]) -> None:
+    with pytest.raises(BusplanError) as caught:
+        changes(*texts).applied(shipped())
+    assert len(caught.value.problems) == len(problems)
+    assert all(map(str.startswith, caught.value.problems, problems))
+
+
+def test_a_problem_of_another_key_names_all_that_was_set() -> None:
+    with pytest.raises(BusplanError) as caught:
+        changes("node.execution.kind=linear", "node.axes=2").applied(shipped())
+    start = "with --set node.execution.kind=linear and --set node.axes=2, node.execution.base_us: missing key."
+    assert caught.value.problems[0].startswith(start)
+
+
+def test_a_long_value_is_shortened_in_messages() -> None:
+    long = changes(f"name={'x' * 300}")
+    with pytest.raises(BusplanError) as caught:
+        long.applied(shipped())
+    assert str(caught.value) == f"--set name={'x' * 95}...: must be no longer than 100 characters"
+
+
+def test_no_change_gives_the_profile_itself() -> None:
+    profile = shipped()
+    assert KeyChanges().applied(profile) is profile
