@@ -55,7 +55,7 @@ def init_command(
         typer.Option(
             "--from",
             metavar="SHIPPED",
-            help="Copy a shipped profile instead, with its comments (see `busplan profiles`).",
+            help="Copy a shipped profile instead, with its comments (see `busplan profiles`).  [default: no copy]",
             autocompletion=complete_profile,
         ),
     ] = None,
@@ -68,7 +68,7 @@ def init_command(
     under a name of its own. Exits 0 when the file is written, whatever the verdict is; a file that is already there
     stays as it is, unless --force is given.
 
-    Example: busplan init gantry --nodes 6 --axes 24 --period 1ms --bytes-per-axis 8
+    Example: busplan init gantry --nodes 6 --axes 24 --period 1ms
     """
     path = Path(name if name.endswith(".toml") else f"{name}.toml")
     if not path.name.removesuffix(".toml").strip("."):

@@ -138,7 +138,7 @@ def explain(
         raise BusplanError(f"{one.key}: not a figure of latency, so it has no transaction")
     found = []
     for period_us in [profile.cycle.period_us] if periods_us is None else periods_us:
-        where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": "period"})
+        where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": f"period {period_us}"})
         for kind in kinds:
             for model in models:
                 for each in (one, *_BESIDE.get(one.key, ())):
