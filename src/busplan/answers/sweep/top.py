@@ -105,7 +105,8 @@ class Tally:
         yield joined(head, cut, Sentence(("; ",)), self._fitting(), Sentence((".",)), by="")
         if self._unjudged:
             unjudged = count_value(self._unjudged, grouped=True)
-            yield sentence("The circle is not judged at {}: no contour tolerance is asked for.", unjudged, state="warns")
+            words = "The circle is not judged at {}: no contour tolerance is asked for."
+            yield sentence(words, unjudged, state="warns")
         if self._passed is not None and self._unjudged < self.points:
             yield joined(
                 Sentence(("The circle holds every tolerance at ",)),
