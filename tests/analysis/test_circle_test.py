@@ -510,6 +510,10 @@ def test_a_loop_that_does_not_settle_fails_and_its_turn_is_not_measured(small: P
         "the loops take more than 60 s to settle, so that the turn is not measured",
     )
     assert (result.circular_deviation_mm, result.max_contour_error_mm, result.centre_offset_mm) == (None, None, None)
+    # Nor is it said how far the table went on it.
+    behind = override(small, {**slow, "servo.integral_gain_per_s2": 0.0, "servo.drive_lag_us": 1e9})
+    assert "not_settled" in (names := [one.name for one in only(behind).failures])
+    assert "circle_not_followed" not in names
     # The paper's move has no turn to settle for.
     assert only(override(small, {**slow, "circle.path": "trapezoid"})).settled is None
 

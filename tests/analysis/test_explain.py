@@ -243,6 +243,16 @@ def test_the_own_keys_of_both_axes_are_among_what_a_circle_starts_from() -> None
     assert {"servo.x.position_gain_per_s", "servo.y.drive_lag_us"} <= names
 
 
+def test_a_default_of_the_servo_is_assumed_whatever_is_known_of_the_others(make: Make) -> None:
+    servo = {"grade": "calibrated", "position_gain_per_s": 50.0, "x": {"drive_lag_us": 1000.0}}
+    known = {one.name: (one.grade, one.source) for one in assumptions(make(servo=servo, circle={}))}
+    assert known["servo.max_velocity_mm_s"] == ("assumed", "default")
+    assert known["servo.position_gain_per_s"] == ("calibrated", "profile test; graded by servo.grade")
+    assert known["servo.x.drive_lag_us"][0] == "calibrated"
+    graded = make(servo={**servo, "grades": {"max_velocity_mm_s": "published"}}, circle={})
+    assert {one.name: one.grade for one in assumptions(graded)}["servo.max_velocity_mm_s"] == "published"
+
+
 LINEAR: dict[str, object] = {"node.execution": {"kind": "linear", "base_us": 30.0, "per_byte_us": 0.35}}
 SMALL: dict[str, object] = {"circle.radius_mm": 20.0, "circle.feed_mm_per_min": 5000.0}
 WITHOUT_EQUATION = {

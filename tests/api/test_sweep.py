@@ -110,6 +110,24 @@ def test_circle_tests_add_their_columns() -> None:
     assert "The circle holds every tolerance at" in str(answer)
 
 
+def test_circles_without_a_contour_tolerance_are_not_judged() -> None:
+    vary = {"circle.radius_mm": [10.0], "servo.position_gain_per_s": [50.0, 30_000.0]}
+    both = str(busplan.sweep("paper-two-node", vary=vary, with_circle=True))
+    assert "The circle is not judged at 1: no contour tolerance is asked for." in both
+    assert "The circle holds every tolerance at 0 " in both
+    one = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, with_circle=True))
+    assert "not judged" in one
+    assert "holds every tolerance" not in one
+    judged = str(busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0]}, with_circle=True))
+    assert "not judged" not in judged
+
+
+def test_a_figure_that_no_circle_has_is_a_column_of_nan() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0, 20.0]}, with_circle=True)
+    assert np.isnan(answer["circular_deviation_mm"]).all()
+    assert answer.to_dict()["rows"][0]["circular_deviation_mm"] is None
+
+
 def test_a_column_that_is_not_there_is_a_key_error() -> None:
     answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})
     with pytest.raises(KeyError, match=r"no column 'axis'; there are bus\.nodes, timing_model"):

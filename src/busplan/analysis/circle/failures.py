@@ -214,8 +214,9 @@ def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple
         low[-1] = low[-1]._replace(more=late)
     return (
         *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
-        # Radial errors do not show this: a table that stands still on the circle has none.
-        *(() if run.follows else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
+        # Radial errors do not show this: a table that stands still on the circle has none. Nothing is known of a turn
+        # before the loops have settled.
+        *(() if run.follows or not settled else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
         *low,
         *(_contour_failures(profile, run) if settled else ()),
     )

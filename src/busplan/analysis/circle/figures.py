@@ -127,7 +127,7 @@ CIRCLE_FIGURES: Final = (
         "passed",
         "passed",
         "profile",
-        "whether the circle holds every tolerance; null without a contour tolerance",
+        "whether the circle holds every tolerance; null if nothing fails, and no contour tolerance is asked for",
         "passed",
         sort="truth",
         better="more",

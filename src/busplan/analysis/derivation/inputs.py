@@ -48,8 +48,8 @@ def given(profile: Profile, key: str) -> Input:
     Returns
     -------
     Input
-        Its grade is that of its section, if the section has one; that of a sourced figure, if the value is that figure;
-        otherwise "given".
+        Its grade is that of its section, if the section has one, but a default of [servo] is assumed; that of a sourced
+        figure, if the value is that figure; otherwise "given".
     """
     *sections, name = key.split(".")
     section: Any = profile
@@ -64,6 +64,8 @@ def given(profile: Profile, key: str) -> Input:
                 own_grade, graded_by = None, ""  # a choice
             elif grades is not None and getattr(grades, name) is not None:
                 own_grade, graded_by = getattr(grades, name), f"; graded by {'.'.join(sections[:number])}.grades.{name}"
+            elif grades is not None and number == len(sections) and name not in section.model_fields_set:
+                own_grade, graded_by = "assumed", ""  # a default is busplan's, whatever is known of the others
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)

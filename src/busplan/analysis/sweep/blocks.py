@@ -56,6 +56,11 @@ class Column(NamedTuple):
         """Where a truth value is true; it may be missing."""
         return self.values if self.words is None else np.equal(self.values, self.words.index(True))
 
+    @property
+    def are_missing(self) -> Array:
+        """Where a truth value is missing."""
+        return np.equal(self.values, self.words.index(None)) if self.words else np.zeros_like(self.values)
+
 
 class SweepBlock(NamedTuple):
     """The figures of a chunk."""

@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
@@ -23,7 +24,7 @@ CIRCLE_COLUMNS: Final = (
 )
 """Columns of circle tests, named as in `circle-test`."""
 MOST_CIRCLES_UNASKED: Final = 1000
-"""Most circle tests without --force: minutes with numba, an hour without."""
+"""Most circle tests without --force: minutes compiled, an hour in plain Python."""
 
 _TRUTHS: Final = (None, False, True)
 """Values of a column of truth values that may be missing, in the order of sorting."""
@@ -85,16 +86,16 @@ def with_circles(
     """
     results = list(run(CircleTask(profile, block.chunk.point(index)) for index in range(block.chunk.points)))
     circles = {
-        name: _column([point[place] for point in results], shape=block.chunk.shape)
+        name: _column(name, [point[place] for point in results], shape=block.chunk.shape)
         for place, name in enumerate(CIRCLE_COLUMNS)
     }
     return block._replace(models=tuple({**figures, **circles} for figures in block.models))
 
 
-def _column(values: Sequence[float | None], *, shape: tuple[int, ...]) -> Column:
+def _column(name: str, values: Sequence[float | None], *, shape: tuple[int, ...]) -> Column:
     """Column of truth values, also missing ones, or of numbers with NaN for None."""
     if all(isinstance(value, bool) for value in values):
         return Column(np.array(values, dtype=bool).reshape(shape))
-    if all(value is None or isinstance(value, bool) for value in values):
+    if CIRCLE_BY_KEY[name].sort == "truth":
         return Column(np.array([_TRUTHS.index(value) for value in values], dtype=np.uint8).reshape(shape), _TRUTHS)
     return Column(np.array([np.nan if value is None else value for value in values], dtype=float).reshape(shape))

@@ -70,6 +70,7 @@ class Tally:
         self._fits = [0] * len(timing_models)
         self._unsafe = 0
         self._passed: list[int] | None = None
+        self._unjudged = 0
 
     @property
     def rows(self) -> int:
@@ -92,6 +93,8 @@ class Tally:
             passed = [_share(figures["passed"].are_true, points) for figures in block.models]
             before = self._passed or [0] * len(passed)
             self._passed = [old + new for old, new in zip(before, passed, strict=True)]
+            # A circle is the same under every model.
+            self._unjudged += _share(block.models[0]["passed"].are_missing, points)
 
     def sentences(self) -> Iterator[Sentence]:
         """Summary of the counts."""
@@ -100,7 +103,11 @@ class Tally:
         cut = Sentence(()) if self.points == self.expected else sentence(" of {} (interrupted)", whole)
         head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(self.profile.name), found)
         yield joined(head, cut, Sentence(("; ",)), self._fitting(), Sentence((".",)), by="")
-        if self._passed is not None:
+        if self._unjudged:
+            unjudged = count_value(self._unjudged, grouped=True)
+            words = "The circle is not judged at {}: no contour tolerance is asked for."
+            yield sentence(words, unjudged, state="warns")
+        if self._passed is not None and self._unjudged < self.points:
             yield joined(
                 Sentence(("The circle holds every tolerance at ",)),
                 self._by_model(self._passed),
