@@ -507,7 +507,7 @@ def test_a_loop_that_does_not_settle_fails_and_its_turn_is_not_measured(small: P
     assert (failure.name, failure.limit, failure.text) == (
         "not_settled",
         60.0,
-        "the loops take more than 60 s to settle, so that the turn is not measured",
+        "the loops and their friction take more than 60 s to settle, so that the turn is not measured",
     )
     assert (result.circular_deviation_mm, result.max_contour_error_mm, result.centre_offset_mm) == (None, None, None)
     # Nor is it said how far the table went on it.
@@ -533,8 +533,8 @@ def test_the_weakest_grade_of_the_values_that_are_given_counts(make: Make) -> No
         ({}, "measured"),
         ({"drive_lag_us": "assumed"}, "assumed"),
         ({"drive_lag_us": "calibrated", "position_gain_per_s": "published"}, "calibrated"),
-        # A default may be graded, too.
-        ({"velocity_feedforward": "calibrated"}, "calibrated"),
+        # A default may be graded, too, but not what is not there.
+        ({"velocity_feedforward": "calibrated", "dac_bits": "assumed"}, "calibrated"),
     ):
         assert only(make(servo={**given, "grades": grades})).servo_grade == weakest
     assert only(make(servo={"x": {"drive_lag_us": 1.0}, "grades": {"drive_lag_us": "published"}})).servo_grade == (
@@ -558,3 +558,10 @@ def test_a_long_test_says_what_it_costs_before_it_runs(
     # 628,339 set-points, 40 steps each, both axes; the same without each of two sources.
     assert said.startswith("circle test: 150,801,360 steps, about ")
     assert said.endswith(("GB", "GB, in plain Python"))
+
+
+def test_a_step_that_is_a_default_is_said_to_be_one(make: Make) -> None:
+    with pytest.raises(BusplanError, match=r"step_us = 100.0: .* would fit; it is the default of servo.step_us"):
+        only(make(cycle__period_us=1050.0))
+    with pytest.raises(BusplanError, match=r"would fit$"):
+        only(make(cycle__period_us=1050.0, servo={"step_us": 100.0}))

@@ -177,12 +177,12 @@ def test_a_sentence_writes_a_failure_as_its_text_does(failure: Failure) -> None:
 def test_how_the_servo_values_are_known_is_said_once_and_only_with_figures() -> None:
     (mixed,) = servo_sentence(MINE, small().results[0])
     assert (sentence_text(mixed), mixed.state) == (
-        "The servo values behind these figures are 6 assumed, 4 calibrated, 2 published.",
+        "The servo values that the profile gives are 6 assumed, 4 calibrated, 2 published.",
         "warns",
     )
     measured = override(MINE, {"servo": {"drive_lag_us": 7500.0, "grade": "measured"}})
     (known,) = servo_sentence(measured, small().results[0]._replace(servo_grade="measured"))
-    assert (sentence_text(known), known.state) == ("The servo values behind these figures are measured.", "neutral")
+    assert (sentence_text(known), known.state) == ("The servo values that the profile gives are measured.", "neutral")
     (ideal,) = servo_sentence(MINE, small().results[0]._replace(ideal_drive=True))
     assert sentence_text(ideal) == "The profile has no [servo]: an ideal drive was simulated."
     both = circle_of(*SMALL.items(), periods_us=(100.0, 4000.0, 2000.0))

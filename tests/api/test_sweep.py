@@ -175,3 +175,17 @@ def test_the_text_is_the_table_of_the_command() -> None:
 def test_what_makes_no_sweep_is_refused(vary: Any, options: Any, message: str) -> None:
     with pytest.raises(busplan.BusplanError, match=re.escape(message)):
         busplan.sweep("paper-4ms", vary=vary, **options)
+
+
+def test_a_truth_that_is_missing_is_none_beside_the_others() -> None:
+    own = {
+        "servo": {"position_gain_per_s": 50.0},
+        "circle": {"radius_mm": 5.0, "feed_mm_per_min": 3000.0, "ramp_periods": 5},
+    }
+    profile = busplan.load_profile("paper-two-node", changes=own)
+    # At 100 us the cycle does not fit, which fails; at 2 ms nothing is asked of the circle.
+    found = busplan.sweep(profile, vary={"cycle.period_us": [100, 2000]}, timing_models=["standard"], with_circle=True)
+    assert list(found["passed"]) == [False, None]
+    judged = busplan.load_profile("paper-two-node", changes={**own, "tolerance.max_contour_error_mm": 1.0})
+    found = busplan.sweep(judged, vary={"cycle.period_us": [100, 2000]}, timing_models=["standard"], with_circle=True)
+    assert found["passed"].tolist() == [False, True]

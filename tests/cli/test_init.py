@@ -71,7 +71,7 @@ def test_a_profile_of_ones_own_is_neutral_and_no_command_stumbles_over_it(run: R
     circle = run("circle-test", "gantry.toml", cwd=tmp_path)
     assert circle.returncode == 0
     assert "NOT JUDGED" in circle.stdout
-    assert "The servo values behind these figures are assumed." in circle.stdout
+    assert "The servo values that the profile gives are assumed." in circle.stdout
 
 
 def test_init_takes_defaults_where_nobody_can_be_asked_and_says_them(run: Run, tmp_path: Path) -> None:

@@ -133,7 +133,7 @@ def servo_sentence(profile: Profile, result: CircleFigures) -> Iterator[Sentence
         yield Sentence(("The profile has no [servo]: an ideal drive was simulated.",), "warns")
         return
     state: State = "warns" if result.servo_grade == "assumed" else "neutral"
-    yield Sentence((f"The servo values behind these figures are {profile.servo.grades_text}.",), state)
+    yield Sentence((f"The servo values that the profile gives are {profile.servo.grades_text}.",), state)
 
 
 def source_words(source: str) -> str:

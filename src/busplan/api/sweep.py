@@ -104,6 +104,8 @@ def _rows(block: SweepBlock, name: str) -> Array:
 def _spelled(column: Column) -> Array:
     if column.words is None:
         return column.values
+    if any(isinstance(word, bool) for word in column.words):
+        return np.array(column.words, dtype=object)[column.values]
     words: Array = np.array([str(spelled(word)) for word in column.words])
     return words[column.values]
 

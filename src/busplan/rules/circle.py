@@ -58,7 +58,8 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
         # A finding needs a key in the file: a default limit has none.
         said = failure.name in subject.profile.tolerance.model_fields_set
         key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
-        cure = "; lower servo.position_gain_per_s or what delays the loop" if stability else ""
+        gain = subject.profile.servo.position_gain_per_s
+        cure = "; lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
         if failure.name in CONTOUR_MEASURES and failure.value is not None:
             cure = attack
         yield "BP202" if stability else "BP201", RuleProblem(key, f"{failure.text}{cure}")

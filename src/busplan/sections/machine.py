@@ -173,7 +173,9 @@ class ServoSection(AxisKeys):
     @property
     def grades_given(self) -> tuple[ServoGrade, ...]:
         """The grade of each value that the profile gives or grades, the weakest first; servo.grade if there is none."""
-        given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set | self.grades.model_fields_set
+        given = self.model_fields_set | self.x.model_fields_set | self.y.model_fields_set
+        # A default may be graded, unless it means that there is nothing.
+        given |= {key for key in self.grades.model_fields_set if getattr(self, key)}
         found = [self.grade_of(key) for key in given & set(ServoGrades.model_fields)] or [self.grade]
         return tuple(sorted(found, key=SERVO_GRADES.index, reverse=True))
 

@@ -32,7 +32,7 @@ class CircleCheck:
         Parameters
         ----------
         profile
-            A variant that fits its bus.
+            A variant that is shown to fit its bus: its failures are those of the circle.
         """
         # The cycle itself matters only where it lies inside a loop on the host.
         key = (profile.cycle.period_us, loop_delays_us(profile))

@@ -93,7 +93,11 @@ _FAILURES: Final[dict[str, _Saying]] = {
         "the largest contour error of {value} is {beyond} over its {limit}", "max_contour_error_mm", "um"
     ),
     "not_settled": _Saying(
-        "the loops take more than {limit} to settle, so that the turn is not measured", "", "s", 0, limit_decimals=0
+        "the loops and their friction take more than {limit} to settle, so that the turn is not measured",
+        "",
+        "s",
+        0,
+        limit_decimals=0,
     ),
     _WITHOUT_TURN: _Saying(
         "the circular deviation G is measured on a whole turn, and the path is a trapezoid: "

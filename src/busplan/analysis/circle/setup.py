@@ -10,7 +10,7 @@ from busplan.analysis.network import bus_of
 from busplan.sections.base import Section
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import parameters
+from busplan.servo.checks import ParameterError, parameters
 from busplan.servo.circle import REST_MM, check_circle, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path, circle_setpoints
@@ -64,9 +64,15 @@ def loop_timing(profile: Profile) -> LoopTiming:
         The period is no multiple of the step.
     """
     servo = profile.servo
-    return LoopTiming(
-        period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
-    )
+    try:
+        return LoopTiming(
+            period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
+        )
+    except ParameterError as error:
+        if "step_us" in servo.model_fields_set:
+            raise
+        default = (one._replace(right=f"{one.right}; it is the default of servo.step_us") for one in error.refused)
+        raise ParameterError(*default) from None
 
 
 def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
