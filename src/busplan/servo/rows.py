@@ -247,12 +247,13 @@ def _pieces(start: Floats, stop: Floats) -> list[tuple[Ints, Floats, Ints]]:
 
 
 def _motion(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, cycles: Ints) -> tuple[Floats, Floats, Floats]:
-    """Start and end of the line of each cycle [mm], and its feed-forward velocity [mm/s]."""
-    before, start, end = (setpoints_mm[np.clip(cycles - back, 0, len(setpoints_mm) - 1)] for back in (2, 1, 0))
+    """Start and end of the line of each of some consecutive cycles [mm], and its feed-forward velocity [mm/s]."""
+    around = setpoints_mm[np.clip(np.arange(cycles[0] - 2, cycles[-1] + 1), 0, len(setpoints_mm) - 1)]
+    before, start, end = around[:-2], around[1:-1], around[2:]
     period_s = timing.period_us / _US_PER_S
-    velocity = (end - start) / period_s
-    acceleration = (end - start - (start - before)) / period_s**2
-    forward = axis.velocity_feedforward * velocity + axis.acceleration_feedforward_s * acceleration
+    forward = axis.velocity_feedforward * ((end - start) / period_s)
+    if axis.acceleration_feedforward_s:
+        forward += axis.acceleration_feedforward_s * ((end - start - (start - before)) / period_s**2)
     return start, end, forward
 
 
