@@ -85,26 +85,60 @@ def test_init_takes_defaults_where_nobody_can_be_asked_and_says_them(run: Run, t
     assert run("circle-test", "other.toml", cwd=tmp_path).returncode == 0
 
 
-def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
+def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> tuple[int, str]:
+    """Exit code and words of `init` in a terminal, with an answer to each of its questions."""
     leader, follower = pty.openpty()
-    command = [sys.executable, "-m", "busplan", "init", "asked", "--axes", "10"]
-    process = subprocess.Popen(command, cwd=tmp_path, stdin=follower, stdout=follower, stderr=follower)
+    # The terminal of a session of its own, so that Ctrl-C reaches the program.
+    program = "import os; os.login_tty(0); from busplan.__main__ import main; main()"
+    command = [sys.executable, "-c", program, "init", "asked", *arguments]
+    process = subprocess.Popen(command, cwd=folder, stdin=follower, stdout=follower, stderr=follower)
     os.close(follower)
     said = ""
-    # A prompt ends in its default; what is no number is asked for again.
-    for answer in ("many", "0", "5", "", "12"):
+
+    def heard() -> bool:
+        nonlocal said
+        try:
+            said += os.read(leader, 10_000).decode()
+        except OSError:  # the program has left its terminal
+            return False
+        return True
+
+    for answer in answers:
+        # A question ends in its default.
         while not said.rstrip().endswith("]:"):
             assert select.select([leader], [], [], 30)[0]
-            said += os.read(leader, 10_000).decode()
+            assert heard()
         said += "<"
-        os.write(leader, f"{answer}\n".encode())
-    assert process.wait(timeout=30) == 0
+        os.write(leader, answer)
+    code = process.wait(timeout=30)
+    while select.select([leader], [], [], 0.1)[0] and heard():
+        pass
     os.close(leader)
+    return code, said
+
+
+def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
+    # What is no number is asked for again.
+    code, said = answered(tmp_path, b"many\n", b"0\n", b"5\n", b"\n", b"12\n", arguments=("--axes", "10"))
+    assert code == 0
     assert said.count("Nodes, the host not counted [4]") == 3
     assert "must be 1 or more" in said
     assert "Axes of all nodes" not in said
     data = tomllib.loads((tmp_path / "asked.toml").read_text(encoding="utf-8"))
     assert (data["bus"]["nodes"], data["node"]["axes"], data["payload"]["read_bytes_per_axis"]) == (5, 2, 12)
+
+
+def test_an_input_that_ends_is_no_answer(tmp_path: Path) -> None:
+    code, said = answered(tmp_path, b"\x04")
+    assert code == 2
+    assert "no answer: give --nodes, --axes, --period and --bytes-per-axis" in said
+    assert files(tmp_path) == {}
+
+
+def test_ctrl_c_at_a_question_is_an_interrupt(tmp_path: Path) -> None:
+    code, _ = answered(tmp_path, b"6\n", b"\x03")
+    assert code == 130
+    assert files(tmp_path) == {}
 
 
 def test_init_starts_from_the_shipped_profile_that_is_asked_for(run: Run, tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -14,6 +14,7 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from busplan.profile.starter import Machine
 
+_Answer = TypeVar("_Answer")
 _NODES = 4
 _AXES_PER_NODE = 4
 _PERIOD = "1ms"
@@ -105,7 +106,7 @@ def _machine(
         if given is not None:
             return given
         while asks:
-            answer = int(typer.prompt(words, default=default, type=int, err=True))
+            answer = _asked(words, default)
             if answer > 0:
                 return answer
             say("must be 1 or more")
@@ -115,7 +116,7 @@ def _machine(
     count = number(nodes, "--nodes", "Nodes, the host not counted", _NODES)
     total = number(axes, "--axes", "Axes of all nodes", _AXES_PER_NODE * count)
     if period is None and asks:
-        period = str(typer.prompt("Communication period, with its unit", default=_PERIOD, err=True))
+        period = _asked("Communication period, with its unit", _PERIOD)
     if period is None:
         taken.append(f"--period {_PERIOD}")
     period_us = time_us(period or _PERIOD, option="--period")
@@ -123,6 +124,17 @@ def _machine(
         raise BusplanError(f"--period {period}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
     size = number(bytes_per_axis, "--bytes-per-axis", "Bytes for each axis, in either direction", _BYTES_PER_AXIS)
     return Machine(count, total, period_us, size), taken
+
+
+def _asked(words: str, default: _Answer) -> _Answer:
+    """Ask in the terminal; Ctrl-C interrupts as everywhere, and an input that ends is no answer."""
+    try:
+        answer: _Answer = typer.prompt(words, default=default, type=type(default), err=True)
+    except typer.Abort as stopped:
+        if isinstance(stopped.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
+        raise BusplanError("no answer: give --nodes, --axes, --period and --bytes-per-axis") from None
+    return answer
 
 
 def _verdict(text: str) -> list[str]:
