@@ -70,12 +70,13 @@ def latency(
     Paper, equations (3)-(10), (12)-(14).
     """
     models = model_names(profile) if timing_models is None else timing_models
+    nodes = int(network_of(profile).nodes)
     _require_execution(profile, payloads_bytes or ())
     variants = [profile] if payloads_bytes is None else [with_payload(profile, size) for size in payloads_bytes]
     return LatencyResult(
         profile.name,
         tuple(
-            Transaction(model, one.name, one.payload_bytes, profile.bus.nodes, FigureValues(_whole_bytes(one.phases)))
+            Transaction(model, one.name, one.payload_bytes, nodes, FigureValues(_whole_bytes(one.phases)))
             for variant in variants
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
             for model, one in zip(models, alike, strict=True)

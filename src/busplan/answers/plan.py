@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from busplan.analysis.capacity.verdict import after_reset
-from busplan.analysis.network import bus_of
+from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.cures import changeable, listed
 from busplan.analysis.planning.options import Option, Plan
 from busplan.answers.documents import document, with_profile
@@ -109,8 +109,8 @@ def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
 
 def _goal(plan: Plan) -> tuple[Part, ...]:
     """The goal of the plan."""
-    goal = plan.goal
-    nodes, axes = goal.bus.nodes, goal.bus.nodes * goal.node.axes
+    goal, network = plan.goal, network_of(plan.goal)
+    nodes, axes = int(network.nodes), int(network.axes)
     return (
         *(Code(goal.name), " with "),
         *(figure_value(NODES, nodes, at="/goal/nodes"), f" {nouns(nodes, 'node')} ("),
@@ -128,7 +128,8 @@ def _why_none(plan: Plan) -> str:
 def _warnings(plan: Plan) -> Iterator[Sentence]:
     option = plan.recommended
     profile = plan.goal if option is None else option.profile
-    yield from warning_sentences(profile, nodes=profile.bus.nodes, most=profile.bus.nodes)
+    nodes = int(network_of(profile).nodes)
+    yield from warning_sentences(profile, nodes=nodes, most=nodes)
     if option is not None:
         yield from reset_sentence(after_reset(option.profile, option.deciding), option.profile)
     limit = profile.limits.max_utilisation
@@ -198,10 +199,11 @@ def plan_records(plan: Plan) -> list[Record]:
 def plan_document(plan: Plan) -> JsonDocument:
     """Document of `busplan plan --format json`."""
     recommended = None if plan.recommended is None else plan.all_changes(plan.recommended)
+    goal = network_of(plan.goal)
     return document(
         "plan",
         profile=plan.profile.name,
-        goal={"nodes": plan.goal.bus.nodes, "axes": plan.goal.bus.nodes * plan.goal.node.axes},
+        goal={"nodes": int(goal.nodes), "axes": int(goal.axes)},
         recommended_changes=recommended,
         options=_options(plan),
         impossible=[one._asdict() for one in plan.impossible],

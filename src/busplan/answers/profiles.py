@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from busplan.analysis.network import network_of
 from busplan.answers.documents import document
 from busplan.forms.blocks import Chapter, Code, Record, Report, Sentence, count_value, sentence
 from busplan.forms.numbers import nouns, period_value
@@ -29,7 +30,7 @@ def _record(profile: Profile) -> Record:
     """Name, main figures and description."""
     return {
         "name": profile.name,
-        "nodes": profile.bus.nodes,
+        "nodes": int(network_of(profile).nodes),
         "period_us": profile.cycle.period_us,
         "timing_model": profile.bus.timing_model,
         "description": " ".join(profile.description.split()),

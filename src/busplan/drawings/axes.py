@@ -7,6 +7,7 @@ from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.capacity.node_steps import NodeSteps
+from busplan.analysis.network import network_of
 from busplan.forms.blocks import Drawing
 from busplan.forms.numbers import period, plural
 from busplan.forms.scale import round_steps
@@ -62,7 +63,7 @@ class AxesDrawing(Drawing):
         profile, steps = self._profile, self._steps
         root = drawing("Most axes over the communication period, under each timing model", css="chart axes")
         root.set("height", str(_TOP + _HEIGHT + _BELOW))
-        own_us, own_axes = profile.cycle.period_us, profile.bus.nodes * profile.node.axes
+        own_us, own_axes = profile.cycle.period_us, int(network_of(profile).axes)
         from_us, to_us = drawn_range(profile, steps)
         plane = _Plane(from_us, to_us, max(own_axes, *(one.max_axes(to_us) for one in steps)))
         _grid(root, plane)
@@ -80,7 +81,7 @@ class AxesDrawing(Drawing):
 
 def drawn_range(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:
     """Range of periods: from the first that carries a node to where the profile's nodes fit, at least twice its own."""
-    own_us, nodes = profile.cycle.period_us, profile.bus.nodes
+    own_us, nodes = profile.cycle.period_us, int(network_of(profile).nodes)
     all_us = [one.from_us for one in steps if one.from_us]
     lasts = [times_us[-1] * 1.25 for times_us in all_us]
     needed = [times_us[min(nodes, len(times_us)) - 1] * 1.25 for times_us in all_us]

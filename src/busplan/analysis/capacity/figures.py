@@ -156,7 +156,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
         terms=cycle.terms,
         binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name,
         max_nodes=max_nodes,
-        max_axes=profile.node.axes * max_nodes,
+        max_axes=int(network.groups[0].axes) * max_nodes,
         limited_by=limited_by,
         exceeded=exceeded,
         fits=not exceeded,
@@ -175,7 +175,7 @@ def _certainty_figures(profile: Profile, cycle: BusCycle, *, is_broken: bool) ->
     return {
         **certainty_numbers(found, cycle),
         "safe_nodes": nodes,
-        "safe_axes": profile.node.axes * nodes,
+        "safe_axes": int(cycle.network.groups[0].axes) * nodes,
         "safe_limited_by": limit,
         "verdict": VERDICTS[int(verdict_code(found, cycle.network, is_broken=is_broken))],
         "doubts": found.doubts,

@@ -171,7 +171,7 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     bits = np.min_scalar_type((1 << len(flags)) - 1)
     exceeded: Array = np.asarray(sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags)))
     most = most_nodes(network, limits)
-    numbers |= {"max_nodes": most.nodes, "max_axes": where.node.axes * most.nodes, "fits": np.equal(exceeded, 0)}
+    numbers |= {"max_nodes": most.nodes, "max_axes": network.groups[0].axes * most.nodes, "fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)
     own = _certainty(cycle, most) if model == bus.deciding_model else _UNDECIDED
     words = {

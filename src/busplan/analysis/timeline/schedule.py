@@ -129,10 +129,11 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     >>> abs(plan.used_us - plan.figures.required_us) < 1e-9
     True
     """
-    nodes, bus = profile.bus.nodes, bus_of(profile)
+    network, bus = network_of(profile), bus_of(profile)
+    nodes = int(network.nodes)
     if nodes > MOST_NODES:
         limit = bus.limit("nodes")
-        carries = "" if limit is None else f"; one bus carries {limit.most(network_of(profile)):g}"
+        carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
         raise BusplanError(f"bus.nodes = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(profile) if model is None else model
     closed = figures(profile, model=model)

@@ -136,7 +136,8 @@ def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """The most axes over the period, as a chart and as a table."""
     source, steps = sources["axes"], answer.steps
-    nodes, axes = answer.profile.bus.nodes, answer.profile.bus.nodes * answer.profile.node.axes
+    network = network_of(answer.profile)
+    nodes, axes = int(network.nodes), int(network.axes)
     caption = sentence(
         f"Axes that a period carries{_curves(answer)}; the point is this profile's own {{}} "
         f"{nouns(axes, 'axis')}, on {{}} {nouns(nodes, 'node')}.",
