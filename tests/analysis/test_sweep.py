@@ -15,6 +15,7 @@ from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import figure_names, sweep
+from busplan.analysis.sweep.circles import require_circles
 from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid, grid_models
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
@@ -215,3 +216,22 @@ def test_of_equal_terms_the_first_binds_as_in_capacity(make: Make) -> None:
         "nonperiodic",
     ]
     assert_rows_are_those_of_capacity(profile, Grid(axes), chunk_points=3)
+
+
+def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
+    make: Make, caplog: pytest.LogCaptureFixture
+) -> None:
+    big = make(
+        circle={"radius_mm": 10_000.0, "feed_mm_per_min": 3000.0, "ramp_periods": 20},
+        cycle__period_us=2000.0,
+        servo={"step_us": 50.0},
+    )
+    # 25,133,560 steps of each axis at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
+    require_circles(big, checked_grid(big, {"cycle.period_us": Listed((2000, 100))}, with_circle=True))
+    assert caplog.messages == []
+    three = checked_grid(big, {"delivery.seed": Listed((1, 2, 3))}, with_circle=True)
+    require_circles(big, three)
+    (said,) = caplog.messages
+    assert said.startswith("circle test: 150,801,360 steps, about ")
+    # The memory of one: they run one behind the other.
+    assert " and 0.58 GB" in said

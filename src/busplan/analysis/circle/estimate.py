@@ -25,6 +25,17 @@ class Estimate(NamedTuple):
     time_s: float
     memory_bytes: float
 
+    def then(self, other: "Estimate") -> "Estimate":
+        """What this costs and, when its memory is free again, another.
+
+        Parameters
+        ----------
+        other
+            What comes behind.
+        """
+        memory_bytes = max(self.memory_bytes, other.memory_bytes)
+        return Estimate(self.steps + other.steps, self.time_s + other.time_s, memory_bytes)
+
     @property
     def is_long(self) -> bool:
         """Whether it is worth a word before it starts."""
@@ -36,6 +47,10 @@ class Estimate(NamedTuple):
         engine = "" if compiled_kernel("auto") else ", in plain Python"
         memory = f"{self.memory_bytes / 1e9:.2g} GB"
         return f"circle test: {self.steps:,} steps, about {self.time_s:.0f} s and {memory}{engine}"
+
+
+NOTHING: Final = Estimate(0, 0.0, 0.0)
+"""What no simulation costs."""
 
 
 def estimate(kept: Sequence[Setup], passing: Sequence[Setup] = ()) -> Estimate:

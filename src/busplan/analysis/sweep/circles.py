@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from busplan.analysis.circle.estimate import NOTHING, announce, estimate
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
@@ -51,7 +52,7 @@ def run_task(task: CircleTask) -> Figures:
 
 
 def require_circles(profile: Profile, grid: Grid) -> None:
-    """Refuse a grid with a point whose circle test cannot be run, before any is run.
+    """Refuse a grid with a point whose circle test cannot be run, before any is run; say what a long sweep costs.
 
     Raises
     ------
@@ -59,15 +60,19 @@ def require_circles(profile: Profile, grid: Grid) -> None:
         The first such point and the reason: its period is no multiple of the step, the drive cannot reach the feed,
         or the circle is too short for its ramps.
     """
+    cost = NOTHING
     for chunk in grid.chunks(1):
         changes = chunk.point(0)
         variant = override(profile, changes)
         try:
-            # What the bus does not carry has an answer, but no circle.
-            _ = setup(variant) if bus(variant).fits else loop_timing(variant)
+            if bus(variant).fits:
+                cost = cost.then(estimate((), [setup(variant)]))
+            else:  # it has an answer, but no circle
+                loop_timing(variant)
         except BusplanError as error:
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
             raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None
+    announce(cost)
 
 
 def with_circles(
