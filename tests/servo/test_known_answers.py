@@ -10,7 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from busplan.servo.circle import CircleRun, settling_time_us, simulate_circle
+from busplan.servo.circle import CircleRun, simulate_circle
+from busplan.servo.measured_part import settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import Direction, circle_path
 

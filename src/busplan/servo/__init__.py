@@ -5,5 +5,5 @@ measured as ISO 230-4 measures real machines, and the stability margins of the p
 opens a file, prints, or depends on profiles.
 
 Read in this order: `parameters`, `path`, `delivery`, `rows`, `kernel`, `axis`, `mechanics`, `contour`, `margins`,
-`circle`. Only `parameters` and `checks` do not need numpy.
+`measured_part`, `circle`. Only `parameters` and `checks` do not need numpy.
 """

@@ -1,10 +1,8 @@
 """Simulate and measure a circle test."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +14,7 @@ from busplan.servo.contour import Contour, contour_error, covered_deg, measure_c
 from busplan.servo.delivery import Arrivals, arrivals, check_delivery
 from busplan.servo.engine import Engine
 from busplan.servo.margins import LoopMargins, loop_margins
+from busplan.servo.measured_part import measured_part
 from busplan.servo.mechanics import move_to_table
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath
@@ -27,13 +26,6 @@ _IDEAL_MECHANICS = Mechanics()
 FULL_TURN_DEG = 360.0
 _FOLLOWING_DEG = 36.0
 """Largest deviation from a full turn that counts as a following error: a tenth of it."""
-_SETTLING_SHARE = 0.2
-"""Largest share of a trapezoid's constant speed that the measures leave out for settling."""
-REST_MM = 1e-4
-"""What may be left of the lag where nothing says how round the circle must be."""
-LONGEST_SETTLING_US = 60e6
-_ROUNDING_STEPS = 1e-9
-_S_PER_MIN = 60.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -198,6 +190,7 @@ def simulate_circle(
     --------
     Two P loops lag behind and cut the circle by r (1 / sqrt(1 + (w / kp)^2) - 1), w = feed / r:
 
+    >>> from busplan.servo.measured_part import settling_time_us
     >>> from busplan.servo.path import circle_path
     >>> axis, timing = Axis(position_gain_per_s=50.0, velocity_feedforward=0.0), LoopTiming(period_us=1000.0)
     >>> settling_us = settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0)
@@ -222,9 +215,7 @@ def simulate_circle(
     y_mm = run(path.y_mm, axis=y, arrivals=arrivals_y, progress=partial(report, total // 2))
     move_to_table(x_mm, y_mm=y_mm, mechanics=mechanics, engine=engine)
     margins_x, margins_y = loop_margins(x, timing=timing), loop_margins(y, timing=timing)
-    part = _settled_arc(path, timing=timing, margins=(margins_x, margins_y))
-    if path.turn_from_us is not None:
-        part = _turn(path, timing, from_us=path.turn_from_us)
+    part = measured_part(path, timing=timing, margins=(margins_x, margins_y))
     return CircleRun(
         path=path,
         x=x,
@@ -293,73 +284,3 @@ def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refuse
             f"axis {name} reaches {(highest_mm_s - offset_mm_s) * 60:g} mm/min with "
             f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the feed must stay below it",
         )
-
-
-def settling_time_us(
-    x: Axis, y: Axis, *, timing: LoopTiming, feed_mm_per_min: float, rest_mm: float = REST_MM
-) -> float | None:
-    """Time at constant speed in which both loops settle.
-
-    Parameters
-    ----------
-    x, y, timing
-        As for `simulate_circle`.
-    feed_mm_per_min
-        Speed along the path [mm/min].
-    rest_mm
-        What may be left of the lag behind the path, above 0 [mm].
-
-    Returns
-    -------
-    float or None
-        The time [us]; None if a loop is unstable, or takes more than `LONGEST_SETTLING_US`.
-
-    Notes
-    -----
-    A loop that starts to move is off by its following error, at most v / kp. With the spectral radius rho of the linear
-    loop, about rho^n of it is left after n control periods; `LoopMargins.time_to_us` allows for a double pole.
-    Friction puts an axis off by at most ``reversal / kp``, which fades with its recovery: that of the start must go,
-    too.
-
-    Examples
-    --------
-    >>> axis, timing = Axis(position_gain_per_s=100.0, max_velocity_mm_s=400.0), LoopTiming(period_us=1000.0)
-    >>> round(settling_time_us(axis, axis, timing=timing, feed_mm_per_min=6000.0) / 1e3)
-    118
-    """
-    each = []
-    for axis in (x, y):
-        lag_mm = feed_mm_per_min / _S_PER_MIN / axis.position_gain_per_s if axis.position_gain_per_s else math.inf
-        margins = loop_margins(axis, timing=timing)
-        each.append(margins.time_to_us(rest_mm / lag_mm) if margins.stable and lag_mm < math.inf else math.inf)
-        if each[-1] < math.inf:
-            friction_mm = axis.reversal_mm_s / axis.position_gain_per_s
-            each.append(axis.reversal_recovery_us * math.log(max(friction_mm / rest_mm, 1.0)))
-    settling_us = max(each) + timing.period_us
-    return settling_us if settling_us <= LONGEST_SETTLING_US else None
-
-
-class _Part(NamedTuple):
-    """Steps that are measured; a position is that at the end of its step."""
-
-    steps: slice
-    turn_share: float | None
-    """Share of the last step that belongs to a turn; None for an arc."""
-
-
-def _turn(path: CirclePath, timing: LoopTiming, *, from_us: float) -> _Part:
-    """Steps of the whole turn at constant speed."""
-    first = round(from_us / timing.step_us)
-    turn = path.turn_us / timing.step_us
-    count = max(1, math.ceil(turn - _ROUNDING_STEPS))
-    return _Part(slice(first, first + count), min(1.0, turn - (count - 1)))
-
-
-def _settled_arc(path: CirclePath, *, timing: LoopTiming, margins: tuple[LoopMargins, ...]) -> _Part:
-    """Steps at constant speed without settling; at least one."""
-    start, stop = path.constant_from_us + path.period_us, path.constant_until_us
-    settling = max(0.0 if margin.settling_us is None else margin.settling_us for margin in margins)
-    start += min(settling, _SETTLING_SHARE * max(stop - start, 0.0))
-    first = math.ceil(start / timing.step_us) - 1
-    last = max(math.floor(stop / timing.step_us), first + 1)
-    return _Part(slice(first, last), None)

@@ -11,7 +11,8 @@ from busplan.sections.base import Section
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError, parameters
-from busplan.servo.circle import REST_MM, check_circle, settling_time_us
+from busplan.servo.circle import check_circle
+from busplan.servo.measured_part import REST_MM, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path, circle_setpoints
 
