@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from busplan.analysis.circle.setup import path_steps
 from busplan.errors import PlacedError
 from busplan.profile.toml import decode
 from busplan.rules.baseline import MODELS, read_baseline
 from busplan.rules.gate import FileResult, check_document, unreadable
 from busplan.rules.registry import all_rules
+from busplan.sections.profile import Profile
+from busplan.servo.checks import ParameterError, Refused
 
 EXAMPLES = Path(__file__).parent / "examples"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
@@ -195,3 +198,24 @@ def test_a_plan_that_lacks_its_reserve_alone_contradicts_no_equation() -> None:
     text = text.replace('"S100"', '"S400"').replace("cable_length_m = 10\n", "")
     found = check_document(decode(text.encode(), name="a.toml"))
     assert "BP102" not in {one.code for one in found.findings}
+
+
+@pytest.mark.parametrize(("radius_mm", "is_run"), [(15.915, True), (15.92, False)])
+def test_a_check_runs_a_circle_of_ten_million_steps_and_none_longer(
+    monkeypatch: pytest.MonkeyPatch, radius_mm: float, is_run: bool
+) -> None:
+    # 2 pi r at 100 mm/s is 1 s: 1,000 periods of 10,000 steps, or one period more.
+    text = (EXAMPLES / "BP204" / "valid.toml").read_text(encoding="utf-8").partition("[servo]")[0]
+    text = text.replace("period_us = 4000", "period_us = 1000") + (
+        "[servo]\nposition_gain_per_s = 50\nstep_us = 0.1\n"
+        f"[circle]\nradius_mm = {radius_mm}\nfeed_mm_per_min = 6000\nramp_periods = 0\n"
+    )
+    ran = []
+
+    def simulated(profile: Profile) -> None:
+        ran.append(path_steps(profile))
+        raise ParameterError(Refused("radius_mm", radius_mm, "was to be run"))
+
+    monkeypatch.setattr("busplan.analysis.circle.roundness.circle_test", simulated)
+    found = {one.code for one in check_document(decode(text.encode(), name="x.toml")).findings}
+    assert (ran, "BP204" in found) == (([10_000_000], False) if is_run else ([], True))
