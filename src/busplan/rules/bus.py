@@ -1,7 +1,6 @@
 """Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
 
 from collections.abc import Iterator
-from math import ceil
 from typing import Final
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
@@ -36,10 +35,9 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The slice is fuller than [limits] allows."""
     limit, one = subject.profile.limits.max_utilisation, subject.deciding
     if limit is not None and one.utilisation > limit:
-        cure = subject.room(one.nodes, utilisation=limit)
         yield RuleProblem(
             "limits.max_utilisation",
-            f"{one.utilisation:.1%} of the slice is used, {limit:.1%} allowed; {cure}",
+            f"{one.utilisation:.1%} of the slice is used, {limit:.1%} allowed; {subject.cure()}",
         )
 
 
@@ -48,7 +46,7 @@ def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
     spare = (one.safe_nodes or 0) - one.nodes
     if limit is not None and spare < limit:
-        yield RuleProblem("limits.min_spare_nodes", f"{_spare(spare, limit)}; {_room(subject, one.nodes + limit)}")
+        yield RuleProblem("limits.min_spare_nodes", f"{_spare(spare, limit)}; {_room(subject)}")
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -56,19 +54,18 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     limit, one = subject.profile.limits.min_spare_axes, subject.deciding
     spare = one.safe_axes - one.axes
     if limit is not None and spare < limit:
-        nodes = ceil((one.axes + limit) / subject.profile.node.axes)
-        yield RuleProblem("limits.min_spare_axes", f"{_spare(spare, limit)}; {_room(subject, nodes)}")
+        yield RuleProblem("limits.min_spare_axes", f"{_spare(spare, limit)}; {_room(subject)}")
 
 
 def _spare(spare: int, limit: int) -> str:
     return f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
 
 
-def _room(subject: RuleSubject, nodes: int) -> str:
-    """What limits the nodes, and how to make room for a number of them."""
+def _room(subject: RuleSubject) -> str:
+    """What limits the nodes, and how to make room for more."""
     one = subject.deciding
     limit = bus_of(subject.profile).limit(one.safe_limited_by)
-    cure = subject.room(nodes) if limit is None or limit.is_safety else limit.way_out
+    cure = subject.cure() if limit is None or limit.is_safety else limit.way_out
     return f"limited by {one.safe_limited_by}; {cure}"
 
 
@@ -90,9 +87,9 @@ RULES: Final = (
         "the cycle does not fit its time slice",
         "All terms of one cycle together (equation 2), with the bias of the timing model, take longer than "
         "slice_ratio * period_us (equation 1), by more than is not known; or a limit is broken that has no rule of its "
-        "own. The message names the cheapest cure: a "
-        "setting of the bus needs no new parts, the slice ratio is computing time of the host, the period is what the "
-        "machine is for.",
+        "own. The message names the cheapest cure, "
+        "which `busplan plan` finds: a setting of the bus needs no new parts, the slice ratio is computing time of the "
+        "host, the period is what the machine is for.",
         slice_overrun,
     ),
     Rule(
