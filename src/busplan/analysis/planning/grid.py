@@ -42,7 +42,7 @@ class Grid(NamedTuple):
         steps = ceil(Decimal(least * (1 - FIT_ROUNDING)) / Decimal(str(self.step)))
         blocks = max(0, len(str(steps)) - self.digits)
         rounded = int((Decimal(steps) / 10**blocks).to_integral_value(ROUND_CEILING))
-        first = 10 ** (self.digits - 1)
+        first: int = 10 ** (self.digits - 1)
         return max(1, rounded + blocks * 9 * first)
 
     def _multiple(self, place: int) -> int:
