@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from busplan.analysis.capacity.certainty import FITS, certainty
 from busplan.analysis.capacity.cycle import available_us, cycle_of
 from busplan.analysis.capacity.figures import figures
+from busplan.analysis.circle.check import CircleCheck
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import cure
 from busplan.analysis.planning.constraints import needs
@@ -317,8 +318,6 @@ def test_a_plan_has_more_to_spare_than_it_is_unsure_of(make: Make) -> None:
 @pytest.mark.parametrize("name", shipped_names())
 @pytest.mark.parametrize("nodes", [3, 8, 14])
 def test_what_is_written_for_a_shipped_profile_passes_the_gate_with_its_circle(name: str, nodes: int) -> None:
-    from busplan.analysis.circle.check import CircleCheck
-
     best = plan(load(name).profile, wanted={"bus.nodes": nodes}, circle=CircleCheck()).recommended
     assert best is not None
     assert errors_of(best.profile, with_circle=True) == []
@@ -368,7 +367,11 @@ def test_a_limit_is_relaxed_no_more_than_it_takes(make: Make) -> None:
 @pytest.mark.parametrize(
     ("free", "wanted", "words"),
     [
-        (["schedule"], {}, "free schedule: there is nothing of that name to free on a bus of kind ieee1394; there are gap"),
+        (
+            ["schedule"],
+            {},
+            "free schedule: there is nothing of that name to free on a bus of kind ieee1394; there are gap",
+        ),
         (["wiring", "speed"], {}, "free wiring: there is nothing"),
         (["period"], {"cycle.period_us": 1000.0}, "free period: cycle.period_us was given a value, which is kept"),
         (["nodes"], {"bus.nodes": 4}, "free nodes: bus.nodes was given a value"),

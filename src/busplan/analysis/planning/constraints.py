@@ -30,8 +30,9 @@ class Need(NamedTuple):
 
     def words(self, most_us: float) -> str:
         """Say what is asked, and what the slice can give at most [us]."""
-        who = "the cycle" if self.key == TIME else self.key
-        return self.why or f"{who} needs a slice of {self.us:.3f} us, and at most {most_us:.3f} us can be given"
+        needs = f"needs a slice of {self.us:.3f} us"
+        who = f"the cycle {needs} to be shown to fit" if self.key == TIME else f"{self.key} {needs}"
+        return self.why or f"{who}, and at most {most_us:.3f} us can be given"
 
 
 def shown(network: Network) -> Need:

@@ -55,21 +55,23 @@ def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
 def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
     """For reads and writes alike. Every size is tried: an execution table need not ascend."""
     title, payloads = "largest payload", bus_of(goal).payloads(network_of(goal))
-    step, held_by = payloads.step_bytes, payloads.bound
-    for size in range(payloads.most_bytes // step * step, 0, -step):
+    step = payloads.step_bytes
+    largest, tried = payloads.most_bytes // step * step, None
+    for size in range(largest, 0, -step):
         one = with_payload(goal, size)
         if one is None:
             return Impossible(title, "the payload follows the axes of a node")
         if not search.allows(one):
-            held_by = "execution"
             continue
         found = search.least(cheap, one) if search.reaches(one, cheap) else None
         if found is not None:
+            bound = payloads.bound if size == largest else "execution"
+            held_by = bound if tried is None else search.binding(cheap, tried).key
             return option(search, title, found, held_by=held_by)
-        held_by = search.binding(cheap, one).key
-    is_unknown = held_by == "execution"
-    reason = "the execution table holds no whole step of the payload" if is_unknown else "not even the smallest fits"
-    return Impossible(title, reason)
+        tried = one
+    if tried is None:
+        return Impossible(title, "the execution table holds no whole step of the payload")
+    return Impossible(title, "not even the smallest fits")
 
 
 def _most_nodes(search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
