@@ -211,11 +211,11 @@ def test_a_reserve_is_kept_and_written_and_the_gate_passes(busplan: Run, run: Ru
 
 
 def test_only_what_is_freed_is_changed(busplan: Run, profile: Path) -> None:
-    asked = ("mine.toml", "--nodes", 6, "--period", "1ms", "--format", "json")
+    asked = ("mine.toml", "--nodes", 7, "--period", "1ms", "--format", "json")
     for free, code, keys in (
         ("slice_ratio", 1, None),
         ("gap_count, slice_ratio", 0, {"bus.nodes", "cycle.slice_ratio", "bus.gap_count"}),
-        ("responses", 0, {"bus.nodes", "node.read_response", "node.write_response"}),
+        ("gap_count, responses", 0, {"bus.nodes", "node.read_response", "node.write_response", "bus.gap_count"}),
     ):
         done = busplan(*asked, "--free", free, cwd=profile.parent)
         document = json.loads(done.stdout)
