@@ -177,7 +177,7 @@ def test_a_payload_stays_inside_the_execution_table_which_need_not_ascend(make: 
     )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_most_nodes_are_safe_for_their_gap_count(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely, start: Safely

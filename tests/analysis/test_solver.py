@@ -46,7 +46,7 @@ def errors_of(profile: Profile, *, with_circle: bool = False) -> list[str]:
     return [one.message for one in found if one.severity == "error"]
 
 
-limits = st.fixed_dictionaries(
+limits: st.SearchStrategy[dict[str, object]] = st.fixed_dictionaries(
     {},
     optional={
         "limits.reserve": st.sampled_from([0.1, 0.2, 0.5]),
@@ -62,7 +62,7 @@ limits = st.fixed_dictionaries(
 def test_what_a_plan_writes_passes_the_gate(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = override(data.draw(any_profile), data.draw(limits))
     free = data.draw(st.none() | st.lists(st.sampled_from(ALL), min_size=1, unique=True))
-    if data.draw(st.integers(0, 9)):  # every size of a payload is tried, which takes a while of large ones
+    if free is not None and "payload" in free:  # every size is tried, which takes a while of large ones
         profile = override(profile, {"payload.read_bytes": 12, "payload.write_bytes": data.draw(st.integers(1, 40))})
     found, errors = least(profile, free), errors_of(profile)
     if found is None:
@@ -348,20 +348,22 @@ def test_without_a_plan_it_says_what_binds_and_what_would_be_enough(
     assert {one.relaxed for one in found.relaxations} == relaxed
 
 
-def test_a_limit_is_relaxed_no_more_than_it_takes(make: Make) -> None:
-    kept = {"cycle.period_us": 1000.0}
-    for key, value, enough in (
-        ("limits.reserve", 0.9, 0.75),
-        ("limits.max_utilisation", 0.1, 0.2),
-        ("limits.min_spare_nodes", 12, 5),
-    ):
-        found = plan(make(), wanted={**kept, key: value})
-        (one,) = (each for each in found.relaxations if each.relaxed == key)
-        assert one.value == pytest.approx(enough)
-        assert holds(override(found.goal, {key: one.value, **one.changes}))
-        step = 1 if isinstance(one.value, int) else 0.01
-        tighter = float(one.value) + (-step if key.endswith("utilisation") else step)
-        assert plan(make(), wanted={**kept, key: type(one.value)(round(tighter, 2))}).recommended is None
+@pytest.mark.parametrize(
+    ("key", "value", "enough", "tighter"),
+    [
+        ("limits.reserve", 0.9, 0.75, 0.76),
+        ("limits.max_utilisation", 0.1, 0.2, 0.19),
+        ("limits.min_spare_nodes", 12, 5, 6),
+    ],
+)
+def test_a_limit_is_relaxed_no_more_than_it_takes(
+    make: Make, key: str, value: float, enough: float, tighter: float
+) -> None:
+    found = plan(make(cycle__period_us=1000.0), wanted={key: value}, free=["gap_count", "slice_ratio"])
+    (one,) = (each for each in found.relaxations if each.relaxed == key)
+    assert one.value == enough
+    assert holds(override(found.goal, {key: one.value, **one.changes}))
+    assert least(override(found.goal, {key: tighter}), ["gap_count", "slice_ratio"]) is None
 
 
 @pytest.mark.parametrize(
@@ -402,7 +404,10 @@ def test_neither_period_nor_slice_ratio_changes_what_is_needed(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile]
 ) -> None:
     profile = override(data.draw(any_profile), data.draw(limits))
-    other = {"cycle.period_us": data.draw(st.floats(10, 1e5)), "cycle.slice_ratio": data.draw(st.floats(0.01, 1.0))}
+    other: dict[str, object] = {
+        "cycle.period_us": data.draw(st.floats(10, 1e5)),
+        "cycle.slice_ratio": data.draw(st.floats(0.01, 1.0)),
+    }
     assert [one.us for one in needs(override(profile, other))] == [one.us for one in needs(profile)]
 
 
