@@ -12,6 +12,7 @@ from busplan.analysis.capacity.cycle import broken_limits
 from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.check import CircleCheck
+from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import Change, cure
 from busplan.analysis.planning.grid import MOST_RATIO
@@ -217,3 +218,27 @@ def test_a_gap_count_that_no_table_cures_is_not_advised_away(make: Make, period_
     found = cure(make(bus__gap_count=0, bus__cable_length_m=10.0, cycle__period_us=period_us), circle=None)
     assert found.changes is None
     assert "for cables of more than 4.5 m none is known to be safe" in found.why
+
+
+def test_a_loop_on_the_node_that_lacks_its_margin_is_tried_once(make: Make) -> None:
+    # Its margins know neither the period nor the bus: no other period is worth a test.
+    unstable = make(cycle__period_us=200.0, servo={"step_us": 100.0, "position_gain_per_s": 30_000.0})
+    runs = []
+
+    class Counted(CircleCheck):
+        def _run(self, profile: Profile) -> tuple[str, ...]:
+            runs.append(profile)
+            return super()._run(profile)
+
+    circle = Counted()
+    failures = [circle(override(unstable, {"cycle.period_us": period_us})) for period_us in (600.0, 900.0, 4000.0)]
+    assert len(set(failures)) == 1
+    assert failures[0]
+    assert len(runs) == 1
+    for gain in (14_000.0, 30_000.0):
+        one = override(unstable, {"servo.position_gain_per_s": gain})
+        margins = {
+            (each.stable, each.phase_margin_deg, each.gain_margin_db)
+            for each in circle_test(one, periods_us=[600.0, 900.0, 4000.0], explain=False).results
+        }
+        assert len(margins) == 1

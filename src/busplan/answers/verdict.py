@@ -283,7 +283,7 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
         )
         carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
         return Sentence((*way, *carried, "."))
-    purpose = "make it fit" if figures.verdict != FITS else "keep its limits" if figures.safe else "make it safe"
+    purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
     return Sentence((*way, margin, " +/- ", doubt, "."))

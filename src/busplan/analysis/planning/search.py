@@ -51,8 +51,9 @@ class Search:
         self.kept = frozenset(kept)
         self.max_circles = max_circles
         self.proven = True
-        """Whether no smaller change exists; False if the search for a period was cut short."""
+        """Whether no smaller change than the last one exists; False if the search for a period was cut short."""
         self._profiles: dict[frozenset[tuple[str, Value]], Profile] = {}
+        self._circles: dict[float, tuple[str, ...]] = {}
         self._needs: dict[frozenset[tuple[str, Value]], list[Need]] = {}
 
     def least(self, levels: Sequence[Freedom], changes: Changes | None = None) -> Changes | None:
@@ -70,15 +71,18 @@ class Search:
         dict or None
             All changes, the dearest first; empty if none is needed, None if no change of these is enough.
         """
-        changes = changes or {}
+        self.proven = True
+        return self._least(levels, changes or {})
+
+    def _least(self, levels: Sequence[Freedom], changes: Changes) -> Changes | None:
         if not levels:
             return changes if self.passes(changes) else None
         *cheaper, dearest = levels
-        kept = self.least(cheaper, changes)
+        kept = self._least(cheaper, changes)
         if kept is not None:
             return kept
         for one in dearest.values(self, changes, cheaper):
-            found = None if self.kept & set(one) else self.least(cheaper, {**changes, **one})
+            found = None if self.kept & set(one) else self._least(cheaper, {**changes, **one})
             if found is not None:
                 return found
         return None
@@ -93,7 +97,15 @@ class Search:
 
     def circle_failures(self, changes: Changes) -> tuple[str, ...]:
         """What the circle does not hold after some changes that fit the bus; nothing where it is not run."""
-        return () if self._circle is None else self._circle(self.profile(changes))
+        if self._circle is None:
+            return ()
+        servo, period_us = self._own.servo, self.period_us(changes)
+        if servo.loop == "host" and servo.update == "on_arrival":
+            return self._circle(self.profile(changes))
+        # The loop knows nothing of the bus but its period.
+        if period_us not in self._circles:
+            self._circles[period_us] = self._circle(self.profile(changes))
+        return self._circles[period_us]
 
     # --- what a network needs, and what its slice gives it --------------------------------------------------
 
