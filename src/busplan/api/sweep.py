@@ -186,7 +186,7 @@ def sweep(
 
 
 def _values(profile: Profile, key: str, given: str | Iterable[object]) -> Values:
-    words = words_of(profile.bus.kind, key)
+    words = words_of(profile, key)
     if isinstance(given, str):
         return parse_values(given, name=f"vary {key}={given}", words=words)
     name = f"vary {key}"

@@ -158,6 +158,13 @@ class BusLatency(NamedTuple):
     payload_bytes: Number | None
     phases: Mapping[str, Number]
     """Figures by key, which are among the kind's `latency_figures`."""
+    group: str = ""
+    """Of which group of nodes; empty where all are alike."""
+
+    @property
+    def label(self) -> str:
+        """What it is called beside the others."""
+        return f"{self.group} {self.name}" if self.group else self.name
 
 
 class Halves(NamedTuple):
@@ -227,8 +234,8 @@ class BusCycle(ABC):
     def events(self) -> Iterator[BusEvent]:
         """The same cycle laid out, of plain numbers only."""
 
-    def figures(self) -> Mapping[str, Number]:
-        """The kind's own figures beside the terms, by key."""
+    def figures(self) -> Mapping[str, Number | None]:
+        """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
         return {}
 
     def latencies(self) -> tuple[BusLatency, ...]:
@@ -289,8 +296,8 @@ class Bus(ABC):
     """Keys of a profile whose default is a figure with a source."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""
-    choosing_keys: ClassVar[tuple[str, ...]] = ("node.execution.grade",)
-    """Keys whose word chooses between numbers by `choose`, so that a derivation has them among its inputs."""
+    choosing_keys: ClassVar[tuple[str, ...]] = ("execution.grade",)
+    """Keys of a node whose word chooses between numbers by `choose`, so that a derivation has them among its inputs."""
     warning_keys: ClassVar[tuple[str, ...]] = ()
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()
@@ -323,8 +330,21 @@ class Bus(ABC):
         """Say whose latency it is."""
         return ", ".join(("the whole cycle", *self.setup_words(network)))
 
-    def halves(self, network: Network, *, model: str, kind: str, payload_bytes: int) -> Halves:  # noqa: ARG002
+    def halves(self, network: Network, *, group: str, model: str, kind: str, payload_bytes: int) -> Halves:  # noqa: ARG002
         """What a transaction's packets take.
+
+        Parameters
+        ----------
+        network
+            The network.
+        group
+            Name of the group of nodes.
+        model
+            Timing model.
+        kind
+            Name of the transaction.
+        payload_bytes
+            Its payload [bytes].
 
         Raises
         ------

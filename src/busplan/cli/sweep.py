@@ -139,7 +139,7 @@ def sweep_command(
     from busplan.cli.sweep_run import available_processors, run_sweep
 
     loaded = load_changed(profile, changes)
-    axes = parse_axes(vary or [], kind=loaded.bus.kind)
+    axes = parse_axes(vary or [], profile=loaded)
     for one in changes.each:
         for key in axes:
             require_separate(one, key, typed=f"--vary {key}")

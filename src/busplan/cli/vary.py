@@ -6,17 +6,18 @@ from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Values
+    from busplan.sections.profile import Profile
 
 
-def parse_axes(texts: list[str], *, kind: str) -> dict[str, "Values"]:
+def parse_axes(texts: list[str], *, profile: "Profile") -> dict[str, "Values"]:
     """Parse all --vary options, in order.
 
     Parameters
     ----------
     texts
         Values of the options.
-    kind
-        Kind of bus, which defines the words allowed instead of numbers.
+    profile
+        The network, whose kind of bus defines the words allowed instead of numbers.
 
     Raises
     ------
@@ -35,5 +36,5 @@ def parse_axes(texts: list[str], *, kind: str) -> dict[str, "Values"]:
             raise BusplanError(f"--vary {text}: expected KEY=VALUES, as bus.nodes=1:62 or cycle.period_us=250,500,1000")
         if key in axes:
             raise BusplanError(f"--vary {text}: {key} is varied already; give all its values at once")
-        axes[key] = parse_values(spec, name=f"--vary {text}", words=words_of(kind, key))
+        axes[key] = parse_values(spec, name=f"--vary {text}", words=words_of(profile, key))
     return axes

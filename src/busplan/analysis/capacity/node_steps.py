@@ -39,7 +39,7 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     Parameters
     ----------
     profile
-        The network; its own period and number of nodes play no part.
+        The network, of nodes that are alike; its own period and number of nodes play no part.
     model
         Timing model.
 
@@ -54,6 +54,5 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     most, limit = safe_nodes(longest) if is_safe else largest_nodes(longest, model=model)
     cycles = (cycle_of(profile, model=model, nodes=nodes) for nodes in range(1, most + 1))
     needed_us = (plain(certainty(one).safe_required_us if is_safe else one.required_us) for one in cycles)
-    return NodeSteps(
-        model, profile.node.axes, tuple(us / profile.cycle.slice_ratio for us in needed_us), limit, is_safe
-    )
+    (said,) = profile.alike_nodes
+    return NodeSteps(model, said.node.axes, tuple(us / profile.cycle.slice_ratio for us in needed_us), limit, is_safe)

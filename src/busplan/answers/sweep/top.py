@@ -114,8 +114,11 @@ class Tally:
                 Sentence((".",)),
                 by="",
             )
-        if "node.axes" in self._varied and not self.profile.payload.follows_axes:
-            keys = Code("payload.read_bytes_per_axis"), Code("payload.write_bytes_per_axis")
+        for one in self.profile.alike_nodes:
+            if one.node_key("axes") not in self._varied or one.payload.follows_axes:
+                continue
+            section = f"group.{one.name}" if one.name else "payload"
+            keys = Code(f"{section}.read_bytes_per_axis"), Code(f"{section}.write_bytes_per_axis")
             yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
         safety = self.bus.safety_figure
         if self._unsafe and safety is not None:

@@ -77,7 +77,9 @@ def of_cycle(
     # One reading is wrong by the same share in all: signs count.
     of_split_us = total(halves * _gap_term_us(_measured_at(node), link.gap_count, "d_split") for node, halves in split)
     gap_term_us = of_split_us + others * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
-    of_packets = total(one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) for one in exchanges)
+    of_packets = total(
+        one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) * one.link.hops for one in exchanges
+    )
     half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
@@ -121,7 +123,7 @@ def of_cycle(
             )
             for group in network.groups
         ),
-        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays) * link.hops * half_width_us / _RECTANGULAR),
+        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays * link.hops) * half_width_us / _RECTANGULAR),
         Doubt(
             "host.transaction_us",
             "host time",
