@@ -31,7 +31,7 @@ class AllAnswers(NamedTuple):
     no_schedule: tuple[str, ...]
     """Why there is no schedule."""
     steps: tuple[NodeSteps, ...]
-    """Nodes over the period, under each timing model."""
+    """Nodes over the period, under each timing model; empty where nodes are in groups."""
     periods: Capacity
     """Capacity at several periods around and including the profile's own."""
     circle: CircleTest | None
@@ -75,7 +75,7 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         latency=latency(profile),
         schedule=plan,
         no_schedule=no_schedule,
-        steps=tuple(node_steps(profile, model=model) for model in model_names(profile)),
+        steps=() if profile.group else tuple(node_steps(profile, model=model) for model in model_names(profile)),
         periods=capacity(profile, periods_us=periods_us),
         circle=circle,
         contour=contour,

@@ -72,7 +72,8 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
             figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
         )
     yield _carries(figures, at=at)
-    yield _advice(verdict, profile, places)
+    if verdict.change is not None or not (verdict.all_well and profile.group):
+        yield _advice(verdict, profile, places)
     yield from execution_sentence(profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
 

@@ -310,8 +310,6 @@ class Bus(ABC):
     """Keys as they are after a bus reset, until somebody sets them again."""
     change_words: ClassVar[Mapping[str, str]] = {}
     """How a table of plans writes a key with its value: a format of the value."""
-    way_charged: ClassVar[str] = "every node alike"
-    """Which way on the wire each node is charged, as drawings of a cycle say it."""
 
     @abstractmethod
     def profile_model(self) -> "type[Profile]":
@@ -384,6 +382,10 @@ class Bus(ABC):
     @abstractmethod
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads that a plan may choose from."""
+
+    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
+        """Say which way on the wire each node is charged."""
+        return "every node alike"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
         """How the bus is set, each in a few words."""

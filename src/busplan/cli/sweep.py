@@ -222,9 +222,9 @@ def _columns(
             if name not in known:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
     elif short:
-        from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS
+        from busplan.answers.sweep.top import CIRCLE_COLUMNS, default_columns
 
-        chosen = DEFAULT_COLUMNS + (CIRCLE_COLUMNS if circle else ())
+        chosen = default_columns(profile) + (CIRCLE_COLUMNS if circle else ())
     else:
         chosen = known
     return tuple(dict.fromkeys((*front, *chosen, *([sort_by] if sort_by else []))))

@@ -16,7 +16,7 @@ from busplan.profile.keys import named_path, path_of
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_model
 from busplan.profile.positions import KeyPath
 from busplan.profile.write import value_text
-from busplan.sections.base import Problem
+from busplan.sections.base import MISSING, Problem
 from busplan.sections.profile import nodes_problems
 
 _TAG: Final = "kind"
@@ -91,18 +91,19 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
 
 def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
     """Problems of how a profile says its nodes: the model looks for them only where there are no others."""
-    bus = data.get("bus")
-    said = {key for key in ("node", "payload", "group") if key in data}
-    if isinstance(bus, dict):
-        model = profile_model(kind_of(data))
-        for one in nodes_problems(said | ({"bus.nodes"} & {f"bus.{key}" for key in bus})):
+    bus, model = data.get("bus"), profile_model(kind_of(data))
+    said = {"node", "payload", "group"}.intersection(data)
+    if not isinstance(bus, dict) or "nodes" in bus or kind_of(data) is None:
+        said.add("bus.nodes")  # or nobody can tell
+    for one in nodes_problems(said):
+        if one.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
             yield _of_problem(one, (), model)
 
 
 def _of_problem(problem: Problem, path: KeyPath, model: type[BaseModel]) -> KeyFinding:
     """Finding of a problem that a validator of ours reports at a path."""
     own = (*path, *_parsed(problem.key)) if problem.key else path
-    if problem.message:
+    if problem.message != MISSING:
         return KeyFinding(own, problem.message, problem.kind, shows_value=problem.kind != "missing-key")
     return KeyFinding(own, _missing(*_path(own, model)), problem.kind, shows_value=False)
 

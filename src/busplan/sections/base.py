@@ -18,6 +18,10 @@ Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
 Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 
 
+MISSING: Final = "Field required"
+"""Message of a missing key; what reports it says what the key is."""
+
+
 class Problem(NamedTuple):
     """One thing that is wrong with a profile."""
 

@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from busplan.printable import has_controls
 from busplan.sections.alike_nodes import AlikeNodes
-from busplan.sections.base import Problem, Section, refused
+from busplan.sections.base import MISSING, Problem, Section, refused
 from busplan.sections.cycle import (
     BusSection,
     CycleSection,
@@ -128,7 +128,7 @@ def _payloads(alike: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
         yield f"{section}.{key}", size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
 
 
-_OF_ALIKE_NODES: Final = ("bus.nodes", "node", "payload")
+_OF_ALIKE_NODES: Final = ("bus.nodes", "payload", "node")
 """What a profile says of its nodes where all are alike."""
 
 
@@ -142,6 +142,7 @@ def nodes_problems(said: Collection[str]) -> Iterator[Problem]:
     """
     for key in _OF_ALIKE_NODES:
         if "group" in said and key in said:
-            yield Problem("is said by each [[group]]; remove one of the two", key=key, kind="inconsistent")
+            own = ", as group.NAME.nodes" if key == "bus.nodes" else ""
+            yield Problem(f"each [[group]] has its own{own}; remove one of the two", key=key, kind="inconsistent")
         elif "group" not in said and key not in said:
-            yield Problem("", key=key, kind="missing-key")
+            yield Problem(MISSING, key=key, kind="missing-key")

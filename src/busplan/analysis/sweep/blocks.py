@@ -142,7 +142,7 @@ def _varied(values: Array) -> Column:
 def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[str, Column]:
     """All figures of a chunk under one timing model."""
     for number, (key, own) in enumerate(values.items()):
-        if own.size > 1 and (own.dtype == object or _makes_alike(key)):
+        if own.dtype == object and own.size > 1:
             # Words among numbers: compute each value by itself and join the results along the axis.
             parts = [
                 _figures(profile, {**values, key: np.take(own, [index], axis=number)}, model)
@@ -150,11 +150,6 @@ def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[
             ]
             return {name: _joined([part[name] for part in parts], axis=number) for name in figure_names(profile)}
     return _columns(_at(profile, values), model, axes=len(values))
-
-
-def _makes_alike(key: str) -> bool:
-    """Whether a value of a key may make two groups alike, which no array can tell."""
-    return key.startswith("group.") and not key.endswith(".nodes")
 
 
 def _joined(parts: list[Column], *, axis: int) -> Column:

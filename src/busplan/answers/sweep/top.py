@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
+from busplan.analysis.capacity.figures import COUNTS
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
@@ -31,7 +32,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import nouns
 from busplan.sections.profile import Profile
 
-DEFAULT_COLUMNS: Final = (
+_DEFAULT_COLUMNS: Final = (
     "required_us",
     "available_us",
     "margin_us",
@@ -43,8 +44,18 @@ DEFAULT_COLUMNS: Final = (
     "verdict",
 )
 """Default figures of a table."""
+_OF_GROUPS: Final = ("safe_nodes", "safe_limited_by")
+"""Of them, what each group has for itself."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
 """Default figures of circle tests."""
+
+
+def default_columns(profile: Profile) -> tuple[str, ...]:
+    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole."""
+    if not profile.group:
+        return _DEFAULT_COLUMNS
+    whole = (key for key in _DEFAULT_COLUMNS if key not in COUNTS)
+    return (*whole, *(f"group.{one.name}.{key}" for one in profile.group for key in _OF_GROUPS))
 
 
 class Tally:

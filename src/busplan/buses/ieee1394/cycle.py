@@ -84,16 +84,16 @@ class Ieee1394Cycle(BusCycle):
     def _exchange(self, place: int, kind: TransactionKind, hops: Number | None, *, suffix: str = "") -> Exchange:
         """The transaction of a group by its place, with a node at some hops or, without them, on the mean."""
         network, own = self.network, charges_own_hops(self.network)
-        link = link_of(network, self._ways[place].mean if hops is None else hops) if own else self.link
-        common = self._delays_of(link) if own else self._delays
+        link = self.link._replace(hops=self._ways[place].mean if hops is None else hops) if own else self.link
+        common = self._delays_of(link, self._delays) if own else self._delays
         return exchange(network, network.groups[place], kind, model=self.model, link=link, common=common, suffix=suffix)
 
     @cached_property
     def _delays(self) -> Delays:
-        return self._delays_of(self.link)
+        return self._delays_of(self.link, None)
 
-    def _delays_of(self, link: Link) -> Delays:
-        found = delays(link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes))
+    def _delays_of(self, link: Link, shared: Delays | None) -> Delays:
+        found = delays(link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes), shared=shared)
         for key, number in (
             ("arbitration_us", found.arbitration_us),
             ("acknowledge_us", found.acknowledge_us),

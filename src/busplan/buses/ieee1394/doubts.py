@@ -111,17 +111,11 @@ def of_cycle(
             total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split) + others * spread_us,
         ),
         Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
-        *(
-            Doubt(
-                group.key("execution"),
-                f"execution time of {group.name}" if group.name else "execution time",
-                total(
-                    one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0)
-                    for one in exchanges
-                    if one.group is group
-                ),
-            )
-            for group in network.groups
+        Doubt(
+            "node.execution" if network.is_uniform else "group.execution",
+            "execution time",
+            # Times of several groups are measured, or guessed, in one way: they are taken to err together.
+            total(one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0) for one in exchanges),
         ),
         Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays * link.hops) * half_width_us / _RECTANGULAR),
         Doubt(

@@ -24,7 +24,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.limits import LIMITS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
-from busplan.buses.ieee1394.transactions import farthest_link, gap_count_of, hops_of
+from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
@@ -125,7 +125,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "bus.max_hops": "tree of {} hops",
         "bus.speed": "speed {}",
     }
-    way_charged = "every node at the hops of the farthest"
 
     def profile_model(self) -> "type[Ieee1394Profile]":
         """The model of its profiles."""
@@ -161,7 +160,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""
         nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
-        return ", ".join((f"farthest of {nodes}", *self.setup_words(network)))
+        farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
+        return ", ".join((farthest, *self.setup_words(network)))
 
     def halves(self, network: Network, *, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
         """What the packets of a split transaction with the farthest node of a group take.
@@ -226,6 +226,10 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """Whole quadlets up to the largest packet of the speed."""
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), "speed", carrier=speed)
+
+    def way_charged(self, network: Network) -> str:
+        """Say whose hops each node is charged."""
+        return f"every node at {'its own hops' if charges_own_hops(network) else 'the hops of the farthest'}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Hops and gap count."""

@@ -65,9 +65,7 @@ class Ieee1394Bus(BusSection):
         description='Gap count of all nodes, 0..63, or "optimal": the smallest safe one for the hops',
         examples=[MAX_GAP_COUNT],
     )
-    nodes: Count | None = Field(
-        default=None, description="Distributed nodes N, host not counted; without them there are groups", examples=[2]
-    )
+    nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[2])
     max_hops: Count | None = Field(
         default=None,
         description="Most cable hops between any two nodes of a tree, the host counted among them; "

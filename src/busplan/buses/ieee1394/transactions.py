@@ -94,10 +94,10 @@ def ways(network: Network) -> tuple[Ways, ...]:
     for group in network.groups:
         mean = (group.nodes + 1) / 2
         before = found[-1].last if found else None
-        if before is None:
-            found.append(Ways(1, mean, group.nodes))
-        else:
-            found.append(Ways(before + 1, before + mean, before + group.nodes))
+        own = Ways(1, mean, group.nodes)
+        if before is not None:
+            own = Ways(before + 1, before + mean, before + group.nodes)
+        found.append(own._replace(mean=named(own.mean, "hops", f"H_mean{group.name and f',{group.name}'}")))
     return tuple(found)
 
 
