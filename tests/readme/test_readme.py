@@ -22,6 +22,7 @@ from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown_words import code, table
 from busplan.manual import FOLDER, topics
+from busplan.profile.kinds import models_of
 from busplan.profile.shipped import shipped_names
 from busplan.sections.machine import AxisOverride
 
@@ -69,7 +70,11 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         inner = sections(field.annotation)
-        if inner == [AxisOverride]:
+        if name == "group":
+            (group,) = models_of(field.annotation)
+            yield from (reference_row(group, own, f"group.NAME.{own}") for own in ("name", "nodes", "axes", "hops"))
+            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | What its nodes have |"
+        elif inner == [AxisOverride]:
             yield f"| `{key}` | any key of one axis | none | {field.description} |"
         elif inner:
             for one in inner:
@@ -84,6 +89,8 @@ def reference_row(model: type[BaseModel], name: str, key: str) -> str:
     default = (
         "required"
         if field.default is PydanticUndefined
+        else "required, without groups"
+        if key == "bus.nodes"
         else repr(field.default).replace("'", '"').replace("False", "false")
     )
     range_ = allowed(model.model_json_schema()["properties"][name])
@@ -101,7 +108,8 @@ def allowed(schema: dict[str, Any]) -> str:
     if schema["type"] == "array":
         return f"list of {allowed(schema['items'])}"
     if schema["type"] == "string":
-        return f"text up to {schema['maxLength']} characters"
+        letters = " of letters, digits, - and _" if schema.get("pattern", "").startswith("^[A-Za-z]") else ""
+        return f"text up to {schema['maxLength']} characters{letters}"
     low = f"> {schema['exclusiveMinimum']:g}" if "exclusiveMinimum" in schema else f"{schema['minimum']:g}"
     kind = "whole " if schema["type"] == "integer" else ""
     return f"{kind}{low} to {schema['maximum']:g}"

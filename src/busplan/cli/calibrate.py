@@ -47,7 +47,7 @@ def calibrate_command(
         typer.Option(
             "--group",
             metavar="NAME",
-            help="The group of nodes that was measured, of a profile with several.",
+            help="The group of nodes that was measured, of a profile with groups.  [default: its one group]",
             show_default=False,
         ),
     ] = None,

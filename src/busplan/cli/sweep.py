@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl"})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "safe_axes"
+_FIGURE_OF_GROUPS: Final = "margin_corrected_us"
 
 
 @takes_changes(words="Not of a key that varies.")
@@ -90,7 +91,7 @@ def sweep_command(
         typer.Option(
             "--figure",
             metavar="COLUMN",
-            help="What --plot draws, by its name in --columns.  [default: safe_axes]",
+            help="What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
             show_default=False,
         ),
     ] = None,
@@ -147,7 +148,7 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    drawn = figure or _DEFAULT_FIGURE
+    drawn = figure or (_FIGURE_OF_GROUPS if loaded.group else _DEFAULT_FIGURE)
     _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
     run_sweep(
         SweepJob(

@@ -183,7 +183,10 @@ def starter_text(source: str, *, name: str) -> str:
     place = document.places["name",]
     # Remove suppressions: they were decided for the shipped profile, not for the new machine.
     before, after = document.text[: place.value_start], document.text[place.value_end :]
-    text = before + value_text(name) + _CIRCLE.sub(rf"\1{_TURN}", _SUPPRESSION.sub("", after))
+    after = _SUPPRESSION.sub("", after)
+    if ("circle", "path") not in document.places:
+        after = _CIRCLE.sub(rf"\1{_TURN}", after)
+    text = before + value_text(name) + after
     # The path to the schema is valid only in the shipped folder.
     text = text.removeprefix("#:schema ./busplan.schema.json\n")
     return _checked(

@@ -44,8 +44,6 @@ _DEFAULT_COLUMNS: Final = (
     "verdict",
 )
 """Default figures of a table."""
-_OF_GROUPS: Final = ("safe_nodes", "safe_limited_by")
-"""Of them, what each group has for itself."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
 """Default figures of circle tests."""
 
@@ -55,7 +53,7 @@ def default_columns(profile: Profile) -> tuple[str, ...]:
     if not profile.group:
         return _DEFAULT_COLUMNS
     whole = (key for key in _DEFAULT_COLUMNS if key not in COUNTS)
-    return (*whole, *(f"group.{one.name}.{key}" for one in profile.group for key in _OF_GROUPS))
+    return (*whole, *(f"group.{one.name}.safe_nodes" for one in profile.group))
 
 
 class Tally:

@@ -191,7 +191,7 @@ def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | N
     alone
         Whether one node alone answers on the bus.
     shared
-        The delays over other hops of the bus, where they have been computed: then those of a hop and the gaps are known.
+        The delays over other hops of the bus, where they have been computed: those of a hop and the gaps are the same.
     """
     clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
     hop_us = _hop_us(link, clock_mbit_s) if shared is None else shared.hop_us
