@@ -23,7 +23,8 @@ from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown_words import code, table
 from busplan.manual import FOLDER, topics
 from busplan.profile.kinds import models_of
-from busplan.profile.shipped import shipped_names
+from busplan.profile.shipped import load, shipped_names
+from busplan.profile.toml import decode, validate
 from busplan.sections.machine import AxisOverride
 
 Run = Callable[..., CompletedProcess[str]]
@@ -152,7 +153,10 @@ def test_tables_are_those_of_the_program(lines: list[str]) -> None:
 
 def test_the_example_profile_is_the_shipped_one() -> None:
     blocks = re.findall(r"^```toml\n(.*?)^```$", PAGES[FOLDER / "profile.md"], re.MULTILINE | re.DOTALL)
-    assert blocks == [(ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")]
+    groups, example = blocks
+    assert example == (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
+    above, _, _ = load("gantry-24").document.text.partition("# The groups stand")
+    assert [one.name for one in validate(decode(f"{above}{groups}".encode(), name="page")).group] == ["drives", "io"]
 
 
 DOCUMENTS = {
