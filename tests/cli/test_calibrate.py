@@ -280,3 +280,17 @@ def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run,
         "Warning: 1 outlier: line 7 (400 us at 256 bytes: T_exec +239.5 us off what the others say); left out "
         in run.stdout
     )
+
+
+def test_a_group_is_calibrated_by_its_name(run: Run, refused: Run, tmp_path: Path) -> None:
+    (tmp_path / "g.toml").write_text(load("gantry-24").document.text, encoding="utf-8")
+    assert "gantry-24 has the groups drives, tool, io; give" in str(
+        refused("calibrate", "g.toml", "table-1.csv", cwd=tmp_path)
+    )
+    unknown = refused("calibrate", "g.toml", "table-1.csv", "--group", "x", cwd=tmp_path)
+    assert "group x: gantry-24 has the groups drives" in str(unknown)
+    done = run("calibrate", "g.toml", "table-1.csv", "--group", "tool", "--form", "linear", "--apply", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "\n[group.execution]  # of tool\n" in done.stdout
+    drives, tool, io = load(str(tmp_path / "g.toml")).profile.group
+    assert [one.execution.grade for one in (drives, tool, io)] == ["assumed", "derived", "assumed"]

@@ -244,9 +244,10 @@ def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
         return profile.alike_nodes[0]
     if group in each:
         return each[group]
-    known = f"its groups are {', '.join(each)}" if profile.group else "it has no groups"
-    asked = f"group {group}: {profile.name} has none of this name" if group else f"{profile.name}: which group"
-    raise BusplanError(f"{asked}; {known}{'' if group else ', name one'}")
+    known = f"the groups {', '.join(each)}" if profile.group else "no groups"
+    if group is None:
+        raise BusplanError(f"{profile.name} has {known}; give the group that was measured")
+    raise BusplanError(f"group {group}: {profile.name} has {known}")
 
 
 def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measurement], model: str) -> _Halves:

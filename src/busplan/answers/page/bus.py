@@ -62,6 +62,7 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     facts = tuple(
         (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
         for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
+        if figure is not SAFE_AXES or not answer.profile.group
     )
     question = Question(
         "Does the cycle fit its period?",
