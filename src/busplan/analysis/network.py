@@ -3,6 +3,7 @@
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
+from busplan.elementwise import Number
 from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
@@ -27,6 +28,7 @@ def network_of(profile: Profile) -> Network:
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
     group = Group(
         node=node,
+        payload=payload,
         nodes=profile.bus.nodes,
         axes=node.axes,
         read_bytes=read_bytes,
@@ -38,6 +40,42 @@ def network_of(profile: Profile) -> Network:
         write_uncertainty_us=execution.standard_uncertainty_us(write_us),
     )
     return Network(profile, (group,), cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us)
+
+
+def with_axes(group: Group, axes: Number) -> Group:
+    """The same nodes with other axes, whose payloads and execution times follow.
+
+    Raises
+    ------
+    ValueError
+        The execution time of a payload is not known.
+    """
+    read_bytes, write_bytes = (group.payload.bytes_of(kind, axes=axes) for kind in TRANSACTION_KINDS)
+    return with_payloads(group._replace(axes=axes), read_bytes=read_bytes, write_bytes=write_bytes)
+
+
+def with_payloads(group: Group, *, read_bytes: Number, write_bytes: Number) -> Group:
+    """The same nodes with other payloads [bytes], whose execution times follow.
+
+    Raises
+    ------
+    ValueError
+        The execution time of a payload is not known.
+    """
+    execution_us = group.node.execution.execution_us
+    sized = group._replace(read_bytes=read_bytes, write_bytes=write_bytes)
+    return with_execution(sized, read_us=execution_us(read_bytes), write_us=execution_us(write_bytes))
+
+
+def with_execution(group: Group, *, read_us: Number, write_us: Number) -> Group:
+    """The same nodes with other execution times [us], as well known as the profile says."""
+    execution = group.node.execution
+    return group._replace(
+        read_execution_us=read_us,
+        write_execution_us=write_us,
+        read_uncertainty_us=execution.standard_uncertainty_us(read_us),
+        write_uncertainty_us=execution.standard_uncertainty_us(write_us),
+    )
 
 
 def model_names(profile: Profile) -> tuple[str, ...]:

@@ -31,6 +31,8 @@ class Group(NamedTuple):
     """Standard uncertainty of the execution time of a write [us]."""
     name: str = ""
     """Name of the group; empty for the nodes of [node]."""
+    payload: Any = None
+    """What the profile says of the payload of one of them, of its kind's own model."""
 
     def key(self, name: str) -> str:
         """Dotted key of what the profile says of its nodes.

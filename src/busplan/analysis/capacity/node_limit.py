@@ -45,7 +45,7 @@ def largest_nodes(profile: Profile, *, model: str) -> tuple[int, str]:
     return _with_key(network, limits_with_time(network, model=model))
 
 
-def safe_nodes(profile: Profile) -> tuple[int, str]:
+def safe_nodes(profile: Profile, *, without: str | None = None) -> tuple[int, str]:
     """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
 
     Each number of nodes has its own cycle, bias, uncertainty and limits; a gap count that follows them does so.
@@ -54,6 +54,8 @@ def safe_nodes(profile: Profile) -> tuple[int, str]:
     ----------
     profile
         The network; its own number of nodes plays no part.
+    without
+        Key of a limit that is not asked: what would keep nodes off the bus once it is gone.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def safe_nodes(profile: Profile) -> tuple[int, str]:
         Number of nodes [1], and the key of the limit.
     """
     network = network_of(profile)
-    return _with_key(network, limits_to_be_safe(network))
+    return _with_key(network, [one for one in limits_to_be_safe(network) if one.key != without])
 
 
 def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:
