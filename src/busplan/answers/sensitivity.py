@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from busplan.analysis.capacity.bottleneck import NextBottleneck
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import Capacity
@@ -14,15 +13,14 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.cures import listed
 from busplan.answers.capacity import capacity_document, capacity_report
 from busplan.answers.documents import with_profile
-from busplan.buses.bus import Term
-from busplan.buses.figure import MARGIN_CORRECTED, SAFE_NODES, VERDICT, by_key, unit_of
+from busplan.answers.next_bottleneck import next_bottleneck_record, next_bottleneck_sentence
+from busplan.buses.figure import MARGIN_CORRECTED, VERDICT, unit_of
 from busplan.drawings.sensitivity import SensitivityDrawing
 from busplan.forms.blocks import (
     Block,
     Cell,
     Chart,
     JsonDocument,
-    Part,
     Record,
     Report,
     Sentence,
@@ -30,13 +28,11 @@ from busplan.forms.blocks import (
     Table,
     TableColumn,
     TableRow,
-    count_value,
     figure_value,
     joined,
     sentence,
 )
-from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, period_value
+from busplan.forms.numbers import period_value
 from busplan.sections.profile import Profile
 
 _DIGITS = 4
@@ -181,53 +177,6 @@ def _after_each(found: Sensitivity) -> Iterator[Sentence]:
         yield Sentence(("The cycle is shown to fit after each of them alone.",))
 
 
-def next_bottleneck_sentence(found: NextBottleneck, profile: Profile, *, at: str = "") -> Sentence:
-    """Say what binds once the largest term, or the limit of the nodes, is gone.
-
-    Parameters
-    ----------
-    found
-        The bottlenecks.
-    profile
-        The network.
-    at
-        JSON pointer to them.
-    """
-    term, behind = (_term(one, profile) for one in (found.binding_term, found.next_binding_term))
-    term_us, behind_us = (
-        ShownValue(one.us, key, "us", 3, at=f"{at}/{key}")
-        for one, key in (
-            (found.binding_term, "binding_term_us"),
-            (found.next_binding_term, "next_binding_term_us"),
-        )
-    )
-    of_term: tuple[Part, ...] = (
-        sentence(
-            f"Next bottleneck: without {term}, now {{}}, the largest term is {behind}, {{}}, and the margin {{}}",
-            term_us,
-            behind_us,
-            figure_value(
-                MARGIN_CORRECTED, found.next_margin_corrected_us, at=f"{at}/next_margin_corrected_us"
-            )._replace(key="next_margin_corrected_us"),
-        )
-        if found.is_gone
-        else sentence(
-            f"Next bottleneck: behind {term}, {{}}, which no key takes away, comes {behind}, {{}}", term_us, behind_us
-        )
-    ).parts
-    nodes = sentence(
-        f"without the limit of {found.limited_by}, now at {{}} {nouns(found.safe_nodes, 'node')}, the next limit is "
-        f"{found.next_limited_by}, at {{}} {nouns(found.next_safe_nodes, 'node')}.",
-        count_value(found.safe_nodes, SAFE_NODES.key, at=f"{at}/{SAFE_NODES.key}"),
-        count_value(found.next_safe_nodes, "next_safe_nodes", at=f"{at}/next_safe_nodes"),
-    )
-    return joined(Sentence(of_term), nodes, by="; ")
-
-
-def _term(term: Term, profile: Profile) -> str:
-    return by_key(bus_of(profile).term_figures)[term.key].label
-
-
 def _capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
@@ -237,7 +186,7 @@ def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], found: S
     whole = capacity_document(result, verdicts)
     for verdict, one in zip(whole["verdicts"], found, strict=True):
         verdict["sensitivity"] = [_record(effect, one.profile) for effect in one.effects]
-        verdict["next_bottleneck"] = _next(one.next_bottleneck, one.profile)
+        verdict["next_bottleneck"] = next_bottleneck_record(one.next_bottleneck, one.profile)
     return whole
 
 
@@ -267,19 +216,4 @@ def _record(one: Effect, profile: Profile) -> Record:
         "exceeded": None if then is None else list(then.exceeded),
         **own,
         "note": one.note or None,
-    }
-
-
-def _next(found: NextBottleneck, profile: Profile) -> Record:
-    return {
-        "binding_term": found.binding_term.name,
-        "binding_term_us": found.binding_term.us,
-        "next_binding_term": found.next_binding_term.name,
-        "next_binding_term_us": found.next_binding_term.us,
-        "next_margin_corrected_us": found.next_margin_corrected_us,
-        "safe_limited_by": found.limited_by,
-        "safe_nodes": found.safe_nodes,
-        "next_safe_limited_by": found.next_limited_by,
-        "next_safe_nodes": found.next_safe_nodes,
-        "text": sentence_text(next_bottleneck_sentence(found, profile)),
     }

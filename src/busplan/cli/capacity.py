@@ -27,8 +27,9 @@ def capacity_command(
         bool,
         typer.Option(
             "--sensitivity",
-            help="Also tell what moves the margin: each of 10 % more execution time, one node, one axis, 4 bytes, one "
-            "hop and one retry more, 10 us more host time, and a bus reset, and what binds next. CSV has these rows.",
+            help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
+            "one retry more, 10 us more host time, or a bus reset, each alone; and what binds next. CSV then has these "
+            "rows.",
         ),
     ] = False,
     format_: FormatOption = None,
