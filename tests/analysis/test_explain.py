@@ -121,7 +121,7 @@ def test_the_registry_holds_every_key_of_the_results() -> None:
             "not_in_it",
             "not_applicable",
         ),
-        *("cheapest_change", "warnings", "text"),
+        *("cheapest_change", "warnings", "text", "sensitivity", "next_bottleneck"),
     }
     assert set(FIGURES["circle-test"]) == set(CircleFigures._fields)
     assert list(FIGURES["latency"]) == list(latency_records(latency(load("paper-4ms").profile))[0])

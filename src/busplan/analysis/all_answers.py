@@ -4,6 +4,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import Capacity, capacity
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
+from busplan.analysis.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
@@ -26,6 +27,7 @@ class AllAnswers(NamedTuple):
     profile: Profile
     capacity: Capacity
     verdict: Verdict
+    sensitivity: Sensitivity
     latency: LatencyResult
     schedule: Schedule | None
     no_schedule: tuple[str, ...]
@@ -72,6 +74,7 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         profile=profile,
         capacity=bus,
         verdict=verdicts(bus)[0],
+        sensitivity=sensitivity(profile),
         latency=latency(profile),
         schedule=plan,
         no_schedule=no_schedule,

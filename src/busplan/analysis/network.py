@@ -6,7 +6,7 @@ from typing import Final
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
-from busplan.elementwise import are_same, total
+from busplan.elementwise import Number, are_same, total
 from busplan.errors import BusplanError
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import Section
@@ -73,6 +73,30 @@ def _is_alike(one: object, other: object) -> bool:
         keys = (key for key in type(one).model_fields if key not in _OF_ONE_GROUP)
         return all(_is_alike(getattr(one, key), getattr(other, key)) for key in keys)
     return are_same(one, other)
+
+
+def with_payloads(group: Group, *, read_bytes: Number, write_bytes: Number) -> Group:
+    """The same nodes with other payloads [bytes], whose execution times follow.
+
+    Raises
+    ------
+    ValueError
+        The execution time of a payload is not known.
+    """
+    execution_us = group.node.execution.execution_us
+    sized = group._replace(read_bytes=read_bytes, write_bytes=write_bytes)
+    return with_execution(sized, read_us=execution_us(read_bytes), write_us=execution_us(write_bytes))
+
+
+def with_execution(group: Group, *, read_us: Number, write_us: Number) -> Group:
+    """The same nodes with other execution times [us], as well known as the profile says."""
+    execution = group.node.execution
+    return group._replace(
+        read_execution_us=read_us,
+        write_execution_us=write_us,
+        read_uncertainty_us=execution.standard_uncertainty_us(read_us),
+        write_uncertainty_us=execution.standard_uncertainty_us(write_us),
+    )
 
 
 def model_names(profile: Profile) -> tuple[str, ...]:

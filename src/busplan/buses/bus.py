@@ -122,6 +122,18 @@ class Setting(NamedTuple):
     """A value that means the best one for any number of nodes."""
 
 
+class Perturbation(NamedTuple):
+    """A small change of a profile, made to see what it does to the margin."""
+
+    label: str
+    changes: Mapping[str, Value]
+    """New value by dotted key."""
+    why_not: str = ""
+    """Why it cannot be made here; empty where it can."""
+    if_nothing: str = ""
+    """Why the margin stays as it is, where it does."""
+
+
 class PayloadRange(NamedTuple):
     """Payloads that a plan may choose from: the largest, and the step between them."""
 
@@ -308,6 +320,8 @@ class Bus(ABC):
     """What a change of a key means on the machine, where the key does not say so."""
     reset_changes: ClassVar[Mapping[str, Value]] = {}
     """Keys as they are after a bus reset, until somebody sets them again."""
+    term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
+    """What would take a term of its own out of the cycle, each new values by dotted key."""
     change_words: ClassVar[Mapping[str, str]] = {}
     """How a table of plans writes a key with its value: a format of the value."""
 
@@ -378,6 +392,10 @@ class Bus(ABC):
     def repairs(self, network: Network) -> dict[str, Value]:  # noqa: ARG002 - a kind may know none
         """The nearest values that keep the limits of the standard, for each that a network breaks."""
         return {}
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:  # noqa: ARG002 - a kind may have none
+        """Small changes that only this kind of bus has, beside those of every kind."""
+        return ()
 
     @abstractmethod
     def payloads(self, network: Network) -> PayloadRange:

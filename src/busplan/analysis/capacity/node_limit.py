@@ -47,7 +47,7 @@ def largest_nodes(profile: Profile, *, model: str, group: str = "") -> tuple[int
     return _with_key(network, limits_with_time(network, model=model))
 
 
-def safe_nodes(profile: Profile, *, group: str = "") -> tuple[int, str]:
+def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None) -> tuple[int, str]:
     """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
 
     Each number of nodes has its own cycle, bias, uncertainty and limits; a gap count that follows them does so.
@@ -58,6 +58,8 @@ def safe_nodes(profile: Profile, *, group: str = "") -> tuple[int, str]:
         The network; its own number of nodes plays no part.
     group
         As for `largest_nodes`.
+    without
+        Key of a limit that is not asked: what would keep nodes off the bus once it is gone.
 
     Returns
     -------
@@ -65,7 +67,7 @@ def safe_nodes(profile: Profile, *, group: str = "") -> tuple[int, str]:
         Number of nodes [1], and the key of the limit.
     """
     network = network_of(profile).asking(group)
-    return _with_key(network, limits_to_be_safe(network))
+    return _with_key(network, [one for one in limits_to_be_safe(network) if one.key != without])
 
 
 def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:

@@ -31,7 +31,12 @@ from busplan.sections.profile import Profile
 _SENTENCES: Final = "sentences on what the command computes"
 OF_DOCUMENT: Final = ("verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
 """Figures whose values the document of `capacity` has."""
-VERDICT_KEYS: Final = ("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text")
+OF_SENSITIVITY: Final = ("sensitivity", "next_bottleneck")
+"""Those that it has with --sensitivity."""
+VERDICT_KEYS: Final = (
+    *("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text"),
+    *OF_SENSITIVITY,
+)
 
 
 def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
@@ -199,6 +204,9 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     # The report fills in the values of changes, lists and sentences.
     if key in OF_DOCUMENT:
         return found(None, _SENTENCES, (deciding["uncertainty_us"],))
+    if key in OF_SENSITIVITY:
+        words = "the cycle computed anew, after each change or without what binds"
+        return found(None, words, (deciding["margin_corrected_us"], *judged))
     if key == "cheapest_change":
         purpose = "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"
         words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"

@@ -9,6 +9,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.answers.capacity import capacity_table, groups_table
 from busplan.answers.latency import latency_tables
 from busplan.answers.page.commands import Sources
+from busplan.answers.sensitivity import sensitivity_blocks
 from busplan.answers.timeline import timeline_chart, totals_table
 from busplan.answers.verdict import places_of, verdict_sentences
 from busplan.buses.figure import (
@@ -133,6 +134,13 @@ def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
     """A term under each timing model."""
     for number, one in enumerate(answer.capacity.results):
         yield attribute_value(term, one, at=f"/results/{number}")
+
+
+def sensitivity_part(answer: AllAnswers, sources: Sources) -> Chapter:
+    """What moves the margin, and what binds next."""
+    source = sources["capacity"]
+    blocks = map(source.gives, sensitivity_blocks(answer.sensitivity, at="/verdicts/0"))
+    return Chapter(Sentence(("What moves the margin",)), (*blocks, source.line), "sensitivity")
 
 
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:

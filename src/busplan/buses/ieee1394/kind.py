@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, EventKind, Halves, Limit, PayloadRange, Setting, TimingModel, Value
+from busplan.buses.bus import Bus, EventKind, Halves, Limit, PayloadRange, Perturbation, Setting, TimingModel, Value
 from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
 from busplan.buses.ieee1394.constants import (
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from busplan.buses.published import PaperSection
 
 _PHASES: Final = by_key(figures.LATENCY)
+_HOST_STEP_US: Final = 10.0
+"""How much slower the host is made, to see what that does to the margin."""
 
 
 def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
@@ -120,6 +122,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "bus.speed": "if all nodes can",
     }
     reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
+    term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
+        {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
+        {"host.transaction_us": 0.0},
+        {"cycle.retries": 0},
+    )
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
@@ -221,6 +228,24 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         if bus.cable_is_standard and gap_count_of(network) < safe_gap_count(hops):
             found["bus.gap_count"] = plain(safe_gap_count(hops))
         return found
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """One hop, one busy retry, and a slower host."""
+        profile = network.profile
+        is_chain = profile.bus.max_hops is None
+        return (
+            Perturbation(
+                "one hop more",
+                {"bus.max_hops": int(hops_of(network)) + 1},
+                why_not="in a chain the hops follow the nodes" if is_chain else "",
+            ),
+            Perturbation("one busy retry more", {"cycle.retries": profile.cycle.retries + 1}),
+            Perturbation(
+                f"host time +{_HOST_STEP_US:g} us",
+                {"host.transaction_us": profile.host.transaction_us + _HOST_STEP_US},
+                if_nothing="the gaps behind the transactions hide it",
+            ),
+        )
 
     def payloads(self, network: Network) -> PayloadRange:
         """Whole quadlets up to the largest packet of the speed."""
