@@ -1,12 +1,13 @@
 """How many nodes a bus carries over its period, exactly: from which period on each further one fits."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import FIT_ROUNDING, cycle_of
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
-from busplan.analysis.network import bus_of
+from busplan.analysis.network import bus_of, network_of
 from busplan.elementwise import plain
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
@@ -57,3 +58,22 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     return NodeSteps(
         model, profile.node.axes, tuple(us / profile.cycle.slice_ratio for us in needed_us), limit, is_safe
     )
+
+
+def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:
+    """Range of periods [us]: from the first that carries a node to where its nodes fit, at least twice its own.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    steps
+        Its steps, one for each timing model of interest.
+    """
+    own_us, nodes = profile.cycle.period_us, int(network_of(profile).nodes)
+    all_us = [one.from_us for one in steps if one.from_us]
+    lasts = [times_us[-1] * 1.25 for times_us in all_us]
+    needed = [times_us[min(nodes, len(times_us)) - 1] * 1.25 for times_us in all_us]
+    to_us = max(2 * own_us, *needed, min(4 * own_us, max(lasts, default=0.0)), 0.0)
+    from_us = min(own_us, *(times_us[0] for times_us in all_us), to_us / 4) / 1.25
+    return from_us, min(to_us, 4 * MAX_TIME_US)

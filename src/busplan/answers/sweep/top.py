@@ -1,6 +1,6 @@
 """Answer of `busplan sweep` for people: how many points fit, and the top rows."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isnan
 from typing import Final, NamedTuple
 
@@ -114,9 +114,7 @@ class Tally:
                 Sentence((".",)),
                 by="",
             )
-        if "node.axes" in self._varied and not self.profile.payload.follows_axes:
-            keys = Code("payload.read_bytes_per_axis"), Code("payload.write_bytes_per_axis")
-            yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
+        yield from payload_sentences(self.profile, self._varied)
         safety = self.bus.safety_figure
         if self._unsafe and safety is not None:
             words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
@@ -140,6 +138,21 @@ class Tally:
             for count, model in zip(counts, self._models, strict=True)
         )
         return joined(*parts, by=" and ")
+
+
+def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sentence]:
+    """Say that the payload does not follow the axes of a node, where these vary.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    varied
+        Keys that vary.
+    """
+    if "node.axes" in varied and not profile.payload.follows_axes:
+        keys = Code("payload.read_bytes_per_axis"), Code("payload.write_bytes_per_axis")
+        yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
 
 
 def _share(flags: Array, points: int) -> int:
