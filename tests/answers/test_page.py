@@ -174,7 +174,7 @@ def at(document: Any, pointer: str) -> Any:
 
 def test_only_the_parts_in_their_order() -> None:
     assert list(parts(whole()[1])) == [
-        *("verdict", "models", "timeline", "terms", "axes", "circle", "sources", "assumptions", "commands"),
+        *("verdict", "models", "timeline", "terms", "axes", "map", "circle", "sources", "assumptions", "commands"),
     ]
 
 
