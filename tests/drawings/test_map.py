@@ -103,6 +103,18 @@ def test_this_design_is_marked_by_its_row_its_column_and_brackets() -> None:
     assert pointer.index("^") == next(line for line in narrow if line.startswith("> ")).index("|") + 1 + 56
 
 
+def test_values_stand_below_their_columns_and_touch_no_other() -> None:
+    lines = [line.text for line in map_lines(WORDS, width=80)]
+    (row,) = [line for line in lines if line.startswith("> ")]
+    below = lines[lines.index(row) + 3]
+    assert below.split() == ["5", "7", "63", "optimal"]
+    assert below.index("optimal") < row.rindex("#") < below.index("optimal") + len("optimal")
+    assert row.index("[#]") <= below.index("63") <= row.index("[#]") + 1
+    root = ET.fromstring(map_svg(WORDS, title="t", inline=True))
+    texts = [text.text for text in root.iter(f"{SVG}text") if text.get("class") in ("small", "small here")]
+    assert {"63", "optimal"} <= set(texts)
+
+
 def test_a_terminal_gets_the_colour_of_each_state() -> None:
     (row,) = [line for line in map_lines(SHOWN, width=80) if line.text.startswith(">")]
     assert {(row.text[mark.start : mark.end].strip()[0], mark.tone) for mark in row.marks} == {

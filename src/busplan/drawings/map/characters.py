@@ -7,7 +7,7 @@ from typing import Final
 from busplan.analysis.map.cells import Cell, NotDrawn
 from busplan.analysis.map.trade_off import TradeOff
 from busplan.drawings.legend import legend_lines
-from busplan.drawings.map.labels import LOOKS, Looks, legend_of, look_of, looks_of, value_text
+from busplan.drawings.map.labels import LOOKS, Looks, legend_of, look_of, looks_of, placed_labels, value_text
 from busplan.forms.lines import BLANK, Line, Mark
 
 _BRACKETED: Final = 3
@@ -68,19 +68,12 @@ def _tones(row: Sequence[Cell | NotDrawn], *, start: int, cell_width: int) -> It
 
 def _below(found: TradeOff, own: int | None, *, cell_width: int) -> Iterator[str]:
     """A pointer to the column of this design, and values of `x` below their columns as far as there is room."""
-    middles = [(cell_width - 1) // 2 + column * cell_width for column in range(len(found.x.values))]
     if own is not None:
-        yield " " * middles[own] + _OWN_COLUMN
-    order = sorted(range(len(middles)), key=lambda column: column != own)
-    placed: dict[int, str] = {}
-    for column in order:
-        text = value_text(found.x, found.x.values[column])
-        at = max(0, middles[column] - len(text) // 2)
-        if all(at > other + len(words) or at + len(text) < other for other, words in placed.items()):
-            placed[at] = text
+        yield " " * ((cell_width - 1) // 2 + own * cell_width) + _OWN_COLUMN
+    texts = [value_text(found.x, one) for one in found.x.values]
     line = ""
-    for at, text in sorted(placed.items()):
-        line += " " * (at - len(line)) + text
+    for column, start in placed_labels(texts, own=own, pitch=cell_width, letter=1).items():
+        line = f"{line:<{int(start)}}{texts[column]}"
     yield line
 
 

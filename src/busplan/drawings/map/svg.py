@@ -1,7 +1,6 @@
 """A map as SVG, in a page or as a file: cells scale with the width, text keeps its size; light and dark."""
 
 from collections.abc import Sequence
-from math import ceil
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
@@ -14,6 +13,7 @@ from busplan.drawings.map.labels import (
     look_of,
     looks_of,
     map_title,
+    placed_labels,
     title_of,
     value_text,
 )
@@ -96,7 +96,7 @@ def _map(body: Element, found: TradeOff, looks: Looks, *, y: int) -> int:
     if own_row is not None and own_column is not None:
         box = _box(own_column, bottom - tall * (own_row + 1), of=len(found.x.values), tall=tall)
         SubElement(area, "rect", {**box, "class": "own"})
-    _across(area, found, own_column, y=bottom + 15)
+    _across(area, found, own_column, y=bottom + 15, room=PHONE * (1 - gutter / 100))
     text_at(body, title_of(found.x, found.profile), x="100%", y=bottom + 32, css="small", anchor="end")
     return bottom + 2 * LINE
 
@@ -119,12 +119,11 @@ def _row(area: Element, found: TradeOff, row: Sequence[Cell | NotDrawn], looks: 
         text_at(area, marks, x=places, y=top + 14, css="mark", anchor="middle")
 
 
-def _across(area: Element, found: TradeOff, own: int | None, *, y: int) -> None:
+def _across(area: Element, found: TradeOff, own: int | None, *, y: int, room: float) -> None:
     """Draw the values of `x`, as many as there is room for on a phone, and always this design's."""
     texts = [value_text(found.x, one) for one in found.x.values]
-    step = ceil((max(map(len, texts)) + 1) * _LETTER * len(texts) / (0.8 * PHONE))
-    first = 0 if own is None else own % step
-    for column in range(first, len(texts), step):
+    pitch = room / len(texts)
+    for column in placed_labels(texts, own=own, pitch=pitch, letter=_LETTER):
         x = f"{100 * (column + 0.5) / len(texts):.5g}%"
         text_at(area, texts[column], x=x, y=y, css="small here" if column == own else "small", anchor="middle")
 
