@@ -46,7 +46,8 @@ def at(profile: Profile, changes: dict[str, Any]) -> Profile | None:
         found = override(profile, dict(changes))
         if axes is None:
             return found
-        nodes, rest = divmod(axes, found.node.axes)
+        (alike,) = found.alike_nodes
+        nodes, rest = divmod(axes, alike.node.axes)
         return None if rest else override(found, {"bus.nodes": nodes})
     except BusplanError:
         return None
@@ -152,6 +153,46 @@ def test_a_number_of_axes_that_no_nodes_have_is_not_drawn() -> None:
     assert [[isinstance(cell, Cell) for cell in row] for row in turned.rows] == [
         list(one) for one in zip(*drawn, strict=True)
     ]
+
+
+GANTRY = load("gantry-24").profile
+
+
+def test_of_unlike_nodes_the_axes_are_by_the_group_that_has_the_most() -> None:
+    found = trade_off(GANTRY)
+    assert found.own is not None
+    assert (found.own.x, found.own.y, found.own.nodes) == (24, 1000, 6)
+    # Four axes of the tool beside five of each drive.
+    assert found.x.values == tuple(4 + 5 * nodes for nodes in range(1, 17))
+    assert {cell.state for cell in found.cells} == {"fits", "not shown to fit", "does not fit"}
+    for cell in found.cells[::7]:
+        changes: dict[str, object] = {"group.drives.nodes": (int(cell.x) - 4) // 5, PERIOD: cell.y}
+        one = figures(override(GANTRY, changes), model="standard")
+        assert (cell.axes, cell.verdict, cell.margin_corrected_us) == (one.axes, one.verdict, one.margin_corrected_us)
+
+
+def test_groups_are_directions_too() -> None:
+    found = trade_off(GANTRY, x=Direction(AXES, (8, 9, 18, 24)), y=Direction("group.tool.axes", (3, 4)))
+    assert [[isinstance(cell, Cell) for cell in row] for row in found.rows] == [
+        [True, False, True, False],
+        [False, True, False, True],
+    ]
+    assert found.not_drawn[0].reason == "axes = 9: no whole number of nodes, with 5 axes each beside 3 others"
+    assert found.own_place == (1, 3)
+    with pytest.raises(BusplanError, match=r"both vary group\.drives\.nodes"):
+        trade_off(GANTRY, x=Direction(AXES, (24,)), y=Direction("group.drives.nodes", (1, 2)))
+    with pytest.raises(BusplanError, match=r"--x bus\.nodes: "):
+        checked_direction(GANTRY, "bus.nodes", Listed((1,)), option="--x")
+
+
+def test_nodes_without_axes_are_counted_themselves() -> None:
+    sizes = {f"group.{name}.{kind}_bytes": 8 for name in ("drives", "tool") for kind in ("read", "write")}
+    still = override(GANTRY, {"group.drives.axes": 0, "group.tool.axes": 0, **sizes})
+    found = trade_off(still)
+    assert (found.x.key, found.y.key) == ("group.drives.nodes", PERIOD)
+    assert found.own is not None
+    with pytest.raises(BusplanError, match="axes = 5: no whole number of nodes, with 0 axes each"):
+        trade_off(still, x=Direction(AXES, (5,)))
 
 
 def test_a_combination_that_the_schema_refuses_is_not_drawn() -> None:

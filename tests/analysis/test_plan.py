@@ -30,11 +30,11 @@ KEYS = {"gap": "bus.gap_count", "ratio": "cycle.slice_ratio", "period": "cycle.p
 
 def working_kinds(profile: Profile, safely: Safely) -> Iterator[tuple[str, ...]]:
     """Kinds of change of which some value works, by trying them all with the second implementation."""
-    bus, cycle, network = profile.bus, profile.cycle, network_of(profile)
+    cycle, network = profile.cycle, network_of(profile)
     hops, own_gap_count = int(hops_of(network)), gap_count_of(network)
     rounding = 1 + Fraction(1, 10**12)
     required = {
-        gap_count: safely(override(profile, {"bus.gap_count": gap_count}), bus.nodes)
+        gap_count: safely(override(profile, {"bus.gap_count": gap_count}), profile.alike_nodes[0].nodes)
         for gap_count in (own_gap_count, *range(SAFE[hops - 1], 64))
     }
     for kind in KINDS:

@@ -35,7 +35,7 @@ def safe(hops: int) -> int:
 @given(data=st.data())
 def test_smallest_ratio(data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely) -> None:
     profile = data.draw(any_profile)
-    required = safely(profile, profile.bus.nodes)
+    required = safely(profile, profile.alike_nodes[0].nodes)
     period = profile.cycle.period_us
     found = smallest_ratio(profile)
     needed = required / (Fraction(period) * (1 + ROUNDING)) * 10_000
@@ -49,7 +49,7 @@ def test_smallest_period_of_the_bus(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile], safely: Safely
 ) -> None:
     profile = data.draw(any_profile)
-    required = safely(profile, profile.bus.nodes)
+    required = safely(profile, profile.alike_nodes[0].nodes)
     ratio = profile.cycle.slice_ratio
     found = smallest_period(profile)
     assert (found.bounded_by, found.proven) == ("time", True)
@@ -118,7 +118,7 @@ def test_largest_payload(data: st.DataObject, any_profile: st.SearchStrategy[Pro
 
     def fits(size: int) -> bool:
         both = override(profile, {"payload.read_bytes": size, "payload.write_bytes": size})
-        return fit(safely(both, both.bus.nodes), ratio=cycle.slice_ratio, period=cycle.period_us)
+        return fit(safely(both, both.alike_nodes[0].nodes), ratio=cycle.slice_ratio, period=cycle.period_us)
 
     limit = PAYLOAD[profile.bus.speed]
     largest = max((size for size in range(4, limit + 1, 4) if fits(size)), default=0)

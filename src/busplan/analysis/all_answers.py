@@ -4,6 +4,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import Capacity, capacity
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
+from busplan.analysis.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
@@ -27,12 +28,13 @@ class AllAnswers(NamedTuple):
     profile: Profile
     capacity: Capacity
     verdict: Verdict
+    sensitivity: Sensitivity
     latency: LatencyResult
     schedule: Schedule | None
     no_schedule: tuple[str, ...]
     """Why there is no schedule."""
     steps: tuple[NodeSteps, ...]
-    """Nodes over the period, under each timing model."""
+    """Nodes over the period, under each timing model; empty where nodes are in groups."""
     periods: Capacity
     """Capacity at several periods around and including the profile's own."""
     trade_off: TradeOff
@@ -75,10 +77,11 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         profile=profile,
         capacity=bus,
         verdict=verdicts(bus)[0],
+        sensitivity=sensitivity(profile),
         latency=latency(profile),
         schedule=plan,
         no_schedule=no_schedule,
-        steps=tuple(node_steps(profile, model=model) for model in model_names(profile)),
+        steps=() if profile.group else tuple(node_steps(profile, model=model) for model in model_names(profile)),
         periods=capacity(profile, periods_us=periods_us),
         trade_off=trade_off(profile),
         circle=circle,

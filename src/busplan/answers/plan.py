@@ -180,7 +180,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "period_us": one.period_us,
         "slice_ratio": profile.cycle.slice_ratio,
         **{key: getattr(one, key) for key in bus_of(profile).planned_figures},
-        **{f"{kind}_bytes": profile.payload.bytes_of(kind, axes=profile.node.axes) for kind in TRANSACTION_KINDS},
+        **{f"{kind}_bytes": profile.alike_nodes[0].bytes_of(kind) for kind in TRANSACTION_KINDS},
     }
 
 

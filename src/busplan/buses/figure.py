@@ -293,6 +293,8 @@ VERDICT_FIGURES: Final = (
     Figure("cheapest_change", "change", _CYCLE, "cheapest change that makes it fit, or carries more nodes"),
     Figure("warnings", "warnings", "table", "what to beware of, whatever the verdict", sort="words"),
     Figure("text", "text", _CYCLE, "the verdict in words", sort="word"),
+    Figure("sensitivity", "sensitivity", _CERTAINTY, "how small changes move the corrected margin, the largest first"),
+    Figure("next_bottleneck", "next bottleneck", _CERTAINTY, "what binds once the largest term or the limit is gone"),
 )
 """Figures of the verdict, which belong to no one timing model."""
 

@@ -32,7 +32,8 @@ _ENDINGS: Final[Mapping[str, MapForm]] = MappingProxyType({**ENDINGS, ".svg": "s
 def _along(option: str, *, default: str) -> typer.models.OptionInfo:
     help_ = (
         f"{'What lies across' if option == '--x' else 'What lies up'}: a key of the profile, or axes for the axes of "
-        f"all nodes, and up to 64 values in its unit: {VALUES_HELP}  [default: {default}]"
+        "all nodes (by their number; of groups, by that of the group with the most axes), and up to 64 values in its unit: "
+        f"{VALUES_HELP}  [default: {default}]"
     )
     found: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
     return found
@@ -115,7 +116,7 @@ def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: b
 
     if text is None:
         return None
-    key, values = parse_axis(text, kind=plan.bus.kind, option=option)
+    key, values = parse_axis(text, profile=plan, option=option)
     circle_option = None if with_circle else "--circle"
     return checked_direction(plan, key, values, option=option, circle_option=circle_option)
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl"})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "safe_axes"
+_FIGURE_OF_GROUPS: Final = "margin_corrected_us"
 
 
 @takes_changes(words="Not of a key that varies.")
@@ -89,7 +90,7 @@ def sweep_command(
         typer.Option(
             "--figure",
             metavar="COLUMN",
-            help="What --plot draws, by its name in --columns.  [default: safe_axes]",
+            help="What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
             show_default=False,
         ),
     ] = None,
@@ -135,7 +136,7 @@ def sweep_command(
     from busplan.cli.sweep_run import available_processors, run_sweep
 
     loaded = load_changed(profile, changes)
-    axes = parse_axes(vary or [], kind=loaded.bus.kind)
+    axes = parse_axes(vary or [], profile=loaded)
     for one in changes.each:
         for key in axes:
             require_separate(one, key, typed=f"--vary {key}")
@@ -143,7 +144,7 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    drawn = figure or _DEFAULT_FIGURE
+    drawn = figure or (_FIGURE_OF_GROUPS if loaded.group else _DEFAULT_FIGURE)
     _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
     run_sweep(
         SweepJob(
@@ -218,9 +219,9 @@ def _columns(
             if name not in known:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
     elif short:
-        from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS
+        from busplan.answers.sweep.top import CIRCLE_COLUMNS, default_columns
 
-        chosen = DEFAULT_COLUMNS + (CIRCLE_COLUMNS if circle else ())
+        chosen = default_columns(profile) + (CIRCLE_COLUMNS if circle else ())
     else:
         chosen = known
     return tuple(dict.fromkeys((*front, *chosen, *([sort_by] if sort_by else []))))

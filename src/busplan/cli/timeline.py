@@ -128,9 +128,9 @@ def timeline_command(
 
 
 def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
-    from busplan.analysis.network import bus_of
+    from busplan.analysis.network import bus_of, network_of
 
-    match, nodes = _TRANSACTION.fullmatch(text), plan.bus.nodes
+    match, nodes = _TRANSACTION.fullmatch(text), int(network_of(plan).nodes)
     kinds = [one.key for one in bus_of(plan).stretch_kinds]
     if match is None or match["kind"] not in kinds or not 1 <= int(match["node"]) <= nodes:
         expected = (

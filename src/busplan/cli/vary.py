@@ -6,6 +6,7 @@ from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Values
+    from busplan.sections.profile import Profile
 
 VALUES_HELP: Final = (
     "250,500,1000 or a range A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). Words that "
@@ -13,15 +14,15 @@ VALUES_HELP: Final = (
 )
 
 
-def parse_axes(texts: list[str], *, kind: str) -> dict[str, "Values"]:
+def parse_axes(texts: list[str], *, profile: "Profile") -> dict[str, "Values"]:
     """Parse all --vary options, in order.
 
     Parameters
     ----------
     texts
         Values of the options.
-    kind
-        Kind of bus, which defines the words allowed instead of numbers.
+    profile
+        The network, whose kind of bus defines the words allowed instead of numbers.
 
     Raises
     ------
@@ -32,21 +33,21 @@ def parse_axes(texts: list[str], *, kind: str) -> dict[str, "Values"]:
         raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")
     axes: dict[str, Values] = {}
     for text in texts:
-        key, values = parse_axis(text, kind=kind, option="--vary")
+        key, values = parse_axis(text, profile=profile, option="--vary")
         if key in axes:
             raise BusplanError(f"--vary {text}: {key} is varied already; give all its values at once")
         axes[key] = values
     return axes
 
 
-def parse_axis(text: str, *, kind: str, option: str) -> "tuple[str, Values]":
+def parse_axis(text: str, *, profile: "Profile", option: str) -> "tuple[str, Values]":
     """Parse one KEY=VALUES.
 
     Parameters
     ----------
     text
         Value of the option.
-    kind
+    profile
         As in `parse_axes`.
     option
         Name of the option.
@@ -62,4 +63,4 @@ def parse_axis(text: str, *, kind: str, option: str) -> "tuple[str, Values]":
     key, equals, spec = (part.strip() for part in text.partition("="))
     if not equals or not key or not spec:
         raise BusplanError(f"{option} {text}: expected KEY=VALUES, as bus.nodes=1:62 or cycle.period_us=250,500,1000")
-    return key, parse_values(spec, name=f"{option} {text}", words=words_of(kind, key))
+    return key, parse_values(spec, name=f"{option} {text}", words=words_of(profile, key))

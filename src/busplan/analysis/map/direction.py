@@ -1,14 +1,14 @@
 """A direction of a map: a key and its values."""
 
-from functools import reduce
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.network import network_of
 from busplan.analysis.sweep.grid import Values, require_keys
 from busplan.buses.bus import Value
-from busplan.buses.network import Group
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
 AXES: Final = "axes"
@@ -27,56 +27,52 @@ class Direction(NamedTuple):
     """In the unit of the key; numbers ascend."""
 
 
-def varied_nodes(profile: Profile) -> tuple[str, Group]:
-    """Key of the number of nodes that `AXES` sets, and the group of these nodes."""
-    (group,) = network_of(profile).groups
-    return "bus.nodes", group
+def varied_nodes(profile: Profile) -> AlikeNodes:
+    """The nodes whose number `AXES` sets: all where they are alike, otherwise the group of the most axes."""
+    return max(profile.alike_nodes, key=lambda one: int(one.nodes * one.node.axes))
 
 
 def profile_key(key: str, profile: Profile) -> str:
     """Key of the profile that a direction sets."""
-    return varied_nodes(profile)[0] if key == AXES else key
+    return varied_nodes(profile).nodes_key if key == AXES else key
 
 
-def profile_value(key: str, value: Value, profile: Profile) -> Value:
-    """Value that a direction gives its key of the profile.
+def nodes_with(axes: Value, profile: Profile, *, nodes_key: str) -> int:
+    """Number of nodes with which all nodes have so many axes [1].
 
     Parameters
     ----------
-    key
-        Key of the direction.
-    value
-        Value along it.
+    axes
+        Axes of all nodes [1].
     profile
-        The profile with the values of the other direction.
+        The network, with the other direction's value.
+    nodes_key
+        Dotted key of the number.
 
     Raises
     ------
     BusplanError
-        A number of axes that no whole number of nodes has.
+        No whole number of nodes has so many axes.
 
     Examples
     --------
     >>> from busplan.profile.shipped import load
-    >>> profile_value("axes", 12, load("paper-4ms").profile)
+    >>> nodes_with(12, load("paper-4ms").profile, nodes_key="bus.nodes")
     3
     """
-    if key != AXES:
-        return value
-    group = varied_nodes(profile)[1]
-    others = network_of(profile).axes - group.nodes * group.axes
-    nodes = (value - others) / group.axes if not isinstance(value, str) else 0
-    if nodes < 1 or nodes != int(nodes):
-        beside = f", beside {others} others" if others else ""
-        raise BusplanError(f"axes = {value}: no whole number of nodes, with {group.axes} axes each{beside}")
-    return int(nodes)
+    alike = next(one for one in profile.alike_nodes if one.nodes_key == nodes_key)
+    each = int(alike.node.axes)
+    others = int(plain(network_of(profile).axes)) - int(alike.nodes) * each
+    own = axes - others if isinstance(axes, int) else 0
+    if own < max(each, 1) or not each or own % each:
+        beside = f" beside {others} others" if others else ""
+        raise BusplanError(f"axes = {axes}: no whole number of nodes, with {each} axes each{beside}")
+    return own // each
 
 
 def own_value(key: str, profile: Profile) -> Any:
     """The profile's own value along a direction; None if it has none."""
-    if key == AXES:
-        return int(plain(network_of(profile).axes))
-    return reduce(getattr, key.split("."), profile)
+    return int(plain(network_of(profile).axes)) if key == AXES else value_at(profile, key)
 
 
 def checked_direction(

@@ -6,7 +6,7 @@ from typing import Final
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps, telling_periods
 from busplan.analysis.circle.setup import loop_timing
 from busplan.analysis.map.direction import AXES, PERIOD, Direction, own_value, varied_nodes
-from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.network import bus_of
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US
@@ -32,26 +32,26 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     with_circle
         If True, take only periods whose circle can be simulated, and the profile's own.
     """
-    steps = node_steps(profile, model=bus_of(profile).deciding_model)
+    varied = varied_nodes(profile)
+    steps = node_steps(profile, model=bus_of(profile).deciding_model, group=varied.name)
     from_us, to_us = telling_periods(profile, [steps])
     if key == AXES:
-        return Direction(AXES, _axes(profile, steps, to_us))
+        nodes, each = _nodes(steps, to_us), int(varied.node.axes)
+        if not each:  # nodes without axes are counted themselves
+            return Direction(varied.nodes_key, nodes)
+        others = own_value(AXES, profile) - steps.own_nodes * each
+        return Direction(AXES, tuple(others + one * each for one in nodes))
     own_us = own_value(PERIOD, profile)
     periods_us = _round_numbers(max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US))
     drawn = (one for one in periods_us if not with_circle or _can_turn(profile, one))
     return Direction(PERIOD, tuple(sorted({*drawn, own_us})))
 
 
-def _axes(profile: Profile, steps: NodeSteps, to_us: float) -> tuple[int, ...]:
-    """Axes of all nodes, from one node to some beyond the most that fit the longest period drawn."""
-    own = network_of(profile)
-    _, group = varied_nodes(profile)
-    others = own.axes - group.nodes * group.axes
-    most = max(0, steps.max_axes(to_us) - int(others)) // int(group.axes)
-    last = min(max(int(group.nodes) + 1, most + _BEYOND), MAX_COUNT)
+def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
+    """Numbers of nodes, from one to some beyond the most that fit the longest period drawn."""
+    last = min(max(steps.own_nodes + 1, steps.max_nodes(to_us) + _BEYOND), MAX_COUNT)
     step = next(one for one in (f * 10**p for p in range(7) for f in (1, 2, 5)) if last <= _MOST * one)
-    nodes = {1, int(group.nodes), *range(step, min(last + step, MAX_COUNT + 1), step)}
-    return tuple(int(others + one * group.axes) for one in sorted(nodes))
+    return tuple(sorted({1, steps.own_nodes, *range(step, min(last + step, MAX_COUNT + 1), step)}))
 
 
 def _round_numbers(least: float, most: float) -> list[float]:

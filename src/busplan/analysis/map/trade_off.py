@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.map.cells import CELL_FIGURES, STATES, Cell, NotDrawn, Region, Setting, cell_of
 from busplan.analysis.map.circles import Mapper, Place, judged
-from busplan.analysis.map.direction import AXES, PERIOD, Direction, own_value, profile_key, profile_value
+from busplan.analysis.map.direction import AXES, PERIOD, Direction, nodes_with, own_value, profile_key
 from busplan.analysis.map.ranges import default_direction
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import sweep
@@ -165,8 +165,9 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> Setting | str:
     try:
         # How many nodes some axes are is asked with the other direction's value.
         for key, value in sorted(along, key=lambda one: one[0] == AXES):
-            other = override(profile, dict(changes)) if key == AXES else profile
-            changes[profile_key(key, profile)] = profile_value(key, value, other)
+            own = profile_key(key, profile)
+            is_axes = key == AXES
+            changes[own] = nodes_with(value, override(profile, dict(changes)), nodes_key=own) if is_axes else value
         return Setting(changes, override(profile, dict(changes)))
     except BusplanError as error:
         return error.problems[0]

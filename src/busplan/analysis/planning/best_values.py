@@ -93,7 +93,7 @@ def largest_payload(profile: Profile) -> Largest:
 
     Every size is tried, from the largest one that the bus carries and the execution table covers.
     """
-    network, execution = network_of(profile), profile.node.execution
+    network, execution = network_of(profile), profile.alike_nodes[0].node.execution
     payloads = bus_of(profile).payloads(network)
     smallest = step = payloads.step_bytes
     most = Largest(payloads.most_bytes, payloads.bound)

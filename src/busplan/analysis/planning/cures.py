@@ -97,7 +97,7 @@ def changes_to_fit(profile: Profile) -> Iterator[Change]:
         The cheapest first; an empty change if the profile fits and is safe already.
     """
     cures = bus_of(profile).repairs(network_of(profile))
-    nodes = int(cures.get("bus.nodes", profile.bus.nodes))
+    nodes = int(cures.get("bus.nodes", network_of(profile).nodes))
     try:
         cured = override(profile, dict(cures))
     except BusplanError:  # the bus could carry the payload, but the execution table does not have it

@@ -157,7 +157,7 @@ def plan(
 
 def nodes_for_axes(profile: Profile, axes: int) -> int:
     """Number of nodes for a number of axes, with the profile's axes per node."""
-    return -(-axes // profile.node.axes)
+    return -(-axes // int(profile.alike_nodes[0].node.axes))
 
 
 def _differing(profile: Profile, changes: Changes) -> Changes:
@@ -274,7 +274,7 @@ class _Planner:
         return self.fitting(title, {"cycle.slice_ratio": ratio}, bounded_by="time")
 
     def payload(self, title: str) -> Option | Impossible:
-        if self.goal.payload.follows_axes:
+        if self.goal.alike_nodes[0].payload.follows_axes:
             return Impossible(title, "the payload follows the axes of a node")
         size, bounded_by = largest_payload(self.goal)
         if not size:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from busplan.analysis.network import known_model, model_names
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
+from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
@@ -256,12 +257,13 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
     *tables, last = key.split(".")
     table: Any = profile.model_dump()
     for part in tables:
-        table = table.get(part) if isinstance(table, dict) else None
+        named = named_tables(table)
+        table = named.get(part) if named else table.get(part) if isinstance(table, dict) else None
     if not isinstance(table, dict) or last not in table:
         section = ".".join(tables)
         siblings = list(table) if isinstance(table, dict) and tables else []
         close = [f"{section}.{one}" for one in get_close_matches(last, siblings, n=1, cutoff=0.7)]
-        read = cycle_keys(profile.bus.kind)
+        read = cycle_keys(profile)
         close = close or get_close_matches(key, read, n=1, cutoff=0.8) * (not siblings)
         known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
         hint = f"did you mean {close[0]}?" if close else known
@@ -273,7 +275,7 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
 
 def _require_read(profile: Profile, key: str, *, name: str, circle_option: str | None) -> None:
     """Refuse a key that no computed figure depends on; without `circle_option`, circle tests are computed."""
-    if key in cycle_keys(profile.bus.kind):
+    if key in cycle_keys(profile):
         return
     section = key.partition(".")[0]
     if section not in CIRCLE_SECTIONS:

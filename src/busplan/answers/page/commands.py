@@ -13,6 +13,7 @@ from busplan.answers.circle import circle_document
 from busplan.answers.documents import changed_document
 from busplan.answers.latency import latency_document
 from busplan.answers.map import map_document
+from busplan.answers.sensitivity import sensitivity_document
 from busplan.answers.timeline import timeline_document
 from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
 from busplan.printable import has_controls
@@ -104,7 +105,8 @@ def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges)
     # Neither latency nor the list of explain takes --period.
     elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
     bus, periods = answer.capacity, answer.periods
-    add("capacity", "verdict, timing models, terms", capacity_document(bus, (answer.verdict,)))
+    document = sensitivity_document(bus, (answer.verdict,), (answer.sensitivity,))
+    add("capacity", "verdict, timing models, terms, what moves the margin", document, "--sensitivity")
     add("latency", "latencies, part by part", latency_document(answer.latency), own=elsewhere)
     if answer.schedule is not None:
         add("timeline", "the cycle event by event", timeline_document(answer.schedule))

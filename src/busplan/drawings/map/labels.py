@@ -109,7 +109,7 @@ def limit_words(region: Region | Cell, profile: Profile) -> str:
 def title_of(direction: Direction, profile: Profile) -> str:
     """Name of a direction."""
     if direction.key == AXES:
-        return f"axes ({varied_nodes(profile)[0]})"
+        return f"axes ({varied_nodes(profile).nodes_key})"
     return "period" if direction.key == PERIOD else direction.key
 
 
