@@ -32,8 +32,8 @@ _ENDINGS: Final[Mapping[str, MapForm]] = MappingProxyType({**ENDINGS, ".svg": "s
 def _along(option: str, *, default: str) -> typer.models.OptionInfo:
     help_ = (
         f"{'What lies across' if option == '--x' else 'What lies up'}: a key of the profile, or axes for the axes of "
-        "all nodes (by their number; of groups, by that of the group with the most axes), and up to 64 values in its unit: "
-        f"{VALUES_HELP}  [default: {default}]"
+        "all nodes (by their number; of groups, by that of the group with the most axes), and up to 64 values "
+        f"in its unit: {VALUES_HELP}  [default: {default}]"
     )
     found: typer.models.OptionInfo = typer.Option(option, metavar="KEY=VALUES", help=help_, show_default=False)
     return found
