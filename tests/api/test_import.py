@@ -10,8 +10,8 @@ import pytest
 import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "scipy", "tomllib", "tomli_w", "json"}
-FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check")
-WITH_NUMPY = ("circle_test", "sweep")
+FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check", "trade_off")
+WITH_NUMPY = ("circle_test", "sweep", "trade_off")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
 
 

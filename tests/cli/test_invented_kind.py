@@ -233,6 +233,7 @@ FORMS = {
     "latency": ("table", "json", "csv"),
     "plan": ("table", "json", "csv"),
     "timeline": ("table", "json", "csv", "mermaid", "svg"),
+    "map": ("table", "markdown", "html", "csv", "json", "svg"),
     "circle-test": ("table", "json", "csv"),
     "report": ("html", "markdown"),
     "check": ("text", "full", "json", "github", "gitlab", "junit", "sarif"),

@@ -152,7 +152,8 @@ def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, shell
     assert len(html) < 300_000
     page = require_the_commands_own(html.decode(), shell=shell, cwd=tmp_path)
     assert len(page.figures) > 200
-    assert list(page.lines) == ["p1-capacity", "p1-latency", "p1-timeline", "p1-axes", "p1-circle", "p1-explain"]
+    keys = ("capacity", "latency", "timeline", "axes", "map", "circle", "explain")
+    assert list(page.lines) == [f"p1-{key}" for key in keys]
     assert page.lines["p1-capacity"] == "busplan capacity paper-4ms --sensitivity --format json"
     # Nothing of these commands' main figures is left out.
     for key in ("required_us", "margin_us", "utilisation", "max_axes"):

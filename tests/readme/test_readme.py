@@ -172,6 +172,7 @@ DOCUMENTS = {
     "sweep": "paper-4ms --vary bus.nodes=1:2 --circle --jobs 1",
     "calibrate": "paper-two-node table-1.csv",
     "timeline": "paper-4ms",
+    "map": "paper-4ms --x axes=4,6",
     "paper": "",
     "profiles": "",
 }

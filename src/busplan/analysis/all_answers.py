@@ -11,6 +11,7 @@ from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_
 from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.latency import LatencyResult, latency
+from busplan.analysis.map.trade_off import TradeOff, trade_off
 from busplan.analysis.network import model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
@@ -36,6 +37,8 @@ class AllAnswers(NamedTuple):
     """Nodes over the period, under each timing model; empty where nodes are in groups."""
     periods: Capacity
     """Capacity at several periods around and including the profile's own."""
+    trade_off: TradeOff
+    """Period against axes, without circle tests."""
     circle: CircleTest | None
     """The test with its contributions but without its simulation, which `contour` condenses."""
     contour: ContourProfile | None
@@ -80,6 +83,7 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         no_schedule=no_schedule,
         steps=() if profile.group else tuple(node_steps(profile, model=model) for model in model_names(profile)),
         periods=capacity(profile, periods_us=periods_us),
+        trade_off=trade_off(profile),
         circle=circle,
         contour=contour,
         no_circle=no_circle,

@@ -167,7 +167,7 @@ def sweep(
         )
     grid = checked_grid(
         network,
-        {key: _values(network, key, given) for key, given in vary.items()},
+        {key: axis_values(network, key, given, name="vary") for key, given in vary.items()},
         with_circle=with_circle,
         option="vary",
         circle_option="with_circle=True",
@@ -185,11 +185,29 @@ def sweep(
     return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=with_circle), tuple(blocks))
 
 
-def _values(profile: Profile, key: str, given: str | Iterable[object]) -> Values:
+def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
+    """Values of a key: text as on the command line, a range, or several values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    key
+        Dotted key.
+    given
+        The values.
+    name
+        Name of the argument in messages.
+
+    Raises
+    ------
+    BusplanError
+        Not values of the key.
+    """
     words = words_of(profile, key)
     if isinstance(given, str):
-        return parse_values(given, name=f"vary {key}={given}", words=words)
-    name = f"vary {key}"
+        return parse_values(given, name=f"{name} {key}={given}", words=words)
+    name = f"{name} {key}"
     return (
         stepped(given, name=name)
         if isinstance(given, range)

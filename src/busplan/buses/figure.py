@@ -26,8 +26,15 @@ Ink = Literal[
     "idle",
     "in",
     "out",
+    "fits",
+    "unsure",
+    "short",
+    "barred",
+    "unsafe",
+    "uneven",
+    "unjudged",
 ]
-"""What a stretch of time is to the reader of a drawing: its colour."""
+"""What a stretch of time, or a setting of a map, is to the reader of a drawing: its colour."""
 
 _UNITS: Final = {
     "_mm_per_min": "mm/min",

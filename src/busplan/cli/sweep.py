@@ -12,6 +12,7 @@ from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ALL_MODELS, ProfileArgument, TimingOption, form_of_file, output_option, plot_format
 from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
+from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
@@ -34,10 +35,8 @@ def sweep_command(
         typer.Option(
             "--vary",
             metavar="KEY=VALUES",
-            help="A key of the profile in numbers, and its values in the profile's unit: 250,500,1000 or a range "
-            "A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). Words that the key takes, "
-            "as optimal, may be among the values. Given several times, every combination is computed; the last key "
-            "changes fastest.  [required]",
+            help=f"A key of the profile in numbers, and its values in the profile's unit: {VALUES_HELP} Given several "
+            "times, every combination is computed; the last key changes fastest.  [required]",
             show_default=False,
         ),
     ] = None,
@@ -129,9 +128,6 @@ def sweep_command(
     for option, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{option} {number}: must be 1 or more")
-    # Imported here, because --help imports the top of this module.
-    from busplan.cli.vary import parse_axes
-
     kept = None if output is None else partial_path(output)
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))

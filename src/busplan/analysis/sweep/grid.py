@@ -1,6 +1,6 @@
 """A full grid of profile values in row-major order, in chunks: no axis is in memory as a whole."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from math import prod
 from typing import Any, Final, NamedTuple
@@ -182,13 +182,10 @@ def checked_grid(
     BusplanError
         A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses.
     """
-    for key in axes:
-        _require_known(profile, key, name=f"{option} {key}")
+    require_keys(profile, axes, option=option, circle_option=None if with_circle else circle_option)
     samples = {key: _samples(axis) for key, axis in axes.items()}
     first: dict[str, object] = {key: values[0] for key, values in samples.items()}
     override(profile, first)
-    for key in axes:
-        _require_read(profile, key, name=f"{option} {key}", circle_option=None if with_circle else circle_option)
     for key, values in samples.items():
         for value in values[1:]:
             override(profile, {**first, key: value})
@@ -201,6 +198,30 @@ def checked_grid(
             f"{option}: {grid.points:,} points are more than the {MAX_POINTS:,} a sweep takes; vary less"
         )
     return grid
+
+
+def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_option: str | None) -> None:
+    """Refuse keys that cannot vary, whatever their values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    keys
+        Dotted keys.
+    option
+        What gives them, for messages.
+    circle_option
+        What requests circle tests, for messages; None where they are run.
+
+    Raises
+    ------
+    BusplanError
+        A key that is unknown, not a number, or without effect here.
+    """
+    for key in keys:
+        _require_known(profile, key, name=f"{option} {key}")
+        _require_read(profile, key, name=f"{option} {key}", circle_option=circle_option)
 
 
 def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, name: str) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.capacity import capacity_table, groups_table
 from busplan.answers.latency import latency_tables
+from busplan.answers.map import headline, map_chart, regions_table
 from busplan.answers.page.commands import Sources
 from busplan.answers.sensitivity import sensitivity_blocks
 from busplan.answers.timeline import timeline_chart, totals_table
@@ -170,6 +171,15 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
     )
     chart = Chart(AxesDrawing(answer.profile, steps), caption)
     return Chapter(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
+
+
+def map_part(answer: AllAnswers, sources: Sources) -> Chapter:
+    """The map of period against axes, and what limits each region."""
+    source, found = sources["map"], answer.trade_off
+    table = source.gives(regions_table(found))
+    return Chapter(
+        Sentence(("What fits, and what limits it",)), (headline(found), map_chart(found), table, source.line), "map"
+    )
 
 
 def _groups_part(answer: AllAnswers, sources: Sources) -> Chapter:

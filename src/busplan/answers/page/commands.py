@@ -12,6 +12,7 @@ from busplan.answers.capacity import capacity_document
 from busplan.answers.circle import circle_document
 from busplan.answers.documents import changed_document
 from busplan.answers.latency import latency_document
+from busplan.answers.map import map_document
 from busplan.answers.sensitivity import sensitivity_document
 from busplan.answers.timeline import timeline_document
 from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
@@ -111,6 +112,7 @@ def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges)
         add("timeline", "the cycle event by event", timeline_document(answer.schedule))
     others = changes.without(key="cycle.period_us")
     add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
+    add("map", "period against axes, cell by cell", map_document(answer.trade_off))
     if answer.circle is not None:
         document = circle_document(answer.circle, with_contributions=True)
         add("circle", "the circle and its error sources", document, "--contributions")

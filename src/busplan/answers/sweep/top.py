@@ -1,6 +1,6 @@
 """Answer of `busplan sweep` for people: how many points fit, and the top rows."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isnan
 from typing import Final, NamedTuple
 
@@ -123,12 +123,7 @@ class Tally:
                 Sentence((".",)),
                 by="",
             )
-        for one in self.profile.alike_nodes:
-            if one.node_key("axes") not in self._varied or one.payload.follows_axes:
-                continue
-            section = f"group.{one.name}" if one.name else "payload"
-            keys = Code(f"{section}.read_bytes_per_axis"), Code(f"{section}.write_bytes_per_axis")
-            yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
+        yield from payload_sentences(self.profile, self._varied)
         safety = self.bus.safety_figure
         if self._unsafe and safety is not None:
             words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
@@ -152,6 +147,24 @@ class Tally:
             for count, model in zip(counts, self._models, strict=True)
         )
         return joined(*parts, by=" and ")
+
+
+def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sentence]:
+    """Say that the payload does not follow the axes of a node, where these vary.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    varied
+        Keys that vary.
+    """
+    for one in profile.alike_nodes:
+        if one.node_key("axes") not in varied or one.payload.follows_axes:
+            continue
+        section = f"group.{one.name}" if one.name else "payload"
+        keys = Code(f"{section}.read_bytes_per_axis"), Code(f"{section}.write_bytes_per_axis")
+        yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
 
 
 def _share(flags: Array, points: int) -> int:
