@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 import busplan
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.map.cells import Cell
-from busplan.analysis.planning.options import Option
+from busplan.analysis.planning.option import Option
 from busplan.rules.report import Located
 
 
