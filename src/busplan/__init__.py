@@ -25,6 +25,7 @@ __all__ = [
     "Profile",
     "SweepAnswer",
     "TimelineAnswer",
+    "TradeOffAnswer",
     "__version__",
     "capacity",
     "check",
@@ -34,6 +35,7 @@ __all__ = [
     "plan",
     "sweep",
     "timeline",
+    "trade_off",
 ]
 
 if TYPE_CHECKING:
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from busplan.api.plan import PlanAnswer, plan
     from busplan.api.sweep import SweepAnswer, sweep
     from busplan.api.timeline import TimelineAnswer, timeline
+    from busplan.api.trade_off import TradeOffAnswer, trade_off
     from busplan.errors import BusplanError
     from busplan.sections.profile import Profile
 else:
@@ -68,6 +71,8 @@ else:
         "sweep": "busplan.api.sweep",
         "TimelineAnswer": "busplan.api.timeline",
         "timeline": "busplan.api.timeline",
+        "TradeOffAnswer": "busplan.api.trade_off",
+        "trade_off": "busplan.api.trade_off",
     }
 
     def __getattr__(name: str) -> object:

@@ -119,6 +119,10 @@ class SpecialNumber(ABC):
         """Give the number a name."""
         return self
 
+    def same_as(self, other: "SpecialNumber") -> bool:
+        """Whether both have one value."""
+        return self is other
+
     def constant(self, number: Number) -> Number:
         """Give a constant that computes with this number as a traced one, too."""
         return number
@@ -354,6 +358,24 @@ def named(number: Number, key: str, symbol: str) -> Number:
 def worded(number: Number, words: str) -> Number:
     """Say in words where a number comes from, for a derivation; any other number stays as it is."""
     return number.worded(words) if isinstance(number, SpecialNumber) else number
+
+
+def are_same(one: object, other: object) -> bool:
+    """Whether two values of a profile are equal; arrays only where they are one.
+
+    Examples
+    --------
+    >>> are_same(2, 2.0), are_same("split", "unified")
+    (True, False)
+    """
+    if one is other:
+        return True
+    if isinstance(one, SpecialNumber) and isinstance(other, SpecialNumber):
+        return one.same_as(other)
+    return isinstance(one, _COMPARED) and isinstance(other, _COMPARED) and one == other
+
+
+_COMPARED: Final = (*_PLAIN, str, tuple)
 
 
 def alike(constant: Number, number: Number) -> Number:

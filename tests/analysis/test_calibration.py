@@ -50,7 +50,7 @@ def of_execution(
     """Measurements whose T_exec is known."""
     plain = profile.model_copy(
         update={
-            "node": profile.node.model_copy(
+            "node": profile.alike_nodes[0].node.model_copy(
                 update={"execution": LinearExecution(kind="linear", base_us=0, per_byte_us=0)}
             )
         }
@@ -72,7 +72,7 @@ def run(profile: Profile, measurements: list[Measurement] | tuple[Measurement, .
 def test_table_1_gives_the_table_of_the_shipped_profile(robust: bool, model: TimingModelName | None) -> None:
     bench = load("paper-two-node").profile
     result = run(bench, table_1(), robust=robust, timing_model=model, grade="derived")
-    shipped, found = bench.node.execution, result.execution
+    shipped, found = bench.alike_nodes[0].node.execution, result.execution
     assert isinstance(shipped, TableExecution)
     assert isinstance(found, TableExecution)
     assert (found.payload_bytes, found.grade) == (shipped.payload_bytes, shipped.grade)
@@ -123,7 +123,7 @@ def test_latencies_of_a_profile_give_its_own_execution_time(
         Measurement(line, kind, size, float(phases(profile, kind, model=model, payload_bytes=size).latency_us), None)
         for line, (size, kind) in enumerate(((size, kind) for size in sizes for kind in TRANSACTION_KINDS), start=2)
     ]
-    own = profile.node.execution
+    own = profile.alike_nodes[0].node.execution
     for robust in (False, True):
         line = run(profile, measurements, timing_model=model, robust=robust).execution
         assert isinstance(line, LinearExecution)

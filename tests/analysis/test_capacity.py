@@ -81,8 +81,8 @@ def test_required_time_equals_the_exact_one(
     profile = data.draw(any_profile)
     model = data.draw(st.sampled_from(model_names(profile)))
     found = figures(profile, model=model)
-    assert found.required_us == pytest.approx(float(exact(profile, model, profile.bus.nodes)), rel=1e-13)
-    assert found.required_time_slice_us * profile.bus.nodes == pytest.approx(found.required_us, rel=1e-13)
+    assert found.required_us == pytest.approx(float(exact(profile, model, profile.alike_nodes[0].nodes)), rel=1e-13)
+    assert found.required_time_slice_us * profile.alike_nodes[0].nodes == pytest.approx(found.required_us, rel=1e-13)
 
 
 @settings(max_examples=200, deadline=None)
@@ -108,12 +108,13 @@ def test_the_figures_of_a_profile_agree_with_each_other(
         + found.nonperiodic_us
     )
     assert parts_us == pytest.approx(found.required_us, rel=1e-12)
+    assert found.max_nodes is not None
     assert found.fits == (found.nodes <= found.max_nodes) == (not found.exceeded)
     assert ("time" in found.exceeded) == (found.margin_us < 0)
     assert found.margin_us == pytest.approx(found.available_us - found.required_us, abs=1e-9 * found.required_us)
     assert found.utilisation == pytest.approx(found.required_us / found.available_us)
-    assert found.max_axes == profile.node.axes * found.max_nodes
-    assert found.axes == profile.node.axes * found.nodes
+    assert found.max_axes == profile.alike_nodes[0].node.axes * found.max_nodes
+    assert found.axes == profile.alike_nodes[0].node.axes * found.nodes
     assert found.time_slice_us * found.nodes == pytest.approx(found.available_us)
     assert found.gaps_us == pytest.approx(found.subaction_gap_us + found.arbitration_reset_gap_us)
     assert found.min_period_us * profile.cycle.slice_ratio == pytest.approx(found.required_us)
@@ -129,7 +130,7 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     shown_us = found.required_us + found.bias_us + (found.uncertainty_us or 0)
     assert found.safe_required_us == pytest.approx(shown_us)
     assert found.safe_min_period_us == pytest.approx(found.safe_required_us / profile.cycle.slice_ratio)
-    assert found.safe_axes == profile.node.axes * found.safe_nodes
+    assert found.safe_axes == profile.alike_nodes[0].node.axes * found.safe_nodes
     assert (found.verdict == "fits" and found.safe) == (found.nodes <= found.safe_nodes)
 
 

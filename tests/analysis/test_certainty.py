@@ -222,7 +222,7 @@ def test_no_faster_node_and_no_shorter_cable_makes_a_verdict_worse(
 ) -> None:
     profile = override(data.draw(any_profile), {"node.execution.uncertainty_us": 0.5})
     before = of(profile)
-    execution: Any = profile.node.execution
+    execution: Any = profile.alike_nodes[0].node.execution
     share = data.draw(st.floats(0.0, 1.0))
     faster = of(override(profile, {"node.execution.base_us": execution.base_us * share}))
     shorter = of(override(profile, {"bus.cable_length_m": profile.bus.cable_length_m * max(share, 0.01)}))

@@ -121,7 +121,7 @@ def test_the_registry_holds_every_key_of_the_results() -> None:
             "not_in_it",
             "not_applicable",
         ),
-        *("cheapest_change", "warnings", "text"),
+        *("cheapest_change", "warnings", "text", "sensitivity", "next_bottleneck"),
     }
     assert set(FIGURES["circle-test"]) == set(CircleFigures._fields)
     assert list(FIGURES["latency"]) == list(latency_records(latency(load("paper-4ms").profile))[0])
@@ -358,7 +358,7 @@ OF_CERTAINTY = ("limits.reserve", "node.execution.residual", "node.execution.gra
 @pytest.mark.parametrize("model", TIMING_MODELS)
 def test_a_figure_changes_with_each_of_its_inputs_and_with_nothing_else(make: Make, model: str) -> None:
     profile, figures_by_key = make(**ALL_IN), partial(capacity_figures, model=model)
-    keys = [key for key in cycle_keys("ieee1394") if key not in FORMS]
+    keys = [key for key in cycle_keys(profile) if key not in FORMS]
     changing = differing(profile, figures_by_key, keys)
     derived = figures_by_key(profile)
     given = resting(derived, derived)
@@ -415,7 +415,7 @@ def test_a_figure_of_the_circle_changes_with_each_of_its_inputs_and_with_nothing
     profile = override(load("paper-1ms").profile, {**SMALL, **LINEAR, **place, "servo.drive_lag_us": 2000.0})
     sections = ("circle", "servo", "delivery", "mechanics", "tolerance")
     own = {f"{section}.{key}" for section in sections for key, value in getattr(profile, section) if value}
-    changing = differing(profile, circle_figures, {*cycle_keys("ieee1394"), *own} - set(FORMS))
+    changing = differing(profile, circle_figures, {*cycle_keys(profile), *own} - set(FORMS))
     given = resting(circle_figures(profile), FIGURES["circle-test"])
     assert changing <= given
     # The lead-in of a turn is a whole number of turns: a loop that settles a little later shows nothing.

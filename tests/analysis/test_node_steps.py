@@ -65,7 +65,7 @@ def test_each_step_is_where_one_more_node_begins_to_fit(model: TimingModelName) 
         # What fits but for the rounding of floats fits here too.
         near_us = from_us * (1 - 5e-13)
         assert most(override(BASE, {"cycle.period_us": near_us})) == nodes
-        assert steps.max_axes(near_us) == nodes * BASE.node.axes
+        assert steps.max_axes(near_us) == nodes * BASE.alike_nodes[0].node.axes
         found = figures(override(BASE, {"bus.nodes": nodes}), model=model)
         smallest_us = found.safe_min_period_us if model == "standard" else found.min_period_us
         assert smallest_us == pytest.approx(from_us)

@@ -114,9 +114,9 @@ def holds(profile: Profile) -> bool:
 
 def every_point(profile: Profile, *, periods_us: Sequence[float], names: Sequence[str]) -> Iterator[dict[str, Any]]:
     """Every point of a small grid, by the definition: the dearest setting changes least, then the next dearest."""
-    own, spare = profile.bus.nodes, profile.limits.min_spare_nodes or 0
+    own, spare = int(network_of(profile).nodes), profile.limits.min_spare_nodes or 0
     ratios = [n / 100 for n in range(1, 91) if n / 100 > profile.cycle.slice_ratio]
-    read, write = profile.payload.read_bytes or 0, profile.payload.write_bytes or 0
+    read, write = profile.alike_nodes[0].payload.read_bytes or 0, profile.alike_nodes[0].payload.write_bytes or 0
     caps = [size for size in range(2048, 0, -4) if size < max(read, write)]
     answers: list[dict[str, Any]] = [
         {"node.read_response": "concatenated"},

@@ -39,7 +39,13 @@ def test_documents_hold_the_results_own_numbers(name: str) -> None:
     result = capacity(profile)
     document = json.loads(to_json(capacity_document(result, verdicts(result))))
     assert document["results"] == [
-        json.loads(json.dumps({**one.by_key(), "exceeded": list(one.exceeded)})) for one in result.results
+        json.loads(
+            json.dumps(
+                {**one.by_key(), "exceeded": list(one.exceeded)}
+                | ({"groups": [group._asdict() for group in one.groups]} if one.groups else {})
+            )
+        )
+        for one in result.results
     ]
     single = latency(profile)
     transactions = json.loads(to_json(latency_document(single)))["transactions"]

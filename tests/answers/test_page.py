@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from busplan.analysis.all_answers import AllAnswers, all_answers
-from busplan.analysis.capacity.node_steps import node_steps
+from busplan.analysis.capacity.node_steps import node_steps, telling_periods
 from busplan.answers.page.commands import shell_word, sources
 from busplan.answers.page.report import ReportedProfile, page_report
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.drawings.axes import AxesDrawing, drawn_range
+from busplan.drawings.axes import AxesDrawing
 from busplan.drawings.terms import LEFT, TermsDrawing
 from busplan.forms import render
 from busplan.forms.blocks import Chapter, Report, ShownValue, Table, values_in
@@ -174,7 +174,8 @@ def at(document: Any, pointer: str) -> Any:
 
 def test_only_the_parts_in_their_order() -> None:
     assert list(parts(whole()[1])) == [
-        *("verdict", "models", "timeline", "terms", "axes", "circle", "sources", "assumptions", "commands"),
+        *("verdict", "models", "timeline", "terms", "sensitivity", "axes", "map", "circle"),
+        *("sources", "assumptions", "commands"),
     ]
 
 
@@ -299,7 +300,7 @@ def stairs(path: str) -> Iterator[tuple[float, float]]:
 def test_a_staircase_has_its_steps_where_nodes_begin_to_fit(profile: Profile) -> None:
     steps = [node_steps(profile, model=model) for model in ("paper", "standard")]
     root = ET.fromstring(AxesDrawing(profile, steps).svg())
-    from_us, to_us = drawn_range(profile, steps)
+    from_us, to_us = telling_periods(profile, steps)
     for one in steps:
         (path,) = (
             found for found in root.iter(f"{SVG}path") if found.get("class") == f"curve {PLACES[one.timing_model]}"
@@ -335,7 +336,7 @@ def test_the_profiles_own_point_and_the_lines_of_axes_share_one_scale() -> None:
     for axes, height in heights.items():
         assert height == pytest.approx(heights[0] - axes * per_axis, abs=1)
     (point,) = root.iter(f"{SVG}circle")
-    own_axes = BASE.bus.nodes * BASE.node.axes
+    own_axes = BASE.alike_nodes[0].nodes * BASE.alike_nodes[0].node.axes
     assert float(point.get("cy") or "") == pytest.approx(heights[0] - own_axes * per_axis, abs=1)
     marks = {rect.get("class"): svg for svg in root.iter(f"{SVG}svg") for rect in svg.findall(f"{SVG}rect")
              if (svg.get("x") or "").endswith("%")}  # fmt: skip

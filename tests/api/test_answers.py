@@ -1,7 +1,9 @@
 """What every answer can do: it is frozen, shows itself, and can be pickled."""
 
 import pickle
+import re
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -16,6 +18,7 @@ ANSWERS: dict[str, Callable[[busplan.Profile], Answer]] = {
     "timeline": busplan.timeline,
     "check": lambda _profile: busplan.check("paper-1ms"),
     "sweep": lambda profile: busplan.sweep(profile, vary={"bus.gap_count": [63, "optimal"], "bus.nodes": "1:3"}),
+    "trade_off": busplan.trade_off,
 }
 
 
@@ -87,6 +90,8 @@ HEADLINES = {
     "check": "<CheckAnswer: checked 1 profile: 0 errors, 0 warnings>",
     "sweep": "<SweepAnswer: paper-1ms: 6 points; 6 fit by the closed form of the paper model, 6 shown to fit (standard "
     "model).>",
+    "trade_off": "<TradeOffAnswer: paper-1ms: 57 of 195 settings are shown to fit. This design (8 axes, period 1 ms): "
+    "fits.>",
 }
 
 
@@ -101,3 +106,29 @@ def test_a_notebook_shows_the_report_and_no_name_is_markup() -> None:
     assert shown.startswith("<pre>&lt;b&gt;&amp;x at 4 ms: fits")
     assert shown.count("<") == 2
     assert "most axes" in shown
+
+
+def test_a_notebook_draws_a_map() -> None:
+    found = busplan.trade_off(busplan.load_profile("paper-4ms", changes={"name": "<b>&x"}))
+    assert found._repr_svg_().startswith("<svg ")
+    assert found._repr_html_() == found._repr_svg_()
+    assert "&lt;b&gt;&amp;x" in found._repr_svg_()
+    assert "<b>" not in found._repr_svg_()
+    assert found.own is not None
+    assert (found.own.state, len(found.cells), found.regions[0].cells) == ("fits", 288, 104)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x": ["bus.nodes"]}, "x ['bus.nodes']: expected one key and its values"),
+        ({"y": {"bus.nodes": [1], "node.axes": [1]}}, "expected one key and its values"),
+        ({"x": {"bus.nodes": 3}}, "x bus.nodes 3: expected several values"),
+        ({"x": {"bus.nodes": "1:x"}}, "x bus.nodes=1:x: 'x' is not a number"),
+        ({"x": {"bus.nodes": range(1, 90)}}, "x bus.nodes: 89 values; a map shows up to 64 of a key"),
+        ({"x": {"circle.radius_mm": [9]}}, "add with_circle=True to run circle tests"),
+    ],
+)
+def test_a_map_of_nonsense_is_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        busplan.trade_off("paper-4ms", **arguments)

@@ -10,8 +10,8 @@ import pytest
 import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "scipy", "tomllib", "tomli_w", "json"}
-FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check")
-WITH_NUMPY = ("circle_test", "sweep")
+FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check", "trade_off")
+WITH_NUMPY = ("circle_test", "sweep", "trade_off")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
 
 
@@ -46,7 +46,7 @@ def test_a_name_loads_what_it_needs(names: tuple[str, ...]) -> None:
 def test_what_simulates_nothing_loads_no_numpy() -> None:
     calls = [
         "latency('paper-4ms')",
-        "capacity('paper-4ms')",
+        "capacity('paper-4ms', sensitivity=True)",
         "timeline('paper-4ms')",
         "plan('paper-4ms', with_circle=False)",
         "check('paper-4ms', with_circle=False)",
@@ -90,3 +90,10 @@ def test_functions_stay_functions_whatever_submodules_are_loaded() -> None:
 def test_a_star_import_gives_every_name() -> None:
     program = "from busplan import *\nprint(' ', capacity('paper-4ms').results[0].max_axes, file=sys.stderr)"
     assert "numpy" in loaded(program)
+
+
+def test_capacity_alone_does_not_load_what_moves_the_margin() -> None:
+    program = "sys.argv = ['busplan', 'capacity', 'paper-4ms']\nfrom busplan.__main__ import main\n"
+    found = loaded(f"{program}try:\n    main()\nexcept SystemExit:\n    pass")
+    assert not {name for name in found if "sensitivity" in name or "bottleneck" in name or name == "xml.etree"}
+    assert "xml.etree" not in loaded("import busplan; busplan.capacity('paper-4ms').to_dict()")

@@ -107,7 +107,7 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
         "payload_bytes = [4, 64, 256]",
         *("uncertainty_us = 0.741", 'residual = "standard"', "measured_gap_count = 63"),
     ]
-    execution = load(str(bench)).profile.node.execution
+    execution = load(str(bench)).profile.alike_nodes[0].node.execution
     assert (execution.grade, execution.uncertainty_us) == ("measured", 0.741)
     busplan("calibrate", "bench.toml", "m.csv", "--timing", "standard", "--robust", "--apply", cwd=bench.parent)
     assert bench.read_text() == after
@@ -207,7 +207,7 @@ def test_an_outlier_is_no_entry_and_every_form_of_answer_says_so(busplan: Run, b
     assert [row["left_out"] for row in rows] == list("00010000")
     busplan("calibrate", "bench.toml", "wild.csv", "--apply", "--keep-outliers", cwd=bench.parent)
     assert "in wild.csv, 1 outlier kept, T1+T2 as measured" in bench.read_text()
-    assert load(str(bench)).profile.node.execution.grade == "assumed"
+    assert load(str(bench)).profile.alike_nodes[0].node.execution.grade == "assumed"
 
 
 def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan: Run, bench: Path) -> None:
@@ -280,3 +280,17 @@ def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run,
         "Warning: 1 outlier: line 7 (400 us at 256 bytes: T_exec +239.5 us off what the others say); left out "
         in run.stdout
     )
+
+
+def test_a_group_is_calibrated_by_its_name(run: Run, refused: Run, tmp_path: Path) -> None:
+    (tmp_path / "g.toml").write_text(load("gantry-24").document.text, encoding="utf-8")
+    assert "gantry-24 has the groups drives, tool, io; give" in str(
+        refused("calibrate", "g.toml", "table-1.csv", cwd=tmp_path)
+    )
+    unknown = refused("calibrate", "g.toml", "table-1.csv", "--group", "x", cwd=tmp_path)
+    assert "group x: gantry-24 has the groups drives" in str(unknown)
+    done = run("calibrate", "g.toml", "table-1.csv", "--group", "tool", "--form", "linear", "--apply", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "\n[group.execution]  # of tool\n" in done.stdout
+    drives, tool, io = load(str(tmp_path / "g.toml")).profile.group
+    assert [one.execution.grade for one in (drives, tool, io)] == ["assumed", "derived", "assumed"]

@@ -48,7 +48,8 @@ def test_a_figure_is_derived_down_to_its_constants(run: Run) -> None:
 def test_every_key_of_a_commands_json_is_explained_with_its_value(run: Run, command: str) -> None:
     listed = json.loads(run("explain", "paper-1ms", "--format", "json").stdout)
     keys = [row["figure"] for row in listed["figures"] if row["command"] == command]
-    extra = ["--contributions"] if command == "circle-test" else ["--timing", "paper"]
+    extras = {"circle-test": ["--contributions"], "capacity": ["--timing", "paper", "--sensitivity"]}
+    extra = extras.get(command, ["--timing", "paper"])
     given = json.loads(run(command, "paper-1ms", *extra, "--format", "json").stdout)
     rows = given.get("results") or given["transactions"]
     row = {**given.get("verdicts", [{}])[0], **rows[0]}
@@ -76,7 +77,7 @@ def test_keys_inside_a_figure_mean_the_figure(run: Run, tmp_path: Path) -> None:
     (tmp_path / "strict.toml").write_text(
         strict.replace("max_contour_error_mm = 0.025", "max_contour_error_mm = 0.001")
     )
-    found = keys_inside(json.loads(run("capacity", "paper-1ms", "--format", "json").stdout))
+    found = keys_inside(json.loads(run("capacity", "paper-1ms", "--sensitivity", "--format", "json").stdout))
     found |= keys_inside(json.loads(run("latency", "paper-1ms", "--format", "json").stdout))
     circle = run("circle-test", "strict.toml", "--contributions", "--format", "json", cwd=tmp_path)
     found |= keys_inside(json.loads(circle.stdout))

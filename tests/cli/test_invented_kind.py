@@ -31,6 +31,7 @@ from busplan.buses.bus import (
     LeftOut,
     Limit,
     PayloadRange,
+    Perturbation,
     Setting,
     Term,
     TimingModel,
@@ -172,6 +173,9 @@ class Ring(Bus):
         values = tuple({"bus.rate_mbit_s": rate} for rate in faster)
         return (Setting("rate", "rate", Cost.REGISTER, ("bus.rate_mbit_s",), values),)
 
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        return (Perturbation("half the rate", {"bus.rate_mbit_s": network.profile.bus.rate_mbit_s / 2}),)
+
     def payloads(self, network: Network) -> PayloadRange:  # noqa: ARG002 - the same for any ring
         return PayloadRange(1, 64, "frame")
 
@@ -231,6 +235,7 @@ FORMS = {
     "latency": ("table", "json", "csv"),
     "plan": ("table", "json", "csv"),
     "timeline": ("table", "json", "csv", "mermaid", "svg"),
+    "map": ("table", "markdown", "html", "csv", "json", "svg"),
     "circle-test": ("table", "json", "csv"),
     "report": ("html", "markdown"),
     "check": ("text", "full", "json", "github", "gitlab", "junit", "sarif"),
@@ -319,6 +324,27 @@ def test_its_figures_are_those_by_hand(ring: Path) -> None:
     assert one.timing_model == "plain"
     assert one.fits
     assert [term.name for term in one.terms] == ["data", "token", "nonperiodic"]
+
+
+def test_what_moves_its_margin_is_by_hand(run: Run, ring: Path) -> None:
+    done = run("capacity", ring.name, "--sensitivity", "--format", "json", cwd=ring.parent)
+    (verdict,) = json.loads(done.stdout)["verdicts"]
+    assert [(one["change"], one["margin_change_us"], one["note"]) for one in verdict["sensitivity"]] == [
+        ("half the rate", -640.0, None),
+        ("payload +4 bytes", -320.0, None),
+        ("one node more", -128.0, None),  # the second token serves it, too
+        ("execution time +10%", 0.0, None),
+        ("one axis more per node", 0.0, "no payload follows the axes"),
+    ]
+    following = verdict["next_bottleneck"]
+    assert (following["binding_term"], following["next_binding_term"]) == ("data", "token")
+    # 750 us carry five stations; without that limit a ring has forty.
+    assert (following["safe_limited_by"], following["safe_nodes"]) == ("time", 5)
+    assert (following["next_safe_limited_by"], following["next_safe_nodes"]) == ("nodes", 40)
+    for form in ("table", "markdown", "html", "csv"):
+        said = run("capacity", ring.name, "--sensitivity", "--format", form, cwd=ring.parent).stdout
+        assert "half the rate" in said
+        assert not [word for word in ("hop", "retry", "gap count", "bus reset") if word in said]
 
 
 def test_its_events_add_up_to_its_terms(ring: Path) -> None:

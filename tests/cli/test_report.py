@@ -152,8 +152,9 @@ def test_every_figure_of_the_shipped_profile_is_the_commands_own(run: Run, shell
     assert len(html) < 300_000
     page = require_the_commands_own(html.decode(), shell=shell, cwd=tmp_path)
     assert len(page.figures) > 200
-    assert list(page.lines) == ["p1-capacity", "p1-latency", "p1-timeline", "p1-axes", "p1-circle", "p1-explain"]
-    assert page.lines["p1-capacity"] == "busplan capacity paper-4ms --format json"
+    keys = ("capacity", "latency", "timeline", "axes", "map", "circle", "explain")
+    assert list(page.lines) == [f"p1-{key}" for key in keys]
+    assert page.lines["p1-capacity"] == "busplan capacity paper-4ms --sensitivity --format json"
     # Nothing of these commands' main figures is left out.
     for key in ("required_us", "margin_us", "utilisation", "max_axes"):
         assert {f"/results/{model}/{key}" for model in (0, 1)} <= {
@@ -170,7 +171,7 @@ def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, sh
     arguments = ("--period", "0.4ms", "--", *names, names[0])
     html = run("report", *arguments, cwd=tmp_path).stdout
     page = require_the_commands_own(html, shell=shell, cwd=tmp_path)
-    assert page.lines["p2-capacity"] == "busplan capacity ./-o.toml --period 400us --format json"
+    assert page.lines["p2-capacity"] == "busplan capacity ./-o.toml --sensitivity --period 400us --format json"
     assert page.lines["p2-latency"] == "busplan latency ./-o.toml --format json"
     assert [html.count(f'id="p{number}"') for number in range(1, 6)] == [1, 1, 1, 1, 0]
 
@@ -224,7 +225,7 @@ def test_standard_input_and_a_title(run: Run, tmp_path: Path) -> None:
     done = run("report", "-", "--title", "Cell 7 <north>", stdin=QUICK, cwd=tmp_path)
     assert "<title>Cell 7 &lt;north&gt; - busplan</title>" in done.stdout
     assert "<h1>Cell 7 &lt;north&gt;</h1>" in done.stdout
-    assert Page(done.stdout).lines["p1-capacity"] == "busplan capacity - --format json"
+    assert Page(done.stdout).lines["p1-capacity"] == "busplan capacity - --sensitivity --format json"
 
 
 def test_a_comparison_stands_in_front_and_leads_to_each_profile(run: Run) -> None:

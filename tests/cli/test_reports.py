@@ -232,6 +232,36 @@ def test_nodes_and_gap_count_replace_the_profiles(run: Run) -> None:
     }
 
 
+def test_what_moves_the_margin_is_asked_for(run: Run) -> None:
+    plain = document(run, "capacity", "paper-4ms")
+    assert not {"sensitivity", "next_bottleneck"} & set(plain["verdicts"][0])
+    # Each change is one that an option makes.
+    asked = ("--sensitivity", "--period", "1ms", "--period", "600us", "--gap-count", "8", "--timing", "paper")
+    found = document(run, "capacity", "paper-4ms", *asked)
+    for period, verdict in zip(("1ms", "600us"), found["verdicts"], strict=True):
+        rows = {one["change"]: one for one in verdict["sensitivity"]}
+        for change, options in (
+            ("one node more", ("--nodes", "3", "--gap-count", "8")),
+            ("a bus reset", ("--gap-count", "63")),
+            ("host time +10 us", ("--gap-count", "8", "--set", "host.transaction_us=10")),
+        ):
+            (other,) = document(run, "capacity", "paper-4ms", "--period", period, *options)["verdicts"]
+            for key in ("margin_corrected_us", "uncertainty_us", "verdict", "gap_count_safe"):
+                assert rows[change][key] == other[key]
+            assert rows[change]["margin_change_us"] == pytest.approx(
+                other["margin_corrected_us"] - verdict["margin_corrected_us"]
+            )
+
+
+def test_what_moves_the_margin_as_a_process(run: Run, tmp_path: Path) -> None:
+    done = run("capacity", "paper-1ms", "--sensitivity", "--set", "bus.gap_count=7", cwd=tmp_path, env={})
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("With --set bus.gap_count=7.\npaper-1ms at 1 ms: fits.")
+    assert "\nWhat moves the margin of 296.144 us at 1 ms, by the standard model\n" in done.stdout
+    (reset,) = (line.split() for line in done.stdout.splitlines() if line.startswith("a bus reset") and "->" in line)
+    assert reset[3:] == ["7", "->", "63", "-66.081", "230.064", "fits"]
+
+
 def test_capacity_as_a_table_begins_with_the_verdict(run: Run) -> None:
     done = run("capacity", "paper-4ms")
     assert (done.returncode, done.stderr) == (0, "")
@@ -284,13 +314,13 @@ def test_profiles_lists_what_every_command_takes_by_name(run: Run) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     found = document(run, "profiles")
     names = [one["name"] for one in found["profiles"]]
-    assert names == ["paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]
-    assert re.findall(r"(?m)^(paper-\S+): \d", done.stdout) == names
+    assert names == ["gantry-24", "paper-1ms", "paper-4ms", "paper-dma", "paper-optimal-gap", "paper-two-node"]
+    assert re.findall(r"(?m)^([\w-]+): \d+ nodes? at", done.stdout) == names
     assert [one["name"] for one in rows(run, "profiles")] == names
     assert all(math.isfinite(one["period_us"]) for one in found["profiles"])
 
 
-@pytest.mark.parametrize("name", ["paper-1ms", "paper-dma", "paper-optimal-gap", "paper-two-node"])
+@pytest.mark.parametrize("name", ["gantry-24", "paper-1ms", "paper-dma", "paper-optimal-gap", "paper-two-node"])
 def test_every_shipped_profile_has_both_reports(run: Run, name: str) -> None:
     for command in ("latency", "capacity"):
         done = run(command, name)

@@ -55,6 +55,7 @@ EVERY = {
     "circle-test": ("mine.toml",),
     "explain": ("mine.toml", "required_us"),
     "timeline": ("mine.toml",),
+    "map": ("mine.toml",),
     "report": ("mine.toml", "--no-circle"),
     "plan": ("mine.toml", "--no-circle"),
     "sweep": ("mine.toml", "--vary", "bus.nodes=1:3"),

@@ -7,10 +7,13 @@ import pytest
 from busplan.analysis.sweep.grid import Listed
 from busplan.cli.vary import parse_axes
 from busplan.errors import BusplanError
+from busplan.profile.shipped import load
+
+PROFILE = load("paper-1ms").profile
 
 
 def values(spec: str) -> list[object]:
-    (axis,) = parse_axes([f"bus.gap_count={spec}"], kind="ieee1394").values()
+    (axis,) = parse_axes([f"bus.gap_count={spec}"], profile=PROFILE).values()
     return list(axis.values) if isinstance(axis, Listed) else axis.part(0, axis.size).tolist()
 
 
@@ -76,4 +79,4 @@ def test_values(spec: str, expected: list[object]) -> None:
 )
 def test_nonsense_is_refused(texts: list[str], message: str) -> None:
     with pytest.raises(BusplanError, match=re.escape(message)):
-        parse_axes(texts, kind="ieee1394")
+        parse_axes(texts, profile=PROFILE)

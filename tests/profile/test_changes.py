@@ -101,12 +101,20 @@ def test_keys_that_only_go_together_do_so_in_any_order() -> None:
             changes(one).applied(shipped())
     both = changes(*texts).applied(shipped())
     assert both == changes(*reversed(texts)).applied(shipped())
-    assert isinstance(both.node.execution, TableExecution)
-    assert (both.node.execution.payload_bytes, both.node.execution.time_us) == ((4, 64), (30.0, 50.0))
+    assert isinstance(both.alike_nodes[0].node.execution, TableExecution)
+    assert (both.alike_nodes[0].node.execution.payload_bytes, both.alike_nodes[0].node.execution.time_us) == (
+        (4, 64),
+        (30.0, 50.0),
+    )
 
 
 def test_a_table_replaces_its_section_and_may_be_of_another_kind() -> None:
-    found = changes("node.execution={kind='linear', base_us=30, per_byte_us=0.1}").applied(shipped()).node.execution
+    found = (
+        changes("node.execution={kind='linear', base_us=30, per_byte_us=0.1}")
+        .applied(shipped())
+        .alike_nodes[0]
+        .node.execution
+    )
     assert isinstance(found, LinearExecution)
     assert (found.base_us, found.per_byte_us, found.grade) == (30.0, 0.1, None)
 

@@ -17,7 +17,8 @@ def read(text: str) -> Profile:
 @pytest.mark.parametrize("name", shipped_names())
 def test_a_written_profile_reads_to_the_same(name: str) -> None:
     profile = load(name).profile
-    changed = override(profile, {"bus.nodes": 7, "bus.gap_count": "optimal", "cycle.period_us": 812.5})
+    nodes_key = profile.alike_nodes[0].nodes_key
+    changed = override(profile, {nodes_key: 7, "bus.gap_count": "optimal", "cycle.period_us": 812.5})
     for one in (profile, changed):
         again = read(profile_text(one))
         assert again == one

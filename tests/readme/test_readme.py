@@ -22,7 +22,9 @@ from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
 from busplan.forms.markdown_words import code, table
 from busplan.manual import FOLDER, topics
-from busplan.profile.shipped import shipped_names
+from busplan.profile.kinds import models_of
+from busplan.profile.shipped import load, shipped_names
+from busplan.profile.toml import decode, validate
 from busplan.sections.machine import AxisOverride
 
 Run = Callable[..., CompletedProcess[str]]
@@ -69,7 +71,11 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         inner = sections(field.annotation)
-        if inner == [AxisOverride]:
+        if name == "group":
+            (group,) = models_of(field.annotation)
+            yield from (reference_row(group, own, f"group.NAME.{own}") for own in ("name", "nodes", "axes", "hops"))
+            yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | What its nodes have |"
+        elif inner == [AxisOverride]:
             yield f"| `{key}` | any key of one axis | none | {field.description} |"
         elif inner:
             for one in inner:
@@ -84,6 +90,8 @@ def reference_row(model: type[BaseModel], name: str, key: str) -> str:
     default = (
         "required"
         if field.default is PydanticUndefined
+        else "required, without groups"
+        if key == "bus.nodes"
         else repr(field.default).replace("'", '"').replace("False", "false")
     )
     range_ = allowed(model.model_json_schema()["properties"][name])
@@ -101,7 +109,8 @@ def allowed(schema: dict[str, Any]) -> str:
     if schema["type"] == "array":
         return f"list of {allowed(schema['items'])}"
     if schema["type"] == "string":
-        return f"text up to {schema['maxLength']} characters"
+        letters = " of letters, digits, - and _" if schema.get("pattern", "").startswith("^[A-Za-z]") else ""
+        return f"text up to {schema['maxLength']} characters{letters}"
     low = f"> {schema['exclusiveMinimum']:g}" if "exclusiveMinimum" in schema else f"{schema['minimum']:g}"
     kind = "whole " if schema["type"] == "integer" else ""
     return f"{kind}{low} to {schema['maximum']:g}"
@@ -144,12 +153,15 @@ def test_tables_are_those_of_the_program(lines: list[str]) -> None:
 
 def test_the_example_profile_is_the_shipped_one() -> None:
     blocks = re.findall(r"^```toml\n(.*?)^```$", PAGES[FOLDER / "profile.md"], re.MULTILINE | re.DOTALL)
-    assert blocks == [(ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")]
+    groups, example = blocks
+    assert example == (ROOT / "profiles" / "paper-4ms.toml").read_text(encoding="utf-8")
+    above, _, _ = load("gantry-24").document.text.partition("# The groups stand")
+    assert [one.name for one in validate(decode(f"{above}{groups}".encode(), name="page")).group] == ["drives", "io"]
 
 
 DOCUMENTS = {
     "latency": "paper-4ms",
-    "capacity": "paper-1ms --period 600us",
+    "capacity": "paper-1ms --period 600us --sensitivity",
     "circle-test": "paper-4ms --period 4ms --period 100us --contributions",
     "explain": "paper-4ms required_us",
     "report": "paper-4ms --no-circle",
@@ -160,6 +172,7 @@ DOCUMENTS = {
     "sweep": "paper-4ms --vary bus.nodes=1:2 --circle --jobs 1",
     "calibrate": "paper-two-node table-1.csv",
     "timeline": "paper-4ms",
+    "map": "paper-4ms --x axes=4,6",
     "paper": "",
     "profiles": "",
 }

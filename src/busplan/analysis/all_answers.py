@@ -4,12 +4,14 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import Capacity, capacity
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
+from busplan.analysis.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
 from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.latency import LatencyResult, latency
+from busplan.analysis.map.trade_off import TradeOff, trade_off
 from busplan.analysis.network import model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
@@ -26,14 +28,17 @@ class AllAnswers(NamedTuple):
     profile: Profile
     capacity: Capacity
     verdict: Verdict
+    sensitivity: Sensitivity
     latency: LatencyResult
     schedule: Schedule | None
     no_schedule: tuple[str, ...]
     """Why there is no schedule."""
     steps: tuple[NodeSteps, ...]
-    """Nodes over the period, under each timing model."""
+    """Nodes over the period, under each timing model; empty where nodes are in groups."""
     periods: Capacity
     """Capacity at several periods around and including the profile's own."""
+    trade_off: TradeOff
+    """Period against axes, without circle tests."""
     circle: CircleTest | None
     """The test with its contributions but without its simulation, which `contour` condenses."""
     contour: ContourProfile | None
@@ -72,11 +77,13 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         profile=profile,
         capacity=bus,
         verdict=verdicts(bus)[0],
+        sensitivity=sensitivity(profile),
         latency=latency(profile),
         schedule=plan,
         no_schedule=no_schedule,
-        steps=tuple(node_steps(profile, model=model) for model in model_names(profile)),
+        steps=() if profile.group else tuple(node_steps(profile, model=model) for model in model_names(profile)),
         periods=capacity(profile, periods_us=periods_us),
+        trade_off=trade_off(profile),
         circle=circle,
         contour=contour,
         no_circle=no_circle,

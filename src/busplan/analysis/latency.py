@@ -1,6 +1,7 @@
 """Latency on the bus: the phases of each transaction under each timing model."""
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 from busplan.analysis.figure_values import FigureValues
@@ -19,6 +20,8 @@ class Transaction(NamedTuple):
 
     timing_model: str
     transaction: str
+    group: str
+    """Of which group of nodes; empty where all are alike."""
     payload_bytes: int | None
     nodes: int
     phases: FigureValues
@@ -76,7 +79,7 @@ def latency(
     return LatencyResult(
         profile.name,
         tuple(
-            Transaction(model, one.name, one.payload_bytes, nodes, FigureValues(_whole_bytes(one.phases)))
+            Transaction(model, one.name, one.group, one.payload_bytes, nodes, FigureValues(_whole_bytes(one.phases)))
             for variant in variants
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
             for model, one in zip(models, alike, strict=True)
@@ -91,9 +94,10 @@ def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float]:
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:
     """Return a copy with the payload of both read and write replaced [bytes], unvalidated."""
-    for kind in TRANSACTION_KINDS:
-        profile = with_unchecked(profile, f"payload.{kind}_bytes", size_bytes)
-        profile = with_unchecked(profile, f"payload.{kind}_bytes_per_axis", None)
+    sections = [f"group.{one.name}" for one in profile.group] or ["payload"]
+    for section, kind in product(sections, TRANSACTION_KINDS):
+        profile = with_unchecked(profile, f"{section}.{kind}_bytes", size_bytes)
+        profile = with_unchecked(profile, f"{section}.{kind}_bytes_per_axis", None)
     return profile
 
 
@@ -103,15 +107,13 @@ def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:
 
 def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
     """Refuse payloads whose execution time is not known, all in one error."""
-    execution = profile.node.execution
-    if not isinstance(execution, TableExecution):
-        return
-    unknown = dict.fromkeys(size for size in payloads_bytes if not execution.covers(size))
+    unknown = dict.fromkeys(
+        f"payload {size} bytes: outside the execution table of {one.name or profile.name}, {execution.range_bytes}; "
+        "nothing is extrapolated"
+        for one in profile.alike_nodes
+        if isinstance(execution := one.node.execution, TableExecution)
+        for size in payloads_bytes
+        if not execution.covers(size)
+    )
     if unknown:
-        raise BusplanError(
-            *(
-                f"payload {size} bytes: outside the execution table of {profile.name}, {execution.range_bytes}; "
-                "nothing is extrapolated"
-                for size in unknown
-            )
-        )
+        raise BusplanError(*unknown)

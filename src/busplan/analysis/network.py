@@ -1,9 +1,15 @@
 """A profile as a network: its kind of bus, and its nodes with their payloads and execution times."""
 
+from collections.abc import Sequence
+from typing import Final
+
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
+from busplan.elementwise import Number, are_same, total
 from busplan.errors import BusplanError
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.base import Section
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
@@ -21,14 +27,21 @@ def network_of(profile: Profile) -> Network:
     profile
         The profile. Its values may be numbers, arrays or traced numbers.
     """
-    payload, node, cycle = profile.payload, profile.node, profile.cycle
-    execution = node.execution
-    read_bytes, write_bytes = (payload.bytes_of(kind, axes=node.axes) for kind in TRANSACTION_KINDS)
+    cycle = profile.cycle
+    groups = tuple(_group(members) for members in _side_by_side(profile.alike_nodes))
+    asked = None if profile.group else ""
+    return Network(profile, groups, cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us, asked)
+
+
+def _group(members: Sequence[AlikeNodes]) -> Group:
+    said = members[0]
+    execution = said.node.execution
+    read_bytes, write_bytes = (said.bytes_of(kind) for kind in TRANSACTION_KINDS)
     read_us, write_us = execution.execution_us(read_bytes), execution.execution_us(write_bytes)
-    group = Group(
-        node=node,
-        nodes=profile.bus.nodes,
-        axes=node.axes,
+    return Group(
+        said=said,
+        nodes=said.nodes if len(members) == 1 else total(one.nodes for one in members),
+        axes=said.node.axes,
         read_bytes=read_bytes,
         write_bytes=write_bytes,
         read_execution_us=read_us,
@@ -36,8 +49,54 @@ def network_of(profile: Profile) -> Network:
         worst_extra_us=execution.worst_extra_us,
         read_uncertainty_us=execution.standard_uncertainty_us(read_us),
         write_uncertainty_us=execution.standard_uncertainty_us(write_us),
+        members=tuple(members),
     )
-    return Network(profile, (group,), cycle.period_us, cycle.slice_ratio, cycle.nonperiodic_us)
+
+
+def _side_by_side(each: Sequence[AlikeNodes]) -> list[list[AlikeNodes]]:
+    """Put neighbours that are alike in all but name and number together: then their cycle is that of a uniform bus."""
+    found: list[list[AlikeNodes]] = []
+    for one in each:
+        if found and _is_alike(found[-1][0].node, one.node):
+            found[-1].append(one)
+        else:
+            found.append([one])
+    return found
+
+
+_OF_ONE_GROUP: Final = ("name", "nodes")
+
+
+def _is_alike(one: object, other: object) -> bool:
+    """Whether two groups, sections or values are equal; arrays only where they are one."""
+    if isinstance(one, Section) and type(one) is type(other):
+        keys = (key for key in type(one).model_fields if key not in _OF_ONE_GROUP)
+        return all(_is_alike(getattr(one, key), getattr(other, key)) for key in keys)
+    return are_same(one, other)
+
+
+def with_payloads(group: Group, *, read_bytes: Number, write_bytes: Number) -> Group:
+    """The same nodes with other payloads [bytes], whose execution times follow.
+
+    Raises
+    ------
+    ValueError
+        The execution time of a payload is not known.
+    """
+    execution_us = group.node.execution.execution_us
+    sized = group._replace(read_bytes=read_bytes, write_bytes=write_bytes)
+    return with_execution(sized, read_us=execution_us(read_bytes), write_us=execution_us(write_bytes))
+
+
+def with_execution(group: Group, *, read_us: Number, write_us: Number) -> Group:
+    """The same nodes with other execution times [us], as well known as the profile says."""
+    execution = group.node.execution
+    return group._replace(
+        read_execution_us=read_us,
+        write_execution_us=write_us,
+        read_uncertainty_us=execution.standard_uncertainty_us(read_us),
+        write_uncertainty_us=execution.standard_uncertainty_us(write_us),
+    )
 
 
 def model_names(profile: Profile) -> tuple[str, ...]:

@@ -15,6 +15,14 @@ CommandName = Literal["latency", "capacity", "circle-test"]
 _HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
     {
         "changes": ("capacity", "cheapest_change"),
+        **dict.fromkeys(("change", "key", "from", "to", "margin_change_us", "note"), ("capacity", "sensitivity")),
+        **dict.fromkeys(
+            (
+                *("binding_term_us", "next_binding_term", "next_binding_term_us", "next_margin_corrected_us"),
+                *("next_safe_nodes", "next_safe_limited_by"),
+            ),
+            ("capacity", "next_bottleneck"),
+        ),
         **dict.fromkeys(("input", "label", "standard_uncertainty_us", "share"), ("capacity", "uncertainty_parts")),
         **dict.fromkeys(("name", "value", "limit", "limit_is_default"), ("circle-test", "failures")),
         **dict.fromkeys(("source", "removed_mm"), ("circle-test", "contributions")),

@@ -30,7 +30,12 @@ from busplan.forms.numbers import nouns, plural, with_unit
 from busplan.profile.write import value_text
 from busplan.sections.execution import LinearExecution, TableExecution
 
-SECTION: Final = "node.execution"
+
+def section(result: Calibration) -> str:
+    """Dotted key of the section that the execution time stands in."""
+    return result.nodes.node_key("execution")
+
+
 _COLUMNS: Final = {
     "payload_bytes": TableColumn("payload", "bytes"),
     "measurements": TableColumn("n"),
@@ -66,7 +71,7 @@ def execution_changes(result: Calibration) -> dict[str, object]:
     """Changes that set a profile's execution time; None removes a key of the other form, or of the old one."""
     gone = dict.fromkeys((*LinearExecution.model_fields, *TableExecution.model_fields))
     changes = {**gone, **execution_keys(result)}
-    return {f"{SECTION}.{key}": value for key, value in changes.items() if key != _KEPT}
+    return {f"{section(result)}.{key}": value for key, value in changes.items() if key != _KEPT}
 
 
 def provenance(result: Calibration, *, source: str) -> str:
@@ -121,7 +126,8 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     yield from (joined(sentence("Warning: ", state="warns"), one, by="") for one in warning_sentences(result))
     yield _by_payload(result.payloads, measured=result.way == "measured-halves")
     keys = (f"{key} = {value_text(value)}" for key, value in execution_keys(result).items())
-    yield Snippet((f"[{SECTION}]", *keys))
+    where = f"[group.execution]  # of {result.nodes.name}" if result.nodes.name else f"[{section(result)}]"
+    yield Snippet((where, *keys))
 
 
 def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:

@@ -9,6 +9,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.forms.blocks import Sentence, ShownValue, count_value, joined, sentence
 from busplan.forms.numbers import nouns
 from busplan.sections.execution import TableExecution
+from busplan.sections.transactions import TRANSACTION_KINDS
 
 _LINE_DIGITS: Final = 6
 """Significant digits of a line's base and slope."""
@@ -126,9 +127,9 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
     if result.outliers:
         yield _outliers(result)
     yield from _undecided(result)
-    execution, (group,) = result.execution, network_of(result.profile).groups
+    execution = result.execution
     if isinstance(execution, TableExecution):
-        outside = [int(size) for size in (group.read_bytes, group.write_bytes) if not execution.covers(int(size))]
+        outside = [size for kind in TRANSACTION_KINDS if not execution.covers(size := int(result.nodes.bytes_of(kind)))]
         for size in dict.fromkeys(outside):
             yield sentence(
                 f"the profile's payload of {{}} is outside the table, {execution.range_bytes}: measure it, or use "

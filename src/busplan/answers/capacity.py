@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import accumulate
+from typing import Final
 
-from busplan.analysis.capacity.figures import Capacity, CapacityFigures
+from busplan.analysis.capacity.figures import COUNTS, Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, leading_model, network_of
 from busplan.answers.documents import document, with_profile
@@ -15,6 +16,7 @@ from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
 from busplan.forms.blocks import (
     Block,
+    Cell,
     Code,
     JsonDocument,
     Record,
@@ -22,6 +24,8 @@ from busplan.forms.blocks import (
     Sentence,
     Table,
     TableColumn,
+    TableRow,
+    attribute_value,
     count_value,
     sentence,
 )
@@ -46,6 +50,8 @@ def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
         places = places_of(figures, start=start, change=number)
         yield from verdict_sentences(verdict, result.profile, places=places)
         yield capacity_table(result.profile, figures, start=start)
+        if result.profile.group:
+            yield groups_table(figures, start=start)
 
 
 def _starts(result: Capacity) -> Iterator[int]:
@@ -77,7 +83,48 @@ def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, star
         Owner(TableColumn(one.timing_model), one, f"/results/{start + number}") for number, one in enumerate(figures)
     ]
     owners.sort(key=lambda one: one.column.heading != leading)
-    return figure_table(_rows(bus), owners, caption=caption)
+    rows = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)]
+    return figure_table(rows, owners, caption=caption)
+
+
+def groups_table(figures: Sequence[CapacityFigures], *, start: int = 0) -> Table:
+    """How many nodes of each group fit one period, the other groups as they are.
+
+    Parameters
+    ----------
+    figures
+        One set for each timing model.
+    start
+        Index of the first one in the document's results.
+    """
+    columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
+    shown: list[tuple[int, tuple[Figure, ...]]] = []
+    for number, one in enumerate(figures):
+        keys = _GROUP_CLOSED if one.verdict is None else _GROUP_SAFE
+        shown.append((number, keys))
+        columns += (
+            TableColumn(key.label, kind="words" if key.sort == "word" else "figures", group=one.timing_model)
+            for key in keys
+        )
+    rows = []
+    for place, group in enumerate(figures[0].groups):
+        at = f"/results/{start}/groups/{place}"
+        cells: list[Cell] = [
+            Code(group.name),
+            count_value(group.nodes, "nodes", at=f"{at}/nodes"),
+            count_value(group.axes, "axes", at=f"{at}/axes"),
+        ]
+        for number, keys in shown:
+            at = f"/results/{start + number}/groups/{place}"
+            cells += (attribute_value(key, figures[number].groups[place], at=at) for key in keys)
+        rows.append(TableRow(tuple(cells)))
+    return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
+
+
+_GROUP_SAFE: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
+"""Under the timing model that decides."""
+_GROUP_CLOSED: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
+"""Under another timing model."""
 
 
 def _rows(bus: Bus) -> list[tuple[Figure, int]]:
@@ -104,8 +151,22 @@ def _rows(bus: Bus) -> list[tuple[Figure, int]]:
 
 
 def capacity_records(result: Capacity) -> list[Record]:
-    """One row for each period and timing model."""
-    return [{**figures.by_key(), "exceeded": list(figures.exceeded)} for figures in result.results]
+    """One row for each period and timing model; what each group has for itself stands in columns of its name."""
+    return [
+        {
+            **figures.by_key(),
+            "exceeded": list(figures.exceeded),
+            **{f"group.{one.name}.{key}": getattr(one, key) for one in figures.groups for key in COUNTS},
+        }
+        for figures in result.results
+    ]
+
+
+def _results(result: Capacity) -> Iterator[Record]:
+    """As the rows, with a list of groups where the profile has some."""
+    for figures in result.results:
+        record: Record = {**figures.by_key(), "exceeded": list(figures.exceeded)}
+        yield {**record, "groups": [one._asdict() for one in figures.groups]} if figures.groups else record
 
 
 def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
@@ -113,7 +174,7 @@ def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocu
     return document(
         "capacity",
         profile=result.profile.name,
-        results=capacity_records(result),
+        results=list(_results(result)),
         verdicts=[_verdict(verdict, result) for verdict in verdicts],
     )
 

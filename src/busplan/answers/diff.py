@@ -8,7 +8,7 @@ from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, D
 from busplan.answers.changes import change_document, change_table
 from busplan.answers.diff_headline import STATES, headline, named
 from busplan.answers.documents import document
-from busplan.answers.verdict import not_applicable
+from busplan.answers.verdict import execution_grades, not_applicable
 from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
@@ -152,7 +152,7 @@ def _notes(found: Difference) -> Iterator[Sentence]:
     """Say why a circle fails or has no figures, and how well the inputs of the figures are known."""
     for side, profile in zip("AB", (found.a, found.b), strict=True):
         yield from (joined(sentence(f"{side}:"), one) for one in not_applicable(profile))
-    executions = (found.a.node.execution.grade, found.b.node.execution.grade)
+    executions = (execution_grades(found.a), execution_grades(found.b))
     yield from _graded("execution time behind these figures is", *executions)
     if found.circles is None:
         return
@@ -170,7 +170,7 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
     if a or b:
         of_a, of_b = a or "not graded", b or "not graded"
         text = of_a if of_a == of_b else f"{of_a} in A and {of_b} in B"
-        yield sentence(f"The {words} {text}.", state="warns" if "assumed" in (a, b) else "neutral")
+        yield sentence(f"The {words} {text}.", state="warns" if "assumed" in text else "neutral")
 
 
 def _row(one: ComparedFigure, at: str) -> TableRow:

@@ -5,13 +5,15 @@ from functools import partial
 from typing import Final
 
 from busplan.analysis.capacity.figures import capacity
+from busplan.analysis.capacity.sensitivity import sensitivities
 from busplan.analysis.capacity.verdict import verdicts
-from busplan.analysis.derivation.capacity import OF_DOCUMENT
+from busplan.analysis.derivation.capacity import OF_DOCUMENT, OF_SENSITIVITY
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
 from busplan.analysis.derivation.origin import DIGITS, short
 from busplan.answers.assumptions import INPUT_COLUMNS, input_cells
 from busplan.answers.capacity import capacity_document
 from busplan.answers.documents import document, with_profile
+from busplan.answers.sensitivity import sensitivity_document
 from busplan.forms import blocks
 from busplan.forms.blocks import (
     Block,
@@ -34,6 +36,8 @@ from busplan.forms.numbers import figure_text, period_value
 from busplan.printable import json_text
 
 _NONE: Final = Words("none")
+_NAMING: Final = ("name", "source", "input", "change")
+"""Keys that name a part of a value, the first that it has."""
 _SYMBOL: Final = TableColumn("symbol", kind="words")
 
 
@@ -61,10 +65,15 @@ def _in_words(explanation: Explanation) -> Explanation:
 
 
 def _with_words(one: Derivation, explanation: Explanation) -> Derivation:
-    if one.figure.key not in (*OF_DOCUMENT, "text", "warnings", "cheapest_change"):
+    key = one.figure.key
+    if key not in (*OF_DOCUMENT, *OF_SENSITIVITY, "text", "warnings", "cheapest_change"):
         return one
     result = capacity(explanation.profile, periods_us=[one.period_us])
-    value = capacity_document(result, verdicts(result))["verdicts"][0][one.figure.key]
+    if key in OF_SENSITIVITY:
+        found = sensitivity_document(result, verdicts(result), sensitivities(result))
+    else:
+        found = capacity_document(result, verdicts(result))
+    value = found["verdicts"][0][key]
     *before, last = one.steps
     return one._replace(value=value, steps=(*before, last._replace(value=value)))
 
@@ -147,11 +156,14 @@ def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
 def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Words:
     if value is None or value in ([], {}):
         return _NONE
+    if isinstance(value, dict) and "text" in value:
+        return Words(value["text"])
     if isinstance(value, dict):
         changes = value.get("changes", value)
         return Words(", ".join(f"{changed} = {new}" for changed, new in changes.items()))
     if isinstance(value, list) and _has_names(value):
-        return Words(", ".join(str(one.get("name", one.get("source", one.get("input")))) for one in value))
+        names = (next(one[key] for key in _NAMING if key in one) for one in value)
+        return Words(", ".join(names))
     return ShownValue(value, key, unit, digits=DIGITS, at=at)
 
 

@@ -52,10 +52,10 @@ def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
 
 def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:
     """Each transaction with the number of its table and its index; a repeated one begins a new table."""
-    seen: set[tuple[str, str]] = set()
+    seen: set[tuple[str, str, str]] = set()
     number = 0
     for place, one in enumerate(transactions):
-        key = (one.timing_model, one.transaction)
+        key = (one.timing_model, one.transaction, one.group)
         if key in seen:
             number, seen = number + 1, set()
         seen.add(key)
@@ -64,7 +64,8 @@ def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, T
 
 def _column(one: Transaction) -> TableColumn:
     payload = "" if one.payload_bytes is None else f" {one.payload_bytes} B"
-    return TableColumn(one.timing_model, group=f"{one.transaction}{payload}")
+    group = f"{one.group} " if one.group else ""
+    return TableColumn(one.timing_model, group=f"{group}{one.transaction}{payload}")
 
 
 def _over(result: LatencyResult, profile: Profile) -> list[str]:
@@ -83,6 +84,8 @@ def latency_records(result: LatencyResult) -> list[Record]:
 def _record(transaction: Transaction) -> Record:
     record = transaction._asdict()
     phases = record.pop("phases")
+    if not transaction.group:
+        del record["group"]
     return {**record, **phases}
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
 from busplan.analysis.capacity.cycle import TIME
-from busplan.analysis.capacity.figures import CapacityFigures
+from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import changeable
@@ -73,7 +73,8 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
             figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
         )
     yield _carries(figures, at=at)
-    yield _advice(verdict, profile, places)
+    if verdict.change is not None or not (verdict.all_well and profile.group):
+        yield _advice(verdict, profile, places)
     yield from execution_sentence(profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
 
@@ -100,10 +101,20 @@ def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Se
 
 def execution_sentence(profile: Profile) -> Iterator[Sentence]:
     """Say how the execution time behind the figures is known; nothing if there is no grade or none on the bus."""
-    grade = profile.node.execution.grade
-    if grade is not None and bus_of(profile).has_execution(network_of(profile)):
-        text = f"The execution time behind these figures is {grade}."
-        yield sentence(text, state="warns" if grade == "assumed" else "neutral")
+    grades = execution_grades(profile)
+    if grades is not None and bus_of(profile).has_execution(network_of(profile)):
+        text = f"The execution time behind these figures is {grades}."
+        yield sentence(text, state="warns" if "assumed" in grades else "neutral")
+
+
+def execution_grades(profile: Profile) -> str | None:
+    """Grade of the execution time; where groups differ, each with the groups that have it. None without a grade."""
+    names: dict[str, list[str]] = {}
+    for one in profile.alike_nodes:
+        names.setdefault(one.node.execution.grade or "without a grade", []).append(one.name)
+    if len(names) == 1:
+        return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
+    return ", ".join(f"{grade} of {' and '.join(each)}" for grade, each in names.items())
 
 
 def _place(at: str, key: str) -> str:
@@ -247,12 +258,22 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
 
 def _carries(figures: CapacityFigures, *, at: str) -> Sentence:
     safely = "" if figures.safe else " on a bus that is set safely"
+    if figures.groups:
+        each = (
+            sentence(f"{one.name} up to {{}} {nouns(one.safe_nodes or 0, 'node')} ({one.safe_limited_by})", _safe(one))
+            for one in figures.groups
+        )
+        return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*each, by=", ").parts, "."))
     return Sentence(
         (
             *(f"Shown to fit{safely}: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0, at=at).parts),
             f", limited by {figures.safe_limited_by}.",
         )
     )
+
+
+def _safe(one: GroupCapacity) -> ShownValue:
+    return count_value(one.safe_nodes or 0)
 
 
 def _nodes(nodes: int, axes: int, *, at: str = "") -> Sentence:

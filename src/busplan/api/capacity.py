@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from busplan.analysis.capacity import figures as analysis
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures
+from busplan.analysis.capacity.sensitivity import Sensitivity, sensitivities
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.answers.capacity import capacity_report
 from busplan.api.answer import Answer
@@ -25,11 +26,14 @@ class CapacityAnswer(Answer):
         Figures of each period, one set for each timing model.
     verdicts
         One verdict for each period.
+    sensitivities
+        What moves the margin, one for each period; empty if it was not asked for.
     """
 
     profile: Profile
     periods: tuple[tuple[CapacityFigures, ...], ...]
     verdicts: tuple[Verdict, ...]
+    sensitivities: tuple[Sensitivity, ...] = ()
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
@@ -37,7 +41,11 @@ class CapacityAnswer(Answer):
         return self._found.results
 
     def _report(self) -> Report:
-        return capacity_report(self._found, self.verdicts)
+        if not self.sensitivities:
+            return capacity_report(self._found, self.verdicts)
+        from busplan.answers.sensitivity import sensitivity_report
+
+        return sensitivity_report(self._found, self.verdicts, self.sensitivities)
 
     @property
     def _found(self) -> Capacity:
@@ -49,6 +57,7 @@ def capacity(
     *,
     periods_us: Iterable[float] | None = None,
     timing_models: Iterable[str] | None = None,
+    sensitivity: bool = False,
 ) -> CapacityAnswer:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
@@ -61,11 +70,15 @@ def capacity(
     timing_models
         Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
         paper's equations as published, and "standard" for the standard's clock and packets.
+    sensitivity
+        If True, `sensitivities` say what moves the margin: by how much each small change of the network does, by the
+        timing model that decides, and what binds next.
 
     Returns
     -------
     CapacityAnswer
-        Its `results` have n entries for each timing model, its `verdicts` n. Times are in us, shares are 0..1.
+        Its `results` have n entries for each timing model, its `verdicts` n, its `sensitivities` n or none. Times are
+        in us, shares are 0..1.
 
     Raises
     ------
@@ -84,6 +97,11 @@ def capacity(
     [('paper', True, 8), ('standard', False, 4)]
     >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
     (False, 'does not fit')
+    >>> (found,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
+    >>> [(one.change, round(one.margin_change_us, 1)) for one in found.effects[:2]]
+    [('one node more', -128.1), ('one busy retry more', -28.0)]
+    >>> found.next_bottleneck.next_binding_term.name
+    'idle'
     """
     network = load_profile(profile)
     found = analysis.capacity(
@@ -91,4 +109,4 @@ def capacity(
         periods_us=None if periods_us is None else items(periods_us, name="periods_us"),
         timing_models=checked_models(timing_models, network),
     )
-    return CapacityAnswer(*found, verdicts=verdicts(found))
+    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found) if sensitivity else ())

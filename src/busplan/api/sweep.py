@@ -21,7 +21,7 @@ from busplan.analysis.sweep.circles import (
 )
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
 from busplan.answers.sweep.rows import json_footer, json_header, json_rows
-from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS, Tally, TopRows, sweep_report
+from busplan.answers.sweep.top import CIRCLE_COLUMNS, Tally, TopRows, default_columns, sweep_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
 from busplan.errors import BusplanError
@@ -86,7 +86,7 @@ class SweepAnswer(Answer):
 
     def _report(self) -> Report:
         circle = [name for name in CIRCLE_COLUMNS if name in self.columns]
-        shown = dict.fromkeys((*self.grid.axes, "timing_model", *DEFAULT_COLUMNS, *circle))
+        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.profile), *circle))
         top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
         tally = Tally(self.profile, self.grid, self.timing_models)
         for block in self.blocks:
@@ -167,7 +167,7 @@ def sweep(
         )
     grid = checked_grid(
         network,
-        {key: _values(network, key, given) for key, given in vary.items()},
+        {key: axis_values(network, key, given, name="vary") for key, given in vary.items()},
         with_circle=with_circle,
         option="vary",
         circle_option="with_circle=True",
@@ -185,11 +185,29 @@ def sweep(
     return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=with_circle), tuple(blocks))
 
 
-def _values(profile: Profile, key: str, given: str | Iterable[object]) -> Values:
-    words = words_of(profile.bus.kind, key)
+def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
+    """Values of a key: text as on the command line, a range, or several values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    key
+        Dotted key.
+    given
+        The values.
+    name
+        Name of the argument in messages.
+
+    Raises
+    ------
+    BusplanError
+        Not values of the key.
+    """
+    words = words_of(profile, key)
     if isinstance(given, str):
-        return parse_values(given, name=f"vary {key}={given}", words=words)
-    name = f"vary {key}"
+        return parse_values(given, name=f"{name} {key}={given}", words=words)
+    name = f"{name} {key}"
     return (
         stepped(given, name=name)
         if isinstance(given, range)

@@ -141,6 +141,18 @@ class Setting(NamedTuple):
     """Why there is none."""
 
 
+class Perturbation(NamedTuple):
+    """A small change of a profile, made to see what it does to the margin."""
+
+    label: str
+    changes: Mapping[str, Value]
+    """New value by dotted key."""
+    why_not: str = ""
+    """Why it cannot be made here; empty where it can."""
+    if_nothing: str = ""
+    """Why the margin stays as it is, where it does."""
+
+
 class PayloadRange(NamedTuple):
     """Payloads that a plan may choose from: the largest, and the step between them."""
 
@@ -177,6 +189,13 @@ class BusLatency(NamedTuple):
     payload_bytes: Number | None
     phases: Mapping[str, Number]
     """Figures by key, which are among the kind's `latency_figures`."""
+    group: str = ""
+    """Of which group of nodes; empty where all are alike."""
+
+    @property
+    def label(self) -> str:
+        """What it is called beside the others."""
+        return f"{self.group} {self.name}" if self.group else self.name
 
 
 class Halves(NamedTuple):
@@ -246,8 +265,8 @@ class BusCycle(ABC):
     def events(self) -> Iterator[BusEvent]:
         """The same cycle laid out, of plain numbers only."""
 
-    def figures(self) -> Mapping[str, Number]:
-        """The kind's own figures beside the terms, by key."""
+    def figures(self) -> Mapping[str, Number | None]:
+        """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
         return {}
 
     def latencies(self) -> tuple[BusLatency, ...]:
@@ -306,8 +325,8 @@ class Bus(ABC):
     """Keys of a profile whose default is a figure with a source."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""
-    choosing_keys: ClassVar[tuple[str, ...]] = ("node.execution.grade",)
-    """Keys whose word chooses between numbers by `choose`, so that a derivation has them among its inputs."""
+    choosing_keys: ClassVar[tuple[str, ...]] = ("execution.grade",)
+    """Keys of a node whose word chooses between numbers by `choose`, so that a derivation has them among its inputs."""
     warning_keys: ClassVar[tuple[str, ...]] = ()
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()
@@ -316,10 +335,10 @@ class Bus(ABC):
     """What a change of a key means on the machine, where the key does not say so."""
     reset_changes: ClassVar[Mapping[str, Value]] = {}
     """Keys as they are after a bus reset, until somebody sets them again."""
+    term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
+    """What would take a term of its own out of the cycle, each new values by dotted key."""
     change_words: ClassVar[Mapping[str, str]] = {}
     """How a table of plans writes a key with its value: a format of the value."""
-    way_charged: ClassVar[str] = "every node alike"
-    """Which way on the wire each node is charged, as drawings of a cycle say it."""
 
     @abstractmethod
     def profile_model(self) -> "type[Profile]":
@@ -338,8 +357,21 @@ class Bus(ABC):
         """Say whose latency it is."""
         return ", ".join(("the whole cycle", *self.setup_words(network)))
 
-    def halves(self, network: Network, *, model: str, kind: str, payload_bytes: int) -> Halves:  # noqa: ARG002
+    def halves(self, network: Network, *, group: str, model: str, kind: str, payload_bytes: int) -> Halves:  # noqa: ARG002
         """What a transaction's packets take.
+
+        Parameters
+        ----------
+        network
+            The network.
+        group
+            Name of the group of nodes.
+        model
+            Timing model.
+        kind
+            Name of the transaction.
+        payload_bytes
+            Its payload [bytes].
 
         Raises
         ------
@@ -372,9 +404,17 @@ class Bus(ABC):
         """What of the bus a plan may turn; it is asked again after each change of the network."""
         return ()
 
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:  # noqa: ARG002 - a kind may have none
+        """Small changes that only this kind of bus has, beside those of every kind."""
+        return ()
+
     @abstractmethod
     def payloads(self, network: Network) -> PayloadRange:
         """Payloads that a plan may choose from."""
+
+    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - most charge all alike
+        """Say which way on the wire each node is charged."""
+        return "every node alike"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:  # noqa: ARG002 - a kind may have none
         """How the bus is set, each in a few words."""

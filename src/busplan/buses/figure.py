@@ -26,8 +26,15 @@ Ink = Literal[
     "idle",
     "in",
     "out",
+    "fits",
+    "unsure",
+    "short",
+    "barred",
+    "unsafe",
+    "uneven",
+    "unjudged",
 ]
-"""What a stretch of time is to the reader of a drawing: its colour."""
+"""What a stretch of time, or a setting of a map, is to the reader of a drawing: its colour."""
 
 _UNITS: Final = {
     "_mm_per_min": "mm/min",
@@ -286,6 +293,8 @@ VERDICT_FIGURES: Final = (
     Figure("cheapest_change", "change", _CYCLE, "cheapest change that makes it fit, or carries more nodes"),
     Figure("warnings", "warnings", "table", "what to beware of, whatever the verdict", sort="words"),
     Figure("text", "text", _CYCLE, "the verdict in words", sort="word"),
+    Figure("sensitivity", "sensitivity", _CERTAINTY, "how small changes move the corrected margin, the largest first"),
+    Figure("next_bottleneck", "next bottleneck", _CERTAINTY, "what binds once the largest term or the limit is gone"),
 )
 """Figures of the verdict, which belong to no one timing model."""
 

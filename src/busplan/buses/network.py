@@ -4,13 +4,14 @@ from functools import reduce
 from typing import Any, NamedTuple
 
 from busplan.elementwise import Number, larger, total
+from busplan.sections.alike_nodes import AlikeNodes
 
 
 class Group(NamedTuple):
     """Nodes that are alike. The numbers may be of any sort."""
 
-    node: Any
-    """What the profile says of one of them, of its kind's own model: how it executes and answers."""
+    said: AlikeNodes
+    """What the profile says of them."""
     nodes: Number
     """How many [1]."""
     axes: Number
@@ -29,8 +30,18 @@ class Group(NamedTuple):
     """Standard uncertainty of the execution time of a read [us]."""
     write_uncertainty_us: Number = 0.0
     """Standard uncertainty of the execution time of a write [us]."""
-    name: str = ""
-    """Name of the group; empty for the nodes of [node]."""
+    members: tuple[AlikeNodes, ...] = ()
+    """The profile's groups that are alike in all but their names, side by side."""
+
+    @property
+    def node(self) -> Any:
+        """What the profile says of one of them, of its kind's own model: how it executes and answers."""
+        return self.said.node
+
+    @property
+    def name(self) -> str:
+        """Name of the group, or names of its members; empty for the nodes of [node]."""
+        return " and ".join(one.name for one in self.members or (self.said,))
 
     def key(self, name: str) -> str:
         """Dotted key of what the profile says of its nodes.
@@ -40,7 +51,7 @@ class Group(NamedTuple):
         name
             The key within it, as "execution.worst_extra_us".
         """
-        return f"group.{self.name}.{name}" if self.name else f"node.{name}"
+        return self.said.node_key(name)
 
 
 class Network(NamedTuple):
@@ -52,6 +63,8 @@ class Network(NamedTuple):
     period_us: Number
     slice_ratio: Number
     nonperiodic_us: Number
+    asked: str | None = None
+    """Name of the profile's group that `with_nodes` changes; None where groups differ and none has been chosen."""
 
     @property
     def nodes(self) -> Number:
@@ -69,7 +82,49 @@ class Network(NamedTuple):
         sizes = [size for group in self.groups for size in (group.read_bytes, group.write_bytes)]
         return reduce(larger, sizes)
 
+    def asking(self, name: str) -> "Network":
+        """The same network, asked how many nodes one of the profile's groups may have.
+
+        Parameters
+        ----------
+        name
+            Name of the group; empty for the nodes of [node].
+        """
+        return self._replace(asked=name)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the profile's groups, in the order of the chain; one empty name for the nodes of [node]."""
+        return tuple(one.name for one in self.alike)
+
+    @property
+    def alike(self) -> tuple[AlikeNodes, ...]:
+        """The profile's groups, in the order of the chain."""
+        return tuple(one for group in self.groups for one in group.members or (group.said,))
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether the profile has no groups: all nodes are those of [node]."""
+        return self.names == ("",)
+
+    @property
+    def asked_nodes(self) -> AlikeNodes:
+        """The nodes that `with_nodes` changes the number of."""
+        return next(one for one in self.alike if one.name == self.asked)
+
     def with_nodes(self, nodes: Number) -> "Network":
-        """The same network with another number of nodes in its one group."""
-        (group,) = self.groups
-        return self._replace(groups=(group._replace(nodes=nodes),))
+        """The same network with another number of nodes in the group that it is asked for.
+
+        Parameters
+        ----------
+        nodes
+            Nodes of that group; of any sort [1].
+        """
+        return self._replace(groups=tuple(self._with_nodes(group, nodes) for group in self.groups))
+
+    def _with_nodes(self, group: Group, nodes: Number) -> Group:
+        members = group.members or (group.said,)
+        if all(one.name != self.asked for one in members):
+            return group
+        others = [one.nodes for one in members if one.name != self.asked]
+        return group._replace(nodes=total((nodes, *others)) if others else nodes)

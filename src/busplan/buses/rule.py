@@ -40,12 +40,16 @@ class RuleFigures(Protocol):
         """What is left of the slice [us]."""
 
     @property
-    def max_nodes(self) -> int:
-        """Most nodes that fit [1]."""
+    def max_nodes(self) -> int | None:
+        """Most nodes that fit [1]; None of groups, each of which has its own."""
 
     @property
     def safe_nodes(self) -> int | None:
-        """Most nodes that are shown to fit [1]; of the model that decides."""
+        """Most nodes that are shown to fit [1]; of the model that decides, and None of groups."""
+
+    @property
+    def groups(self) -> Sequence[Any]:
+        """The counts of each group of nodes; empty where all are alike."""
 
     @property
     def verdict(self) -> str | None:

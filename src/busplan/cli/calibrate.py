@@ -42,6 +42,15 @@ def calibrate_command(
             show_default=False,
         ),
     ] = None,
+    group: Annotated[
+        str | None,
+        typer.Option(
+            "--group",
+            metavar="NAME",
+            help="The group of nodes that was measured, of a profile with groups.  [default: its one group]",
+            show_default=False,
+        ),
+    ] = None,
     timing: Annotated[
         str | None,
         typer.Option(
@@ -71,8 +80,8 @@ def calibrate_command(
         bool,
         typer.Option(
             "--apply",
-            help="Write [node.execution] into PROFILE, a file, with a comment where it is from, which replaces "
-            "comments on the origin of the old values; the rest stays.",
+            help="Write [node.execution], or that of the group, into PROFILE, a file, with a comment where it is from, "
+            "which replaces comments on the origin of the old values; the rest stays.",
         ),
     ] = False,
     format_: FormatOption = None,
@@ -113,6 +122,7 @@ def calibrate_command(
             bench,
             parse_measurements(read_bytes(path, name=name, limit=MAX_MEASUREMENTS_BYTES), name=name),
             source=name,
+            group=group,
             timing_model=None if timing is None else timing_model(timing, bench),
             form=form,
             robust=robust,
@@ -127,12 +137,12 @@ def calibrate_command(
                 for key in found:
                     require_separate(one, key, typed="--apply")
             asked = {one.key: one.value for one in changes.by_set}
-            apply_changes(loaded.document, {**asked, **found}, notes={said.SECTION: note})
-            gone = origin_comments(loaded.document, said.SECTION)
+            apply_changes(loaded.document, {**asked, **found}, notes={said.section(result): note})
+            gone = origin_comments(loaded.document, said.section(result))
             kept = "every comment of yours is kept"
             if gone:
                 kept = f"the new comment on their origin replaces {plural(len(gone), 'line')}: {' '.join(gone)}"
-            say(f"wrote {', '.join((f'[{said.SECTION}]', *asked))} of {profile}; {kept}")
+            say(f"wrote {', '.join((f'[{said.section(result)}]', *asked))} of {profile}; {kept}")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
 

@@ -1,5 +1,9 @@
 """`busplan capacity`."""
 
+from typing import Annotated
+
+import typer
+
 from busplan.cli.answering import answer
 from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
@@ -19,6 +23,15 @@ def capacity_command(
     period: PeriodsOption = None,
     changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
+    sensitivity: Annotated[
+        bool,
+        typer.Option(
+            "--sensitivity",
+            help="Also tell what moves the margin: 10% more execution time, one node, one axis, 4 bytes, one hop or "
+            "one retry more, 10 us more host time, or a bus reset, each alone; and what binds next. CSV then has these "
+            "rows.",
+        ),
+    ] = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -33,8 +46,15 @@ def capacity_command(
     with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
         from busplan.analysis.capacity.figures import capacity
         from busplan.analysis.capacity.verdict import verdicts
-        from busplan.answers.capacity import capacity_report
 
         plan = load_changed(profile, changes)
         result = capacity(plan, periods_us=periods_us(period, plan), timing_models=timing_models(timing, plan))
-        give(capacity_report(result, verdicts(result)))
+        if sensitivity:
+            from busplan.analysis.capacity.sensitivity import sensitivities
+            from busplan.answers.sensitivity import sensitivity_report
+
+            give(sensitivity_report(result, verdicts(result), sensitivities(result)))
+        else:
+            from busplan.answers.capacity import capacity_report
+
+            give(capacity_report(result, verdicts(result)))

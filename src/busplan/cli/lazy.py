@@ -19,6 +19,7 @@ COMMANDS: Final = (
     "calibrate",
     "plan",
     "timeline",
+    "map",
     "sweep",
     "check",
     "diff",

@@ -12,6 +12,7 @@ from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import ALL_MODELS, ProfileArgument, TimingOption, form_of_file, output_option, plot_format
 from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
+from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl"})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "safe_axes"
+_FIGURE_OF_GROUPS: Final = "margin_corrected_us"
 
 
 @takes_changes(words="Not of a key that varies.")
@@ -33,10 +35,8 @@ def sweep_command(
         typer.Option(
             "--vary",
             metavar="KEY=VALUES",
-            help="A key of the profile in numbers, and its values in the profile's unit: 250,500,1000 or a range "
-            "A:B (in steps of 1), A:B:STEP, A:B:*FACTOR, A:B:#COUNT (evenly, both ends). Words that the key takes, "
-            "as optimal, may be among the values. Given several times, every combination is computed; the last key "
-            "changes fastest.  [required]",
+            help=f"A key of the profile in numbers, and its values in the profile's unit: {VALUES_HELP} Given several "
+            "times, every combination is computed; the last key changes fastest.  [required]",
             show_default=False,
         ),
     ] = None,
@@ -90,7 +90,7 @@ def sweep_command(
         typer.Option(
             "--figure",
             metavar="COLUMN",
-            help="What --plot draws, by its name in --columns.  [default: safe_axes]",
+            help="What --plot draws, by its name in --columns.  [default: safe_axes; of groups margin_corrected_us]",
             show_default=False,
         ),
     ] = None,
@@ -128,9 +128,6 @@ def sweep_command(
     for option, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{option} {number}: must be 1 or more")
-    # Imported here, because --help imports the top of this module.
-    from busplan.cli.vary import parse_axes
-
     kept = None if output is None else partial_path(output)
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
@@ -139,7 +136,7 @@ def sweep_command(
     from busplan.cli.sweep_run import available_processors, run_sweep
 
     loaded = load_changed(profile, changes)
-    axes = parse_axes(vary or [], kind=loaded.bus.kind)
+    axes = parse_axes(vary or [], profile=loaded)
     for one in changes.each:
         for key in axes:
             require_separate(one, key, typed=f"--vary {key}")
@@ -147,7 +144,7 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    drawn = figure or _DEFAULT_FIGURE
+    drawn = figure or (_FIGURE_OF_GROUPS if loaded.group else _DEFAULT_FIGURE)
     _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
     run_sweep(
         SweepJob(
@@ -222,9 +219,9 @@ def _columns(
             if name not in known:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
     elif short:
-        from busplan.answers.sweep.top import CIRCLE_COLUMNS, DEFAULT_COLUMNS
+        from busplan.answers.sweep.top import CIRCLE_COLUMNS, default_columns
 
-        chosen = DEFAULT_COLUMNS + (CIRCLE_COLUMNS if circle else ())
+        chosen = default_columns(profile) + (CIRCLE_COLUMNS if circle else ())
     else:
         chosen = known
     return tuple(dict.fromkeys((*front, *chosen, *([sort_by] if sort_by else []))))

@@ -14,8 +14,8 @@ from busplan.errors import BusplanError, WorkerLostError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import SweepBlock
-    from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.cli.sweep_job import SweepJob
+    from busplan.cli.workers import Map
     from busplan.drawings.sweep_plot import FigureData
 
 _CIRCLES_AT_ONCE: Final = 4
@@ -125,22 +125,26 @@ def _blocks(job: "SweepJob") -> "Iterator[Iterable[SweepBlock]]":
         chunk_points = TEXT_POINTS if job.form in ROWS_FORMS else CHUNK_POINTS
         yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=chunk_points)
         return
-    from busplan.analysis.sweep.circles import with_circles
+    from busplan.analysis.sweep.circles import run_task, with_circles
 
     few = sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=_CIRCLES_AT_ONCE * job.jobs)
-    with _circle_runner(min(job.jobs, job.grid.points)) as run:
-        yield (with_circles(job.profile, block, run=run) for block in few)
+    with mapper(min(job.jobs, job.grid.points)) as map_:
+        yield (with_circles(job.profile, block, run=lambda tasks: map_(run_task, tasks)) for block in few)
 
 
 @contextmanager
-def _circle_runner(jobs: int) -> "Iterator[Callable[[Iterable[CircleTask]], Iterable[Figures]]]":
-    """Give a function that runs circle tests here, or in other processes."""
-    from busplan.analysis.sweep.circles import run_task
+def mapper(jobs: int) -> "Iterator[Map]":
+    """Give a `map` that works here, or in other processes.
 
+    Parameters
+    ----------
+    jobs
+        Number of processes [1].
+    """
     if jobs == 1:
-        yield lambda tasks: map(run_task, tasks)
+        yield lambda function, tasks: list(map(function, tasks))
         return
     from busplan.cli.workers import workers
 
     with workers(jobs) as map_:
-        yield lambda tasks: map_(run_task, tasks)
+        yield map_

@@ -13,12 +13,12 @@ from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, tak
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     ProfileArgument,
-    form_of_file,
     output_option,
     time_us,
     timing_model,
 )
-from busplan.cli.output import refuse_terminal, write_document
+from busplan.cli.output import write_document
+from busplan.cli.pictures import picture_form
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -101,7 +101,7 @@ def timeline_command(
 
     Example: busplan timeline paper-4ms --transaction read:1
     """
-    chosen = _form(format_, output)
+    chosen = picture_form(format_, output, forms=_ENDINGS)
     from_us = None if from_ is None else time_us(from_, option="--from")
     to_us = None if to is None else time_us(to, option="--to")
     if from_us is not None and to_us is not None and from_us >= to_us:
@@ -127,22 +127,10 @@ def timeline_command(
                 give(timeline_report(shown()))
 
 
-def _form(format_: TimelineForm | None, output: Path | None) -> TimelineForm:
-    """Form by --format or the file's ending; fail before the work if it cannot be drawn."""
-    chosen = form_of_file(format_, output, forms=_ENDINGS, default="table")
-    if chosen == "png":
-        if output is None:
-            refuse_terminal("png")
-        from busplan.drawings.circle_plot import require_matplotlib
-
-        require_matplotlib("--format png")
-    return chosen
-
-
 def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
-    from busplan.analysis.network import bus_of
+    from busplan.analysis.network import bus_of, network_of
 
-    match, nodes = _TRANSACTION.fullmatch(text), plan.bus.nodes
+    match, nodes = _TRANSACTION.fullmatch(text), int(network_of(plan).nodes)
     kinds = [one.key for one in bus_of(plan).stretch_kinds]
     if match is None or match["kind"] not in kinds or not 1 <= int(match["node"]) <= nodes:
         expected = (

@@ -6,13 +6,12 @@ from math import ceil, floor, log10
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.analysis.capacity.node_steps import NodeSteps
+from busplan.analysis.capacity.node_steps import NodeSteps, telling_periods
 from busplan.analysis.network import network_of
 from busplan.forms.blocks import Drawing
 from busplan.forms.numbers import period, plural
 from busplan.forms.scale import round_steps
 from busplan.forms.svg import drawing, markup, text_at
-from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
 
 _TOP: Final = 50
@@ -64,7 +63,7 @@ class AxesDrawing(Drawing):
         root = drawing("Most axes over the communication period, under each timing model", css="chart axes")
         root.set("height", str(_TOP + _HEIGHT + _BELOW))
         own_us, own_axes = profile.cycle.period_us, int(network_of(profile).axes)
-        from_us, to_us = drawn_range(profile, steps)
+        from_us, to_us = telling_periods(profile, steps)
         plane = _Plane(from_us, to_us, max(own_axes, *(one.max_axes(to_us) for one in steps)))
         _grid(root, plane)
         stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
@@ -77,17 +76,6 @@ class AxesDrawing(Drawing):
         for css, one in zip(_CSS, steps, strict=False):
             _mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
         return markup(root)
-
-
-def drawn_range(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:
-    """Range of periods: from the first that carries a node to where the profile's nodes fit, at least twice its own."""
-    own_us, nodes = profile.cycle.period_us, int(network_of(profile).nodes)
-    all_us = [one.from_us for one in steps if one.from_us]
-    lasts = [times_us[-1] * 1.25 for times_us in all_us]
-    needed = [times_us[min(nodes, len(times_us)) - 1] * 1.25 for times_us in all_us]
-    to_us = max(2 * own_us, *needed, min(4 * own_us, max(lasts, default=0.0)), 0.0)
-    from_us = min(own_us, *(times_us[0] for times_us in all_us), to_us / 4) / 1.25
-    return from_us, min(to_us, 4 * MAX_TIME_US)
 
 
 def _step(most: int) -> int:

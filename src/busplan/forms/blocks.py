@@ -151,6 +151,8 @@ class Drawing(ABC):
     stylesheet: ClassVar[str] = ""
     """CSS of its SVG, included once in a page."""
     shape: ClassVar[Literal["wide", "round"]] = "wide"
+    is_text_in_markdown: ClassVar[bool] = False
+    """If True, Markdown shows it in characters where it is no Mermaid diagram."""
 
     @abstractmethod
     def svg(self) -> str | None:

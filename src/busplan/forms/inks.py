@@ -33,6 +33,13 @@ INKS: Final[Mapping[Ink, InkColours]] = MappingProxyType(
         "idle": InkColours("#e6eaef", "#252d38"),
         "in": InkColours("#4668a8", "#7c9fe0"),
         "out": InkColours("#2a9d8f", "#5cc9bb"),
+        "fits": InkColours("#6cc07a", "#5cab67"),
+        "unsure": InkColours("#f2c14e", "#dba82f"),
+        "short": InkColours("#d5dae0", "#8792a0"),
+        "barred": InkColours("#aab4c0", "#667282"),
+        "unsafe": InkColours("#ec7fb4", "#e377ad"),
+        "uneven": InkColours("#74aef7", "#6ea8f5"),
+        "unjudged": InkColours("#bfe3c4", "#a5d0ab"),
     }
 )
 """Colours by ink; the name of an ink is its CSS class."""

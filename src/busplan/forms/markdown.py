@@ -25,9 +25,12 @@ from busplan.forms.blocks import (
     Words,
 )
 from busplan.forms.columns import cell_text
+from busplan.forms.lines import plain_text
 from busplan.forms.markdown_words import code, escaped, table
 from busplan.forms.numbers import with_unit
 
+_TEXT_WIDTH: Final = 80
+"""Width of a drawing in characters, in columns."""
 _COMMENT_LEVEL: Final = 3
 """Title level of an answer that is not a page: it is read inside one, as in a comment on a change."""
 
@@ -71,6 +74,9 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
             drawn = block.drawing.mermaid()
             if drawn is not None:
                 yield from (*_caption(block.caption), "```mermaid", drawn.rstrip("\n"), "```")
+            elif block.drawing.is_text_in_markdown:
+                lines = block.drawing.characters(_TEXT_WIDTH) or ()
+                yield from (*_caption(block.caption), "```text", *plain_text(lines).splitlines(), "```")
         case Snippet():
             yield from (f"```{block.language}", *block.lines, "```")
         case Calculation():

@@ -1,5 +1,6 @@
 """Parts of every SVG: widths are in percent, so that it fills its container and text keeps its size."""
 
+from textwrap import wrap
 from typing import Final, Protocol
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -7,6 +8,10 @@ from busplan.forms.scale import ticks
 
 LINE: Final = 20
 """Height of a line of text."""
+PHONE: Final = 335
+"""Width of a phone without margins, in px."""
+_LINE_CHARACTERS: Final = 42
+"""Characters in a line of text: fits on a phone."""
 _NAMESPACE: Final = "http://www.w3.org/2000/svg"
 _TICKS: Final = 5
 _SHORT: Final = 6
@@ -49,6 +54,15 @@ def inside(parent: Element, *, x_percent: float, width_percent: float, y: int) -
 def text_at(parent: Element, text: str, *, x: str, y: int, css: str = "", anchor: str = "start") -> None:
     """Draw text at a place."""
     SubElement(parent, "text", {"x": x, "y": str(y), "class": css, "text-anchor": anchor}).text = text
+
+
+def paragraph(parent: Element, text: str, *, y: int, css: str) -> int:
+    """Draw wrapped text, and return the y below it."""
+    # Letters of other scripts may be twice as wide.
+    for line in wrap(text, _LINE_CHARACTERS if text.isascii() else _LINE_CHARACTERS // 2):
+        y += LINE
+        text_at(parent, line, x="0", y=y - 5, css=css)
+    return y
 
 
 def markup(root: Element) -> str:

@@ -16,7 +16,7 @@ import tomli_w
 from busplan.errors import BusplanError, PlacedError
 from busplan.printable import printable
 from busplan.profile.document import Document
-from busplan.profile.keys import flat, holder
+from busplan.profile.keys import flat, holder, path_of
 from busplan.profile.positions import KeyPath, Place
 from busplan.profile.toml import decode, validate
 from busplan.profile.write import value_text
@@ -143,28 +143,38 @@ def _by_hand(changed: Mapping[str, str | None], notes: Mapping[str, str]) -> Ite
         if section in notes:
             yield f"# {printable(notes[section])}"
         if section:
-            yield f"[{section}]"
+            yield _header_text(section)
         for key, text in changed.items():
             table, _, name = key.rpartition(".")
             if table == section:
                 yield f"# remove {name}" if text is None else f"{name} = {text}"
 
 
+def _header_text(section: str) -> str:
+    """Header of a section; in that of a group its place says which one it is."""
+    parts = section.split(".")
+    if parts[0] != "group" or len(parts) == 1:
+        return f"[{section}]"
+    _, name, *inner = parts
+    return f"[{'.'.join(('group', *inner))}]  # of {name}" if inner else f"[[group]]  # {name}"
+
+
 def _edited(
     document: Document, changed: Mapping[str, str | None], notes: Mapping[str, str], *, wanted: dict[str, str]
 ) -> str:
     """Make the changes one after the other."""
+    data = document.data()
     for section in notes:
         document = Document(document.name, _without_origins(document, section))
     for key, text in changed.items():
-        path = tuple(key.split("."))
+        path = path_of(data, key)
         if text is None:
             new = _without(document, path)
         else:
             new = (_replaced if path in document.places else _with_line)(document, path, text)
         document = Document(document.name, new)
     for section, note in notes.items():
-        document = Document(document.name, _noted(document, tuple(section.split(".")), note))
+        document = Document(document.name, _noted(document, path_of(data, section), note))
     if not _reads_to(document.text, wanted):
         raise _LayoutError("its sections are laid out in an unusual way")
     return document.text
@@ -185,6 +195,8 @@ def _with_line(document: Document, path: KeyPath, value: str) -> str:
     """Add a line to a section, or a new section at the end."""
     text, table, line = document.text, path[:-1], f"{path[-1]} = {value}\n"
     if table and table not in document.places:
+        if any(isinstance(part, int) for part in table):
+            raise _LayoutError("there is no section of a group to write to")
         return f"{_whole_lines(text)}\n[{'.'.join(map(str, table))}]\n{line}"
     own = [place for key, place in document.places.items() if key[:-1] == table and place.value_start > place.key_end]
     header = [_header(document, table)] if table else []  # every profile has keys above its sections
@@ -210,12 +222,12 @@ def origin_comments(document: Document, section: str) -> list[str]:
     measurement, a fit, a table, a paper, a date. Suppressions, keys that are commented out, and comments on other keys
     are none.
     """
-    return [document.text[start:end].strip() for start, end in _origins(document, tuple(section.split(".")))]
+    return [document.text[start:end].strip() for start, end in _origins(document, path_of(document.data(), section))]
 
 
 def _without_origins(document: Document, section: str) -> str:
     text = document.text
-    for start, end in reversed(_origins(document, tuple(section.split(".")))):
+    for start, end in reversed(_origins(document, path_of(document.data(), section))):
         line = _line_start(text, start)
         if text[line:start].strip():
             text = text[:line] + text[line:start].rstrip() + text[end:]

@@ -1,7 +1,7 @@
 """A profile as dotted keys with their values."""
 
-from collections.abc import Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
@@ -40,12 +40,72 @@ def dotted_keys(profile: Profile) -> dict[str, KeyValue]:
 
 
 def flat(table: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Yield dotted key and value of everything but tables."""
+    """Yield dotted key and value of everything but tables.
+
+    Of several tables of one key, the key of each is its name, and the names are the value of their key:
+
+    Examples
+    --------
+    >>> list(flat({"group": [{"name": "drives", "nodes": 2}]}))
+    [('group', ['drives']), ('group.drives.nodes', 2)]
+    """
     for name, value in table.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{prefix}{name}.")
+        elif (tables := named_tables(value)) is not None:
+            yield f"{prefix}{name}", list(tables)
+            for own, one in tables.items():
+                yield from flat({key: each for key, each in one.items() if key != NAME}, f"{prefix}{name}.{own}.")
         else:
             yield f"{prefix}{name}", value
+
+
+NAME: Final = "name"
+"""The key that tells several tables of one key apart."""
+
+
+def named_tables(value: object) -> dict[str, dict[str, Any]] | None:
+    """Tables of one key by their names; None if a value is no such list."""
+    if not isinstance(value, Sequence) or isinstance(value, str) or not value:
+        return None
+    tables = {str(one[NAME]): one for one in value if isinstance(one, dict) and NAME in one}
+    return tables if len(tables) == len(value) else None
+
+
+def path_of(data: Mapping[str, object], key: str) -> tuple[str | int, ...]:
+    """Path of a dotted key, with the place of a table among several of one key instead of its name.
+
+    Examples
+    --------
+    >>> path_of({"group": [{"name": "drives", "nodes": 2}]}, "group.drives.nodes")
+    ('group', 0, 'nodes')
+    """
+    path: list[str | int] = []
+    inner: object = data
+    for part in key.split("."):
+        tables = named_tables(inner)
+        if tables is not None and part in tables:
+            path.append(list(tables).index(part))
+            inner = tables[part]
+        else:
+            path.append(part)
+            inner = inner.get(part) if isinstance(inner, Mapping) else None
+    return tuple(path)
+
+
+def named_path(data: object, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    """The path with the name of a table among several of one key instead of its place, where it has one."""
+    found: list[str | int] = []
+    for part in path:
+        tables = named_tables(data)
+        if isinstance(part, int) and tables is not None and part < len(tables):
+            name = list(tables)[part]
+            found.append(name)
+            data = tables[name]
+        else:
+            found.append(part)
+            data = data.get(part) if isinstance(data, Mapping) else None
+    return tuple(found)
 
 
 def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[dict[str, Any], str]:
@@ -63,11 +123,25 @@ def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[
     Raises
     ------
     BusplanError
-        A part of the key is a value.
+        A part of the key is a value, or there is no table of that name.
     """
-    *tables, last = key.split(".")
-    for table in tables:
-        data = data.setdefault(table, {})
-        if not isinstance(data, dict):
-            raise BusplanError(f"{name or key}: no such key; {table} is a value, not a section")
-    return data, last
+    *sections, last = key.split(".")
+    found: object = data
+    for number, section in enumerate(sections):
+        tables = named_tables(found)
+        if tables is not None:
+            if section not in tables:
+                raise BusplanError(
+                    f"{name or key}: no {sections[number - 1]} is called {section}; there are {', '.join(tables)}"
+                )
+            found = tables[section]
+        elif isinstance(found, dict):
+            found = found.setdefault(section, {})
+        else:
+            raise BusplanError(f"{name or key}: no such key; {sections[number - 1]} is a value, not a section")
+    if not isinstance(found, dict):
+        tables = named_tables(found)
+        why = f"{sections[-1]} is a value, not a section"
+        known = f"give the name of one, as {sections[-1]}.{next(iter(tables))}.{last}" if tables else why
+        raise BusplanError(f"{name or key}: no such key; {known}")
+    return found, last

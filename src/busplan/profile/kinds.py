@@ -1,6 +1,7 @@
 """Model and keys of a profile, by its kind of bus."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from types import UnionType
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
@@ -14,6 +15,8 @@ _NO_PART_OF_A_CYCLE: Final = (*CIRCLE_SECTIONS, "limits")
 """Sections whose common keys no cycle depends on; a cycle may depend on keys that a kind of bus adds to them."""
 _OF_VERDICT: Final = ("limits.reserve",)
 """Keys of these sections that a verdict depends on."""
+_OF_GROUP: Final = ("name", "execution.kind")
+"""Keys of a group that say how the others are read."""
 _CHANGE_NO_FIGURE: Final = ("bus.kind", "bus.timing_model", "node.execution.kind")
 """Keys that say how the others are read, or what is shown first."""
 
@@ -39,42 +42,66 @@ def _fields(model: type[BaseModel], path: tuple[int | str, ...]) -> Iterator[Fie
     """Fields of a key, one for each member of a union that has it; for an element, the field of its array."""
     field = model.model_fields.get(str(path[0]))
     inner = [] if field is None else models_of(field.annotation)
-    if field is not None and (len(path) == 1 or not inner):
+    rest = path[2:] if len(path) > 1 and isinstance(path[1], int) else path[1:]
+    if field is not None and not (rest and inner):
         yield field
-    for one in inner if len(path) > 1 else []:
-        yield from _fields(one, path[1:])
+    for one in inner if rest else []:
+        yield from _fields(one, rest)
 
 
 def models_of(annotation: Any) -> list[type[BaseModel]]:
     """Models inside an annotation: the section itself, or each member of a union of sections."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    if get_origin(annotation) in (Union, UnionType, Annotated):
+    if get_origin(annotation) in (Union, UnionType, Annotated, tuple):
         return [model for part in get_args(annotation) for model in models_of(part)]
     return []
 
 
-def value_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Dotted keys of a model whose value is one number, word or truth, in the order of the schema."""
+def value_keys(model: type[BaseModel], groups: Sequence[str], prefix: str = "") -> Iterator[str]:
+    """Dotted keys of a model whose value is one number, word or truth, in the order of the schema.
+
+    Parameters
+    ----------
+    model
+        The model.
+    groups
+        Names of the groups that a profile has.
+    prefix
+        What stands before each key.
+    """
     for name, field in model.model_fields.items():
         inner = models_of(field.annotation)
-        for one in inner:
-            yield from value_keys(one, f"{prefix}{name}.")
+        sections = [f"{name}.{one}" for one in groups] if _are_several(field.annotation) else [name]
+        for section, one in product(sections, inner):
+            yield from value_keys(one, (), f"{prefix}{section}.")
         if not inner and (_is_number(field.annotation) or _words(field.annotation)):
             yield f"{prefix}{name}"
 
 
-def cycle_keys(kind: str) -> tuple[str, ...]:
-    """Keys that the cycle of a kind of bus, or its verdict, may depend on."""
-    others = {key for key in value_keys(Profile) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
-    keys = dict.fromkeys(value_keys(profile_model(kind)))
-    return tuple(key for key in keys if ("." in key and key not in {*others, *_CHANGE_NO_FIGURE}) or key in _OF_VERDICT)
+def cycle_keys(profile: Profile) -> tuple[str, ...]:
+    """Keys of a profile that its cycle, or its verdict, may depend on."""
+    groups = [one.name for one in profile.group]
+    others = {key for key in value_keys(Profile, ()) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
+    without = {*others, *_CHANGE_NO_FIGURE, *(f"group.{one}.{key}" for one in groups for key in _OF_GROUP)}
+    unused = ("node.", "payload.", "bus.nodes") if groups else ()
+    keys = dict.fromkeys(value_keys(profile_model(profile.bus.kind), groups))
+    read = (key for key in keys if "." in key and key not in without and not key.startswith(unused))
+    return (*read, *_OF_VERDICT)
 
 
-def words_of(kind: str, key: str) -> tuple[str, ...]:
-    """Words allowed for a key, instead of a number or alone; those of a truth are true and false."""
-    fields = _fields(profile_model(kind), tuple(key.split(".")))
+def words_of(profile: Profile, key: str) -> tuple[str, ...]:
+    """Words allowed for a key of a profile, instead of a number or alone; those of a truth are true and false."""
+    path = tuple(part for place, part in enumerate(key.split(".")) if not (place == 1 and key.startswith("group.")))
+    fields = _fields(profile_model(profile.bus.kind), path)
     return tuple(dict.fromkeys(text for one in fields for text in _words(one.annotation)))
+
+
+def _are_several(annotation: Any) -> bool:
+    """Whether a key has several tables."""
+    if get_origin(annotation) is Annotated:
+        return _are_several(get_args(annotation)[0])
+    return get_origin(annotation) is tuple
 
 
 def _is_number(annotation: Any) -> bool:

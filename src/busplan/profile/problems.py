@@ -12,9 +12,12 @@ from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem, ProblemKind
 from busplan.printable import printable
 from busplan.profile.document import Document
+from busplan.profile.keys import named_path, path_of
 from busplan.profile.kinds import is_of_a_kind, kind_of, models_of, profile_model
 from busplan.profile.positions import KeyPath
 from busplan.profile.write import value_text
+from busplan.sections.base import MISSING, Problem
+from busplan.sections.profile import nodes_problems
 
 _TAG: Final = "kind"
 """The key that selects the member of a union of tables."""
@@ -49,13 +52,15 @@ class KeyFinding(NamedTuple):
     kind: ProblemKind
     shows_value: bool = True
     """If True, the message shows the value."""
+    named: KeyPath = ()
+    """The path with the names of groups instead of their places."""
 
     @property
     def key(self) -> str:
         """The path as a dotted key, indexes in brackets: node.execution.time_us[0]."""
         return "".join(
             f"[{part}]" if isinstance(part, int) else f"{'.' if index else ''}{_quoted(part)}"
-            for index, part in enumerate(self.path)
+            for index, part in enumerate(self.named or self.path)
         )
 
 
@@ -79,13 +84,37 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
     KeyFinding
         One for each problem, in pydantic's order.
     """
+    found = dict.fromkeys((*_validated(error, data), *_of_nodes(data), *_unknown_kind(data)))
+    for one in found:
+        yield one._replace(named=named_path(data, one.path))
+
+
+def _of_nodes(data: dict[str, Any]) -> Iterator[KeyFinding]:
+    """Problems of how a profile says its nodes: the model looks for them only where there are no others."""
+    bus, model = data.get("bus"), profile_model(kind_of(data))
+    said = {"node", "payload", "group"}.intersection(data)
+    if not isinstance(bus, dict) or "nodes" in bus or kind_of(data) is None:
+        said.add("bus.nodes")  # or nobody can tell
+    for one in nodes_problems(said):
+        if one.key != "bus.nodes" or (isinstance(bus, dict) and kind_of(data) is not None):
+            yield _of_problem(one, (), model)
+
+
+def _of_problem(problem: Problem, path: KeyPath, model: type[BaseModel]) -> KeyFinding:
+    """Finding of a problem that a validator of ours reports at a path."""
+    own = (*path, *_parsed(problem.key)) if problem.key else path
+    if problem.message != MISSING:
+        return KeyFinding(own, problem.message, problem.kind, shows_value=problem.kind != "missing-key")
+    return KeyFinding(own, _missing(*_path(own, model)), problem.kind, shows_value=False)
+
+
+def _validated(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
     model = profile_model(kind_of(data))
     for details in error.errors(include_url=False):
         path, section = _path(details["loc"], model)
         if details["type"] == "busplan":
             for problem in details["ctx"]["problems"]:
-                own = _parsed(problem.key) if problem.key else path
-                yield KeyFinding(own, problem.message, problem.kind, shows_value=problem.kind != "missing-key")
+                yield _of_problem(problem, path, model)
         elif details["type"] == "missing":
             yield KeyFinding(path, _missing(path, section), "missing-key", shows_value=False)
         elif details["type"] == "extra_forbidden":
@@ -101,7 +130,6 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
         else:
             kind: ProblemKind = "wrong-type" if details["type"] in _WRONG_TYPE else "out-of-range"
             yield KeyFinding(path, _expected(details), kind)
-    yield from _unknown_kind(data)
 
 
 def _unknown_kind(data: dict[str, Any]) -> Iterator[KeyFinding]:
@@ -120,6 +148,8 @@ def _path(location: tuple[int | str, ...], model: type[BaseModel]) -> tuple[KeyP
             members = [one for one in members if part in _tag(one)]
             continue
         path.append(part)
+        if isinstance(part, int):
+            continue  # one of the tables of a key
         if members:
             section = members[0]
         field = section.model_fields.get(str(part)) if members else None
@@ -217,7 +247,7 @@ def refused_changes(
     """Make the error for changes of a profile; each problem names what set its key."""
     found = _unknown_kind(data) if error is None else findings(error, data)
     sources: dict[KeyPath, str] = {
-        tuple(key.split(".")): origin.get(key, f"{key} {value}") for key, value in changes.items()
+        path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
     return BusplanError(*(_of_changes(one, sources) for one in found))
 

@@ -25,25 +25,12 @@ name = {name}
 description = "{nodes} nodes, {axes} axes, {period} us, {bytes} bytes an axis each way: assumed until somebody measures"
 
 {bus}
-nodes = {nodes}                  # the host is not counted
-
+{count}
 [cycle]
 period_us = {period}
 slice_ratio = 0.8          # assumed: the share of the period for communication; the rest is for the host's own work
 
-[payload]                  # assumed: see the register map of the nodes; a fixed part is read_bytes, write_bytes
-read_bytes_per_axis = {bytes}    # as position and status of an axis
-write_bytes_per_axis = {bytes}   # as set-point and control word of an axis
-
-[node]
-axes = {axes_per_node}
-
-[node.execution]           # measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv --apply
-kind = "linear"
-grade = "assumed"
-base_us = 20               # assumed: time in a node between a request and its response
-per_byte_us = 0.1          # assumed: what each byte adds
-
+{each}
 [limits]
 reserve = 0.15             # share of the slice that must stay free for a plan to fit
 
@@ -67,6 +54,39 @@ feed_mm_per_min = 3000
 """
 
 
+_COUNT: Final = "nodes = {nodes}                  # the host is not counted\n"
+_PAYLOAD: Final = """\
+read_bytes_per_axis = {bytes}    # as position and status of an axis
+write_bytes_per_axis = {bytes}   # as set-point and control word of an axis
+"""
+_PAYLOAD_WITHOUT_AXES: Final = """\
+read_bytes = {bytes}             # as inputs
+write_bytes = {bytes}            # as outputs
+"""
+_EXECUTION: Final = """\
+kind = "linear"
+grade = "assumed"
+base_us = 20               # assumed: time in a node between a request and its response
+per_byte_us = 0.1          # assumed: what each byte adds
+"""
+_ALIKE: Final = f"""\
+[payload]                  # assumed: see the register map of the nodes; a fixed part is read_bytes, write_bytes
+{_PAYLOAD}
+[node]
+axes = {{axes}}
+
+[node.execution]           # measure latencies, then: busplan calibrate {{file}} MEASUREMENTS.csv --apply
+{_EXECUTION}"""
+_GROUP: Final = f"""\
+[[group]]                  # the groups stand in the order of the chain; the payload is assumed: see the register map
+name = "axes-{{axes}}"
+nodes = {{nodes}}
+axes = {{axes}}
+{{payload}}
+[group.execution]          # busplan calibrate {{file}} MEASUREMENTS.csv --group axes-{{axes}} --apply
+{_EXECUTION}"""
+
+
 class Machine(NamedTuple):
     """What a new profile starts from."""
 
@@ -81,6 +101,8 @@ class Machine(NamedTuple):
 def machine_text(machine: Machine, *, name: str, file: str) -> str:
     """Text of a profile of a machine that nobody has measured; every value that rests on nothing says so.
 
+    Axes that cannot be shared out evenly make two groups of nodes.
+
     Parameters
     ----------
     machine
@@ -93,28 +115,34 @@ def machine_text(machine: Machine, *, name: str, file: str) -> str:
     Raises
     ------
     BusplanError
-        The axes cannot be shared out evenly, or an invalid name.
+        An invalid name.
     """
     per_node, rest = divmod(machine.axes, machine.nodes)
-    if rest or not per_node:
-        even = [count * machine.nodes for count in (per_node, per_node + 1) if count]
-        raise BusplanError(
-            f"--axes {machine.axes}: no multiple of --nodes {machine.nodes}, and all nodes of a profile have the same "
-            f"axes; {' or '.join(map(str, even))} would be right"
-        )
+    if rest:
+        count = ""
+        shares = ((rest, per_node + 1), (machine.nodes - rest, per_node))
+        each = "\n".join(_group(nodes, axes, machine=machine, file=file) for nodes, axes in shares)
+    else:
+        count = _COUNT.format(nodes=machine.nodes)
+        each = _ALIKE.format(bytes=machine.bytes_per_axis, axes=per_node, file=file)
     step_us = machine.period_us / ceil(machine.period_us / _LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
-        file=file,
         bus=kind_named(STARTER_KIND).starter,
         nodes=machine.nodes,
         axes=machine.axes,
-        axes_per_node=per_node,
+        count=count,
+        each=each,
         period=value_text(_whole(machine.period_us)),
         bytes=machine.bytes_per_axis,
         step=value_text(_whole(step_us)),
     )
     return _checked(text, name=name)
+
+
+def _group(nodes: int, axes: int, *, machine: Machine, file: str) -> str:
+    payload = (_PAYLOAD if axes else _PAYLOAD_WITHOUT_AXES).format(bytes=machine.bytes_per_axis)
+    return _GROUP.format(nodes=nodes, axes=axes, payload=payload, file=file)
 
 
 STARTER_KIND: Final = "ieee1394"
@@ -155,7 +183,10 @@ def starter_text(source: str, *, name: str) -> str:
     place = document.places["name",]
     # Remove suppressions: they were decided for the shipped profile, not for the new machine.
     before, after = document.text[: place.value_start], document.text[place.value_end :]
-    text = before + value_text(name) + _CIRCLE.sub(rf"\1{_TURN}", _SUPPRESSION.sub("", after))
+    after = _SUPPRESSION.sub("", after)
+    if ("circle", "path") not in document.places:
+        after = _CIRCLE.sub(rf"\1{_TURN}", after)
+    text = before + value_text(name) + after
     # The path to the schema is valid only in the shipped folder.
     text = text.removeprefix("#:schema ./busplan.schema.json\n")
     return _checked(

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from busplan.printable import printable
 from busplan.sections.profile import Profile
@@ -14,7 +14,7 @@ def value_text(value: object) -> str:
     Raises
     ------
     TypeError
-        Not a bool, a number, a str or a sequence of them.
+        Not a bool, a number, a str, or a sequence or table of them.
     ValueError
         A number is not finite.
 
@@ -34,6 +34,8 @@ def value_text(value: object) -> str:
     if isinstance(value, str):
         # TOML has JSON's escapes; for other characters that are not printable, it needs \U.
         return printable(json.dumps(value, ensure_ascii=False), write=lambda one: f"\\U{ord(one):08x}")
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key} = {value_text(one)}' for key, one in value.items())}}}"
     if isinstance(value, Sequence):
         return f"[{', '.join(map(value_text, value))}]"
     raise TypeError(f"{value!r} is no value of a profile")

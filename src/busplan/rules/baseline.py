@@ -27,11 +27,13 @@ Recorded = Mapping[str, float]
 
 def figures_of(subject: Subject) -> dict[str, float]:
     """Figures of a profile to record, by name."""
-    found = {
-        f"{one.timing_model}.{name}": getattr(one, name)
-        for one in sorted((subject.deciding, *subject.others), key=lambda one: one.timing_model)
-        for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us")
-    }
+    found: dict[str, float | None] = {}
+    for one in sorted((subject.deciding, *subject.others), key=lambda one: one.timing_model):
+        for name in ("max_axes", "margin_us", "safe_axes", "margin_corrected_us"):
+            found[f"{one.timing_model}.{name}"] = getattr(one, name)
+        for group in one.groups:
+            for name in ("max_nodes", "safe_nodes"):
+                found[f"{one.timing_model}.group.{group.name}.{name}"] = getattr(group, name)
     return {name: value for name, value in found.items() if value is not None}
 
 
@@ -42,8 +44,9 @@ def regressions(now: Recorded, before: Recorded) -> Iterator[RuleProblem]:
             continue
         lost = before[name] - value
         if lost > _ROUNDING * max(abs(before[name]), 1.0):
-            model, figure = name.split(".")
-            key = "bus.nodes" if figure.endswith("_axes") else "cycle.period_us"
+            model, _, figure = name.partition(".")
+            section, _, last = figure.rpartition(".")
+            key = f"{section}.nodes" if section else "bus.nodes" if last.endswith("_axes") else "cycle.period_us"
             yield RuleProblem(
                 key,
                 f"{figure} under the {model} timing fell to {value:.12g} from the {before[name]:.12g} of the baseline",

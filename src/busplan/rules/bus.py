@@ -1,12 +1,12 @@
 """Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject, overrun
+from busplan.buses.rule import Rule, RuleFigures, RuleProblem, RuleSubject, overrun
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -44,37 +44,43 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further nodes than [limits] requires."""
     limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
-    spare = (one.safe_nodes or 0) - one.nodes
-    if limit is not None and spare < limit:
-        yield RuleProblem("limits.min_spare_nodes", f"{_spare(spare, limit)}; {_room(subject)}")
+    for counts in _counted(one):
+        spare = (counts.safe_nodes or 0) - counts.nodes
+        if limit is not None and spare < limit:
+            yield RuleProblem("limits.min_spare_nodes", _too_few(subject, counts, spare, limit))
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further axes than [limits] requires."""
     limit, one = subject.profile.limits.min_spare_axes, subject.deciding
-    spare = one.safe_axes - one.axes
-    if limit is not None and spare < limit:
-        yield RuleProblem("limits.min_spare_axes", f"{_spare(spare, limit)}; {_room(subject)}")
+    for counts in _counted(one):
+        spare = (counts.safe_axes or 0) - counts.axes
+        if limit is not None and counts.axes and spare < limit:
+            yield RuleProblem("limits.min_spare_axes", _too_few(subject, counts, spare, limit))
 
 
-def _spare(spare: int, limit: int) -> str:
-    return f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
+def _counted(one: RuleFigures) -> Sequence[Any]:
+    """What has counts of its own: the whole, or each group."""
+    return one.groups or (one,)
 
 
-def _room(subject: RuleSubject) -> str:
-    """What limits the nodes, and how to make room for more."""
-    one = subject.deciding
-    limit = bus_of(subject.profile).limit(one.safe_limited_by)
-    cure = subject.cure() if limit is None or limit.is_safety else limit.way_out
-    return f"limited by {one.safe_limited_by}; {cure}"
+def _too_few(subject: RuleSubject, counts: Any, spare: int, limit: int) -> str:
+    """Say what is missing, what limits the nodes, and how to make room for more."""
+    of = f"group {counts.name}: " if subject.deciding.groups else ""
+    bound = bus_of(subject.profile).limit(counts.safe_limited_by)
+    cure = subject.cure() if bound is None or bound.is_safety else bound.way_out
+    said = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
+    return f"{of}{said}; limited by {counts.safe_limited_by}; {cure}"
 
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The execution time is an assumption."""
-    profile = subject.profile
-    if profile.node.execution.grade == "assumed" and bus_of(profile).has_execution(network_of(profile)):
+    network, bus = network_of(subject.profile), bus_of(subject.profile)
+    for group in network.groups:
+        if group.node.execution.grade != "assumed" or not bus.has_execution(network._replace(groups=(group,))):
+            continue
         yield RuleProblem(
-            "node.execution.grade",
+            group.key("execution.grade"),
             "the execution time is an assumption, and the largest terms rest on it; measure it on the node",
         )
 

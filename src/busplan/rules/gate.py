@@ -9,6 +9,7 @@ from busplan.errors import BusplanError, PlacedError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import ProfileSource
 from busplan.profile.document import Document
+from busplan.profile.keys import path_of
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.rules import circle
 from busplan.rules.baseline import Recorded, figures_of, regressions
@@ -175,7 +176,9 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
 def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Make a finding at the line of the problem's key, or of the table that should have it."""
     document = subject.document
-    line, column = document.lines.line_and_column(document.nearest(tuple(problem.key.split("."))))
+    line, column = document.lines.line_and_column(
+        document.nearest(path_of(document.data() if "group." in problem.key else {}, problem.key))
+    )
     message = f"{problem.key}: {problem.message}{subject.origin}"
     return Finding(rule.code, rule.name, rule.severity, message, problem.key, line, column)
 

@@ -1,6 +1,6 @@
 """What all sections of a profile share: strictness, ranges, and errors in our own words."""
 
-from typing import Annotated, Final, NamedTuple, TypeVar
+from typing import Annotated, Any, Final, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -18,12 +18,16 @@ Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
 Bytes = Annotated[int, Field(ge=0, le=MAX_COUNT)]
 
 
+MISSING: Final = "Field required"
+"""Message of a missing key; what reports it says what the key is."""
+
+
 class Problem(NamedTuple):
     """One thing that is wrong with a profile."""
 
     message: str
     key: str | None = None
-    """Dotted key it belongs to, where that is not the validator's own."""
+    """Dotted key it belongs to, below the section that is validated; None for the section itself."""
     kind: ProblemKind = "out-of-range"
 
 
@@ -63,10 +67,35 @@ def with_unchecked(section: _Section, key: str, value: object) -> _Section:
     section
         The profile, or a section of it.
     key
-        Dotted key below it.
+        Dotted key below it; of several tables of one key, the name of one stands behind the key.
     value
         Anything that computes like a number: an array, or a traced number.
     """
     name, _, rest = key.partition(".")
-    new = with_unchecked(getattr(section, name), rest, value) if rest else value
+    inner = getattr(section, name)
+    new = value
+    if isinstance(inner, tuple) and rest:
+        own, _, rest = rest.partition(".")
+        new = tuple(with_unchecked(one, rest, value) if one.name == own else one for one in inner)
+    elif rest:
+        new = with_unchecked(inner, rest, value)
     return section.model_copy(update={name: new})
+
+
+def value_at(section: Section, key: str) -> Any:
+    """The value of a dotted key below a section; None if it has no such key.
+
+    Parameters
+    ----------
+    section
+        The profile, or a section of it.
+    key
+        Dotted key, as `with_unchecked` takes it.
+    """
+    found: Any = section
+    for part in key.split("."):
+        if isinstance(found, tuple):
+            found = next((one for one in found if getattr(one, "name", None) == part), None)
+        else:
+            found = getattr(found, part, None)
+    return found

@@ -1,4 +1,4 @@
-"""What profiles of every kind of bus say of the cycle and its nodes: [bus], [cycle], [payload], [node].
+"""What profiles of every kind of bus say of the cycle and its nodes: [bus], [cycle], [payload], [node], [[group]].
 
 A kind of bus adds its own keys in a class of its own. The limits of its standard are not checked here: a profile that
 breaks them loads, and the analysis says why it does not fit.
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from busplan.elementwise import Number
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
 from busplan.sections.execution import Execution
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
@@ -40,7 +40,7 @@ class BusSection(_Extended):
     kind: str = Field(description="Kind of bus", examples=["ieee1394"])
 
     if TYPE_CHECKING:
-        nodes: int
+        nodes: int | None
         timing_model: str
 
 
@@ -77,7 +77,7 @@ class PayloadSection(_Extended):
         missing = [
             Problem(
                 f"missing key; expected {kind}_bytes, {kind}_bytes_per_axis or both",
-                key=f"payload.{kind}_bytes",
+                key=f"{kind}_bytes",
                 kind="missing-key",
             )
             for kind in TRANSACTION_KINDS
@@ -107,8 +107,8 @@ class PayloadSection(_Extended):
         return share if fixed is None else fixed + share
 
     def key_of(self, kind: TransactionKind) -> str:
-        """The dotted key that a payload is changed by first: what each axis adds, where it adds something."""
-        return f"payload.{kind}_bytes" if self._parts(kind)[1] is None else f"payload.{kind}_bytes_per_axis"
+        """The key that a payload is changed by first: what each axis adds, where it adds something."""
+        return f"{kind}_bytes" if self._parts(kind)[1] is None else f"{kind}_bytes_per_axis"
 
     @property
     def follows_axes(self) -> bool:
@@ -121,3 +121,37 @@ class NodeSection(Section):
 
     axes: Count = Field(description="Axes that one node controls", examples=[4])
     execution: Execution = Field(description="Execution time T_exec in the node, measured")
+
+
+GroupName = Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
+GroupAxes = Annotated[
+    int,
+    Field(ge=0, le=MAX_COUNT, description="Axes that one node of the group controls; 0 for inputs and outputs"),
+]
+
+
+class GroupSection(NodeSection, PayloadSection):
+    """One of the sections [[group]]: nodes that are alike, in the order of the chain.
+
+    They stand instead of `bus.nodes`, [node] and [payload]. A kind of bus extends its own node and payload by this
+    section, and says `axes` again.
+    """
+
+    name: GroupName = Field(description="Name of the group; its keys are group.NAME.key", examples=["drives"])
+    nodes: Count = Field(description="Nodes of the group", examples=[2])
+    axes: GroupAxes = Field(examples=[4])
+
+    @model_validator(mode="after")
+    def _has_payloads(self) -> Self:
+        empty = [
+            Problem(
+                f"makes a payload of 0 bytes, for the group has no axes; give {kind}_bytes",
+                key=self.key_of(kind),
+                kind="inconsistent",
+            )
+            for kind in TRANSACTION_KINDS
+            if not self.bytes_of(kind, axes=self.axes)
+        ]
+        if empty:
+            raise refused(*empty)
+        return self

@@ -90,7 +90,7 @@ class TableExecution(GradedExecution):
         problems = [
             Problem(
                 f"payloads must ascend, and this follows {one}",
-                key=f"node.execution.payload_bytes.{index}",
+                key=f"payload_bytes.{index}",
                 kind="inconsistent",
             )
             for index, (one, other) in enumerate(pairwise(self.payload_bytes), start=1)
@@ -98,9 +98,7 @@ class TableExecution(GradedExecution):
         ]
         if len(self.payload_bytes) != len(self.time_us):
             values = f"has {len(self.time_us)} values and payload_bytes has {len(self.payload_bytes)}"
-            problems.append(
-                Problem(f"{values}: the two must be of one length", key="node.execution.time_us", kind="inconsistent")
-            )
+            problems.append(Problem(f"{values}: the two must be of one length", key="time_us", kind="inconsistent"))
         if problems:
             raise refused(*problems)
         return self

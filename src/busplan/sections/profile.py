@@ -4,14 +4,21 @@ Models are strict (no text for a number), frozen and closed (an unknown key is r
 for a float.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from busplan.printable import has_controls
-from busplan.sections.base import Problem, Section, refused
-from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.base import MISSING, Problem, Section, refused
+from busplan.sections.cycle import (
+    BusSection,
+    CycleSection,
+    GroupSection,
+    NodeSection,
+    PayloadSection,
+)
 from busplan.sections.execution import TableExecution
 from busplan.sections.limits import Limits
 from busplan.sections.machine import CircleSection, DeliverySection, MechanicsSection, ServoSection, ToleranceSection
@@ -53,8 +60,12 @@ class Profile(Section):
     )
     bus: BusSection = Field(description="The bus")
     cycle: CycleSection = Field(description="The communication cycle")
-    payload: PayloadSection = Field(description="What travels in a cycle")
-    node: NodeSection = Field(description="One distributed node")
+    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
+    # Strictness would refuse TOML's arrays for a tuple; their elements stay strict.
+    group: Annotated[tuple[GroupSection, ...], Field(strict=False)] = Field(
+        default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
+    )
     servo: ServoSection = Field(default_factory=ServoSection, description="Position loop and drive of both axes")
     mechanics: MechanicsSection = Field(
         default_factory=MechanicsSection, description="What lies between encoders and table"
@@ -69,26 +80,69 @@ class Profile(Section):
         """Whether the profile says anything that a circle test is for."""
         return not self.model_fields_set.isdisjoint(CIRCLE_SECTIONS)
 
+    @property
+    def alike_nodes(self) -> tuple[AlikeNodes, ...]:
+        """The nodes, as groups of which each is alike, in the order of the chain."""
+        if self.group:
+            return tuple(AlikeNodes(one.name, one.nodes, one, one) for one in self.group)
+        return (AlikeNodes("", self.bus.nodes, self.node, self.payload),)
+
     @model_validator(mode="after")
-    def _execution_is_known(self) -> Self:
-        execution = self.node.execution
-        if isinstance(execution, TableExecution):
-            unknown = [
-                Problem(
-                    f"{sum_}is outside the execution table, {execution.range_bytes}: measure it and add it to "
-                    'node.execution, or use kind = "linear"',
-                    key=key,
-                    kind="execution-unknown",
-                )
-                for key, size, sum_ in self._payloads()
-                if not execution.covers(size)
-            ]
-            if unknown:
-                raise refused(*unknown)
+    def _nodes_are_said_once(self) -> Self:
+        said = {"bus.nodes": self.bus.nodes, "node": self.node, "payload": self.payload, "group": self.group or None}
+        problems = list(nodes_problems({key for key, value in said.items() if value is not None}))
+        names = [one.name for one in self.group]
+        problems += (
+            Problem("there is a group of this name", key=f"group.{place}.name", kind="inconsistent")
+            for place, name in enumerate(names)
+            if name in names[:place]
+        )
+        if problems:
+            raise refused(*problems)
         return self
 
-    def _payloads(self) -> Iterator[tuple[str, int, str]]:
-        """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
-        for kind in TRANSACTION_KINDS:
-            key, size = self.payload.key_of(kind), int(self.payload.bytes_of(kind, axes=self.node.axes))
-            yield key, size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
+    @model_validator(mode="after")
+    def _execution_is_known(self) -> Self:
+        unknown = [
+            Problem(
+                f"{sum_}is outside the execution table, {execution.range_bytes}: measure it and add it to "
+                f'{alike.node_key("execution")}, or use kind = "linear"',
+                key=key,
+                kind="execution-unknown",
+            )
+            for place, alike in enumerate(self.alike_nodes)
+            if isinstance(execution := alike.node.execution, TableExecution)
+            for key, size, sum_ in _payloads(alike, place)
+            if not execution.covers(size)
+        ]
+        if unknown:
+            raise refused(*unknown)
+        return self
+
+
+def _payloads(alike: AlikeNodes, place: int) -> Iterator[tuple[str, int, str]]:
+    """Key of each payload, its bytes, and a word on how they add up where the key does not hold all of them."""
+    section = f"group.{place}" if alike.name else "payload"
+    for kind in TRANSACTION_KINDS:
+        key, size = alike.payload.key_of(kind), int(alike.bytes_of(kind))
+        yield f"{section}.{key}", size, (f"makes {size} bytes, which " if key.endswith("_per_axis") else "")
+
+
+_OF_ALIKE_NODES: Final = ("bus.nodes", "payload", "node")
+"""What a profile says of its nodes where all are alike."""
+
+
+def nodes_problems(said: Collection[str]) -> Iterator[Problem]:
+    """Tell what is wrong with the way a profile says its nodes: all alike, or in groups.
+
+    Parameters
+    ----------
+    said
+        Which of the keys bus.nodes, node, payload and group it has.
+    """
+    for key in _OF_ALIKE_NODES:
+        if "group" in said and key in said:
+            own = ", as group.NAME.nodes" if key == "bus.nodes" else ""
+            yield Problem(f"each [[group]] has its own{own}; remove one of the two", key=key, kind="inconsistent")
+        elif "group" not in said and key not in said:
+            yield Problem(MISSING, key=key, kind="missing-key")

@@ -18,6 +18,7 @@ from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.network import Group
+from busplan.sections.alike_nodes import AlikeNodes
 
 ROUNDING_US = 1e-6
 RATES = {"S100": 98.304, "S200": 196.608, "S400": 393.216}
@@ -60,6 +61,8 @@ class Case(NamedTuple):
     start_waits: bool = True
     farthest: bool = True
     """Whether each node is as far away as the farthest."""
+    own: bool = False
+    """Whether the closed form charges each node its own hops."""
 
     @property
     def hops(self) -> int:
@@ -74,6 +77,7 @@ class Case(NamedTuple):
             "gap_count": self.gap_count,
             "nodes": 1,
             "max_hops": self.max_hops,
+            "charge_hops": "own" if self.own else "farthest",
             "cable_length_m": self.cable_length_m,
             "cycle_master": self.first_start_us is not None,
             "isochronous_us": self.isochronous_us,
@@ -91,7 +95,10 @@ class Case(NamedTuple):
                 "node": {"axes": 1, "execution": execution, **answers},
             }
         )
-        network = network_of(profile)._replace(groups=tuple(one._replace(node=profile.node) for one in self.groups))
+        (said,) = profile.alike_nodes
+        network = network_of(profile)._replace(
+            groups=tuple(one._replace(said=said._replace(nodes=one.nodes)) for one in self.groups)
+        )
         return float(Ieee1394Cycle(network, "standard").required_us)
 
     def starts_us(self, *, cycles: int = CYCLES) -> Sequence[float]:
@@ -128,12 +135,15 @@ class Case(NamedTuple):
         return starts_us
 
 
+UNSAID = AlikeNodes("", 0, None, None)
+
+
 def group(
     nodes: int, *, size: int = 12, read_us: float = 0.0, write_us: float | None = None, extra_us: float = 0.0
 ) -> Group:
     write_us = read_us if write_us is None else write_us
     return Group(
-        None,
+        UNSAID,
         nodes,
         axes=1,
         read_bytes=size,
@@ -157,7 +167,7 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
 
     def one_group(nodes: int) -> Group:
         return Group(
-            None,
+            UNSAID,
             nodes,
             axes=1,
             read_bytes=draw(sizes),
@@ -172,11 +182,12 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
     cycle_master = draw(st.booleans())
     # Beyond its bound an execution is the bound itself.
     executions_us = st.just(1000.0) | times_us
+    max_hops, farthest = draw(st.none() | st.integers(1, 16)), draw(st.booleans())
     return Case(
         tuple(one_group(number) for number in (first, second) if number),
         speed=speed,
         gap_count=gap_count,
-        max_hops=draw(st.none() | st.integers(1, 16)),
+        max_hops=max_hops,
         cable_length_m=draw(st.sampled_from((4.5, 1.0, 10.0))),
         read=draw(st.sampled_from(("split", "split", "concatenated"))),
         write=draw(st.sampled_from(("split", "split", "unified"))),
@@ -188,7 +199,8 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
         executions_us=tuple(draw(st.lists(executions_us, max_size=7))),
         priority=draw(st.booleans()),
         start_waits=draw(st.booleans()),
-        farthest=draw(st.booleans()),
+        farthest=farthest,
+        own=max_hops is None and not farthest and draw(st.booleans()),
     )
 
 
@@ -227,6 +239,10 @@ EXACT = {
     "with priority": Case((group(3, read_us=5.0),), priority=True),
     "read and write differ": Case((group(3, read_us=5.0, write_us=50.0, size=100),)),
     "two sorts of nodes": Case((group(3, read_us=5.0, size=4), group(2, read_us=70.0, size=200))),
+    "own hops": Case((group(3, read_us=50.0),), farthest=False, own=True),
+    "own hops of two sorts": Case(
+        (group(3, read_us=5.0, size=4), group(2, read_us=70.0, size=200)), farthest=False, own=True
+    ),
     "concatenated reads": Case((group(3, read_us=50.0),), read="concatenated", response_us=1.0),
     "unified writes": Case((group(3, read_us=50.0),), write="unified"),
     "neither split": Case((group(3),), read="concatenated", write="unified", host_us=30.0, gap_count=7),

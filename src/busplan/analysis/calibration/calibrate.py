@@ -17,6 +17,7 @@ from busplan.buses.bus import Halves, Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement
+from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.execution import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
@@ -97,6 +98,8 @@ class Calibration(NamedTuple):
 
     profile: Profile
     """The network that was measured."""
+    nodes: AlikeNodes
+    """Those of its nodes that were measured."""
     timing_model: str
     way: Way
     method: Method
@@ -132,6 +135,7 @@ def calibrate(
     measurements: Sequence[Measurement],
     *,
     source: str,
+    group: str | None = None,
     timing_model: str | None = None,
     form: ExecutionForm | None = None,
     robust: bool = False,
@@ -152,6 +156,8 @@ def calibrate(
         At least one; either all or none have T1 + T2.
     source
         Name of the measurements in messages.
+    group
+        Name of the group of nodes that was measured, of a profile with groups.
     timing_model
         Timing model; by default the one that decides.
     form
@@ -175,8 +181,8 @@ def calibrate(
     Raises
     ------
     BusplanError
-        A latency shorter than its packets, a payload over the limit of the speed, a line through one payload or
-        with a negative part.
+        No group of that name, a latency shorter than its packets, a payload over the limit of the speed, a line through
+        one payload or with a negative part.
 
     References
     ----------
@@ -184,7 +190,8 @@ def calibrate(
     Kendall's tau", JASA 63 (1968). Outliers: `outliers.screen`.
     """
     model = timing_model or bus_of(profile).deciding_model
-    halves = _packets(profile, measurements, model)
+    nodes = _nodes(profile, group)
+    halves = _packets(profile, nodes, measurements, model)
     way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
     raw = _with_packets(measurements, measurements, halves)
     _require_possible(profile, raw, source=source, way=way, model=model)
@@ -199,13 +206,14 @@ def calibrate(
     groups: defaultdict[int, list[float]] = defaultdict(list)
     for one, packets_us in (raw[place] for place in kept):
         groups[one.payload_bytes].append(one.latency_us - packets_us)
-    chosen = form or profile.node.execution.kind
+    chosen = form or nodes.node.execution.kind
     doubtful = screening.undecided or (keep_outliers and screening.expected_us)
     fit = fit_execution(groups, chosen, robust=robust, grade="assumed" if doubtful else grade, source=source)
     compared = _compared(raw, fit)
     residuals = tuple(_residual(compared[place]) for place in kept)
     return Calibration(
         profile=profile,
+        nodes=nodes,
         timing_model=model,
         way=way,
         method=METHODS[chosen, robust],
@@ -229,11 +237,24 @@ def calibrate(
 _Halves = Mapping[tuple[str, int], Halves]
 
 
-def _packets(profile: Profile, measurements: Sequence[Measurement], model: str) -> _Halves:
+def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
+    """The nodes that were measured."""
+    each = {one.name: one for one in profile.alike_nodes}
+    if group is None and len(each) == 1:
+        return profile.alike_nodes[0]
+    if group in each:
+        return each[group]
+    known = f"the groups {', '.join(each)}" if profile.group else "no groups"
+    if group is None:
+        raise BusplanError(f"{profile.name} has {known}; give the group that was measured")
+    raise BusplanError(f"group {group}: {profile.name} has {known}")
+
+
+def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measurement], model: str) -> _Halves:
     """Time of the packets for every transaction and payload that was measured."""
     bus, network = bus_of(profile), network_of(profile)
     return {
-        (kind, size): bus.halves(network, model=model, kind=kind, payload_bytes=size)
+        (kind, size): bus.halves(network, group=nodes.name, model=model, kind=kind, payload_bytes=size)
         for kind, size in dict.fromkeys((one.transaction, one.payload_bytes) for one in measurements)
     }
 

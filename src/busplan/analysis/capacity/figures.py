@@ -18,6 +18,23 @@ from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
 
+class GroupCapacity(NamedTuple):
+    """How many nodes of one group a bus carries, the other groups as they are."""
+
+    name: str
+    nodes: int
+    axes: int
+    """Of all its nodes."""
+    max_nodes: int
+    max_axes: int
+    limited_by: str
+    """Key of the limit that keeps `max_nodes` from being more."""
+    safe_nodes: int | None
+    """This and the figures below exist for the timing model that decides."""
+    safe_axes: int | None
+    safe_limited_by: str | None
+
+
 class CapacityFigures(NamedTuple):
     """Capacity at one period under one timing model; what each figure is stands in the register of its bus.
 
@@ -40,9 +57,10 @@ class CapacityFigures(NamedTuple):
     margin_us: float
     binding_term: str
     """Name of the largest term."""
-    max_nodes: int
-    max_axes: int
-    limited_by: str
+    max_nodes: int | None
+    """This, the axes and the limit are None where there are groups: each has its own."""
+    max_axes: int | None
+    limited_by: str | None
     """Key of the limit that keeps `max_nodes` from being more."""
     min_period_us: float
     min_slice_ratio: float
@@ -62,6 +80,8 @@ class CapacityFigures(NamedTuple):
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
     """What the uncertainty is made of."""
+    groups: tuple[GroupCapacity, ...]
+    """One for each [[group]] of the profile."""
     safe: bool
     """Whether the bus is set so that it works reliably, beside fitting."""
     own: FigureValues
@@ -143,40 +163,62 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
     numbers: dict[str, Any] = {key: plain(number) for key, number in numeric_figures(cycle).items()}
-    own = FigureValues({key: plain(number) for key, number in cycle.figures().items()})
-    max_nodes, limited_by = largest_nodes(profile, model=model)
+    own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     broken = broken_limits(profile)
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
+    groups = tuple(_group_capacity(profile, name, model=model) for name in network.names)
+    whole = groups[0] if network.is_uniform else None
+    counts: dict[str, Any] = {key: getattr(whole, key, None) for key in COUNTS}
     return CapacityFigures(
         kind=bus.kind,
         timing_model=model,
         **numbers,
         terms=cycle.terms,
         binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name,
-        max_nodes=max_nodes,
-        max_axes=int(network.groups[0].axes) * max_nodes,
-        limited_by=limited_by,
+        **counts,
         exceeded=exceeded,
         fits=not exceeded,
-        **(_certainty_figures(profile, cycle, is_broken=bool(broken)) if decides else _UNDECIDED),
+        **(_certainty_figures(cycle, is_broken=bool(broken)) if decides else _UNDECIDED),
+        groups=() if whole else groups,
         safe=bus.is_safe(network),
         own=own,
     )
 
 
-_UNDECIDED: Final[dict[str, Any]] = {**dict.fromkeys((one.key for one in CERTAINTY), None), "doubts": ()}
+COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
+"""Figures that each group has for itself; where all nodes are alike, they are those of the whole."""
+_UNDECIDED: Final[dict[str, Any]] = {
+    **{one.key: None for one in CERTAINTY if one.key not in COUNTS},
+    "doubts": (),
+}
 
 
-def _certainty_figures(profile: Profile, cycle: BusCycle, *, is_broken: bool) -> dict[str, Any]:
-    """Figures of how sure the verdict is, by the names of `CapacityFigures`."""
-    found, (nodes, limit) = certainty(cycle), safe_nodes(profile)
+def _group_capacity(profile: Profile, name: str, *, model: str) -> GroupCapacity:
+    """How many nodes of one group fit; of the nodes of [node] by an empty name."""
+    said = next(one for one in profile.alike_nodes if one.name == name)
+    axes, decides = said.node.axes, model == bus_of(profile).deciding_model
+    nodes, limit = largest_nodes(profile, model=model, group=name)
+    safe, safe_limit = safe_nodes(profile, group=name) if decides else (None, None)
+    return GroupCapacity(
+        name=name,
+        nodes=int(said.nodes),
+        axes=int(said.nodes) * axes,
+        max_nodes=nodes,
+        max_axes=axes * nodes,
+        limited_by=limit,
+        safe_nodes=safe,
+        safe_axes=None if safe is None else axes * safe,
+        safe_limited_by=safe_limit,
+    )
+
+
+def _certainty_figures(cycle: BusCycle, *, is_broken: bool) -> dict[str, Any]:
+    """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
+    found = certainty(cycle)
     return {
         **certainty_numbers(found, cycle),
-        "safe_nodes": nodes,
-        "safe_axes": int(cycle.network.groups[0].axes) * nodes,
-        "safe_limited_by": limit,
         "verdict": VERDICTS[int(verdict_code(found, cycle.network, is_broken=is_broken))],
         "doubts": found.doubts,
     }

@@ -22,7 +22,7 @@ class MostNodes(NamedTuple):
     limit: Number
 
 
-def largest_nodes(profile: Profile, *, model: str) -> tuple[int, str]:
+def largest_nodes(profile: Profile, *, model: str, group: str = "") -> tuple[int, str]:
     """Find the largest number of nodes that fits the profile's period, and what keeps it from being larger.
 
     Parameters
@@ -31,6 +31,8 @@ def largest_nodes(profile: Profile, *, model: str) -> tuple[int, str]:
         The network; its own number of nodes plays no part.
     model
         Timing model.
+    group
+        Name of the group whose nodes are counted, the others as they are; empty where all nodes are alike.
 
     Returns
     -------
@@ -41,11 +43,11 @@ def largest_nodes(profile: Profile, *, model: str) -> tuple[int, str]:
     ----------
     Paper, equations (1)-(11), with (11) solved for N.
     """
-    network = network_of(profile)
+    network = network_of(profile).asking(group)
     return _with_key(network, limits_with_time(network, model=model))
 
 
-def safe_nodes(profile: Profile) -> tuple[int, str]:
+def safe_nodes(profile: Profile, *, group: str = "", without: str | None = None) -> tuple[int, str]:
     """Find the largest number of nodes that is shown to fit, with the reserve, on a bus that is set safely for them.
 
     Each number of nodes has its own cycle, bias, uncertainty and limits; a gap count that follows them does so.
@@ -54,14 +56,18 @@ def safe_nodes(profile: Profile) -> tuple[int, str]:
     ----------
     profile
         The network; its own number of nodes plays no part.
+    group
+        As for `largest_nodes`.
+    without
+        Key of a limit that is not asked: what would keep nodes off the bus once it is gone.
 
     Returns
     -------
     tuple
         Number of nodes [1], and the key of the limit.
     """
-    network = network_of(profile)
-    return _with_key(network, limits_to_be_safe(network))
+    network = network_of(profile).asking(group)
+    return _with_key(network, [one for one in limits_to_be_safe(network) if one.key != without])
 
 
 def _with_key(network: Network, limits: Sequence[Limit]) -> tuple[int, str]:

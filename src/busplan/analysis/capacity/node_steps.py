@@ -1,12 +1,13 @@
 """How many nodes a bus carries over its period, exactly: from which period on each further one fits."""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, cycle_of
+from busplan.analysis.capacity.cycle import FIT_ROUNDING
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
-from busplan.analysis.network import bus_of
+from busplan.analysis.network import bus_of, network_of
 from busplan.elementwise import plain
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
@@ -27,13 +28,19 @@ class NodeSteps(NamedTuple):
     """What keeps it from going on."""
     is_safe: bool
     """Whether the nodes are shown to fit."""
+    own_nodes: int
+    """Nodes that the profile has [1]."""
+
+    def max_nodes(self, period_us: float) -> int:
+        """Most nodes that a period carries [1]."""
+        return bisect_right(self.from_us, period_us * (1 + FIT_ROUNDING))
 
     def max_axes(self, period_us: float) -> int:
         """Most axes that a period carries [1]."""
-        return self.axes_per_node * bisect_right(self.from_us, period_us * (1 + FIT_ROUNDING))
+        return self.axes_per_node * self.max_nodes(period_us)
 
 
-def node_steps(profile: Profile, *, model: str) -> NodeSteps:
+def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     """Find the period from which on each number of nodes fits, or is shown to fit under the model that decides.
 
     Parameters
@@ -42,6 +49,8 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
         The network; its own period and number of nodes play no part.
     model
         Timing model.
+    group
+        Name of the group whose nodes are counted, the others as they are; empty where all nodes are alike.
 
     Examples
     --------
@@ -50,10 +59,30 @@ def node_steps(profile: Profile, *, model: str) -> NodeSteps:
     >>> steps.max_axes(1000.0)
     16
     """
-    longest, is_safe = override(profile, {"cycle.period_us": MAX_TIME_US}), model == bus_of(profile).deciding_model
-    most, limit = safe_nodes(longest) if is_safe else largest_nodes(longest, model=model)
-    cycles = (cycle_of(profile, model=model, nodes=nodes) for nodes in range(1, most + 1))
+    longest, bus = override(profile, {"cycle.period_us": MAX_TIME_US}), bus_of(profile)
+    is_safe = model == bus.deciding_model
+    most, limit = safe_nodes(longest, group=group) if is_safe else largest_nodes(longest, model=model, group=group)
+    network = network_of(profile).asking(group)
+    cycles = (bus.cycle(network.with_nodes(nodes), model=model) for nodes in range(1, most + 1))
     needed_us = (plain(certainty(one).safe_required_us if is_safe else one.required_us) for one in cycles)
-    return NodeSteps(
-        model, profile.node.axes, tuple(us / profile.cycle.slice_ratio for us in needed_us), limit, is_safe
-    )
+    said, ratio = network.asked_nodes, profile.cycle.slice_ratio
+    return NodeSteps(model, said.node.axes, tuple(us / ratio for us in needed_us), limit, is_safe, int(said.nodes))
+
+
+def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:
+    """Range of periods [us]: from the first that carries a node to where its nodes fit, at least twice its own.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    steps
+        Its steps, one for each timing model of interest.
+    """
+    own_us = profile.cycle.period_us
+    carrying = [one for one in steps if one.from_us]
+    lasts = [one.from_us[-1] * 1.25 for one in carrying]
+    needed = [one.from_us[min(one.own_nodes, len(one.from_us)) - 1] * 1.25 for one in carrying]
+    to_us = max(2 * own_us, *needed, min(4 * own_us, max(lasts, default=0.0)), 0.0)
+    from_us = min(own_us, *(one.from_us[0] for one in carrying), to_us / 4) / 1.25
+    return from_us, min(to_us, 4 * MAX_TIME_US)

@@ -10,7 +10,7 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
 
     On the host it is one period, for the synchronous packet triggers both the sample and the update with the last
     command. A node that applies its command on arrival has it earlier: x is taken to be on the first node of the
-    cycle and y on the last, which differ most.
+    cycle with axes and y on the last, which differ most.
 
     References
     ----------
@@ -22,11 +22,14 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
     if profile.servo.update == "next_sync":
         return period_us, period_us
     own = bus_of(profile)
+    cycle = cycle_of(profile, model=own.deciding_model)
+    moves = [bool(group.axes) for group in cycle.network.groups for _ in range(int(group.nodes))]
     arrived_us: dict[int, float] = {}
     now_us = 0.0
-    for event in cycle_of(profile, model=own.deciding_model).events():
+    for event in cycle.events():
         now_us += event.us
-        if event.node is not None and (event.transaction, event.kind) in own.command_events:
+        is_command = (event.transaction, event.kind) in own.command_events
+        if event.node is not None and is_command and moves[event.node - 1]:
             arrived_us[event.node] = now_us
     first, last = min(arrived_us, default=0), max(arrived_us, default=0)
     # A cycle that does not fit is never simulated; its delay must not stop the report that says so.

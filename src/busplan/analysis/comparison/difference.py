@@ -8,7 +8,7 @@ from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, TypeGuard
 
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
-from busplan.analysis.capacity.figures import figures
+from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.network import bus_of, model_names
 from busplan.buses import figure as known
@@ -227,28 +227,42 @@ def _figures(
     circles: tuple[CircleSide, CircleSide] | None,
 ) -> Iterator[ComparedFigure]:
     buses = (bus_of(a), bus_of(b))
-    yield from _compared("plan", plan_figures(*buses), _plan(a), _plan(b))
+    groups = tuple(dict.fromkeys(one.name for one in (*a.group, *b.group)))
+    plan = (*plan_figures(*buses), *_of_groups(groups, known.SAFE_NODES))
+    yield from _compared("plan", plan, _plan(a), _plan(b))
     deciding = (("deciding", buses[0].deciding_model, buses[1].deciding_model),)
     common = tuple(model for model in model_names(a) if model in model_names(b))
     models = common if timing_models is None else timing_models
     pairs = tuple((model, model, model) for model in models) if buses[0] is buses[1] else deciding
     for part, of_a, of_b in pairs:
-        yield from _compared(part, cycle_figures(*buses), _cycle(a, of_a), _cycle(b, of_b))
+        cycle = (*cycle_figures(*buses), *_of_groups(groups, known.MAX_NODES))
+        yield from _compared(part, cycle, _cycle(a, of_a), _cycle(b, of_b))
     if circles is not None:
         circle_a, circle_b = ({} if side.figures is None else side.figures._asdict() for side in circles)
         yield from _compared("circle", _CIRCLE, circle_a, circle_b)
 
 
+def _of_groups(names: Sequence[str], figure: Figure) -> Iterator[Figure]:
+    """A figure that each group has for itself."""
+    for name in names:
+        yield figure._replace(key=f"group.{name}.{figure.key}", label=f"{figure.label} of {name}")
+
+
+def _counts(found: CapacityFigures, figure: Figure) -> _Figures:
+    return {f"group.{one.name}.{figure.key}": getattr(one, figure.key) for one in found.groups}
+
+
 def _plan(profile: Profile) -> _Figures:
     """Figures under the model that decides, whichever are asked for: no choice of models hides its verdict."""
     deciding = figures(profile, model=bus_of(profile).deciding_model)
-    return deciding.by_key() | {SHOWN_TO_FIT.key: deciding.verdict == FITS}
+    own = {SHOWN_TO_FIT.key: deciding.verdict == FITS}
+    return {**deciding.by_key(), **own, **_counts(deciding, known.SAFE_NODES)}
 
 
 def _cycle(profile: Profile, model: str) -> _Figures:
     """Figures of one cycle by key: those of `capacity`, and others that the bus compares."""
     found = figures(profile, model=model)
-    return found.by_key() | dict(found.own)
+    return {**found.by_key(), **found.own, **_counts(found, known.MAX_NODES)}
 
 
 def _compared(part: str, measures: Sequence[Figure], a: _Figures, b: _Figures) -> Iterator[ComparedFigure]:

@@ -23,7 +23,7 @@ from busplan.analysis.derivation.trace import Traced, found, value_of
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.advice import changeable
 from busplan.buses.bus import Bus, BusCycle, Term
-from busplan.buses.figure import CERTAINTY, by_key
+from busplan.buses.figure import CERTAINTY, MAX_NODES, SAFE_NODES, by_key
 from busplan.buses.network import Network
 from busplan.elementwise import Number
 from busplan.forms.numbers import listed
@@ -32,7 +32,12 @@ from busplan.sections.profile import Profile
 _SENTENCES: Final = "sentences on what the command computes"
 OF_DOCUMENT: Final = ("verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
 """Figures whose values the document of `capacity` has."""
-VERDICT_KEYS: Final = ("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text")
+OF_SENSITIVITY: Final = ("sensitivity", "next_bottleneck")
+"""Those that it has with --sensitivity."""
+VERDICT_KEYS: Final = (
+    *("models_agree", "reserve", *OF_DOCUMENT, "cheapest_change", "warnings", "text"),
+    *OF_SENSITIVITY,
+)
 
 
 def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
@@ -56,27 +61,45 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     numbers: dict[str, Number] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         **{term.key: term.us for term in cycle.terms},
-        **cycle.figures(),
+        **{key: number for key, number in cycle.figures().items() if number is not None},
         **numeric_figures(cycle),
     }
     known = by_key(bus.capacity_figures)
     named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if key in known}
-    # The largest number of nodes does not depend on the profile's own: replace it by a number that is no input.
-    searched = network.with_nodes(Traced(plain.max_nodes + 1))
-    needed_us = bus.cycle(searched, model=model).required_us
-    most = found(
-        plain.max_nodes,
-        f"a search: the largest whole N with T_need <= alpha T_s, within the limits of {_limit_names(bus)}",
-        (*_limits(bus, searched), named["available_us"], needed_us),
-    ).named("max_nodes", known["max_nodes"].symbol)
-    named["max_nodes"], named["max_axes"] = most, network.groups[0].axes * most
-    named["limited_by"] = found(plain.limited_by, "a search: what keeps N_max + 1 nodes off the bus", (most,))
+    if network.is_uniform:
+        named |= _most(network, plain, model=model)
+    else:
+        each = (named["required_us"], named["available_us"])
+        named |= {
+            key: found(None, _OF_GROUPS, each) for key in known if key not in named and getattr(plain, key) is None
+        }
     if model == bus.deciding_model:
         named |= _certainty(profile, cycle, plain)
     named |= _words(named, plain, cycle.terms, _limits(bus, network))
     for key, number in named.items():
         number.named(key, known[key].symbol)
     return named
+
+
+_OF_GROUPS: Final = "each group of nodes has its own: see the groups of capacity"
+
+
+def _most(network: Network, plain: CapacityFigures, *, model: str) -> dict[str, Traced]:
+    """The largest number of nodes, and what follows from it."""
+    bus = bus_of(network.profile)
+    # It does not depend on the profile's own: replace that by a number that is no input.
+    searched = network.with_nodes(Traced((plain.max_nodes or 0) + 1))
+    needed_us = bus.cycle(searched, model=model).required_us
+    most = found(
+        plain.max_nodes,
+        f"a search: the largest whole N with T_need <= alpha T_s, within the limits of {_limit_names(bus)}",
+        (*_limits(bus, searched), available_us(network), needed_us),
+    ).named("max_nodes", MAX_NODES.symbol)
+    return {
+        "max_nodes": most,
+        "max_axes": network.asked_nodes.node.axes * most,
+        "limited_by": found(plain.limited_by, "a search: what keeps N_max + 1 nodes off the bus", (most,)),
+    }
 
 
 def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dict[str, Traced]:
@@ -87,19 +110,8 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
         remembered(doubt.us, doubt.key, f"u({doubt.label})")
     numbers = certainty_numbers(weighed, cycle)
     named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if number is not None}
-    beyond = network.with_nodes(Traced((plain.safe_nodes or 0) + 1))
-    needed_us = certainty(bus.cycle(beyond, model=bus.deciding_model)).safe_required_us
-    most = found(
-        plain.safe_nodes,
-        "a search: the largest whole N with T_safe <= alpha T_s, on a bus set safely for N, within the limits of "
-        f"{_limit_names(bus)}",
-        (*_limits(bus, beyond, with_safety=True), needed_us, available_us(network)),
-    ).named("safe_nodes", known["safe_nodes"].symbol)
-    named |= {
-        "safe_nodes": most,
-        "safe_axes": network.groups[0].axes * most,
-        "safe_limited_by": found(plain.safe_limited_by, "a search: what keeps N_safe + 1 nodes off the bus", (most,)),
-    }
+    if network.is_uniform:
+        named |= _most_safe(network, plain)
     named["verdict"] = Traced(
         plain.verdict,
         formula="fits where T_safe <= alpha T_s, does not fit where margin_c + U < 0 or a limit is broken",
@@ -116,6 +128,24 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
         ),
     )
     return named
+
+
+def _most_safe(network: Network, plain: CapacityFigures) -> dict[str, Traced]:
+    """The largest number of nodes that is shown to fit, and what follows from it."""
+    bus = bus_of(network.profile)
+    beyond = network.with_nodes(Traced((plain.safe_nodes or 0) + 1))
+    needed_us = certainty(bus.cycle(beyond, model=bus.deciding_model)).safe_required_us
+    most = found(
+        plain.safe_nodes,
+        "a search: the largest whole N with T_safe <= alpha T_s, on a bus set safely for N, within the limits of "
+        f"{_limit_names(bus)}",
+        (*_limits(bus, beyond, with_safety=True), needed_us, available_us(network)),
+    ).named("safe_nodes", SAFE_NODES.symbol)
+    return {
+        "safe_nodes": most,
+        "safe_axes": network.asked_nodes.node.axes * most,
+        "safe_limited_by": found(plain.safe_limited_by, "a search: what keeps N_safe + 1 nodes off the bus", (most,)),
+    }
 
 
 def _limit_names(bus: Bus) -> str:
@@ -175,6 +205,9 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
     # The report fills in the values of changes, lists and sentences.
     if key in OF_DOCUMENT:
         return found(None, _SENTENCES, (deciding["uncertainty_us"],))
+    if key in OF_SENSITIVITY:
+        words = "the cycle computed anew, after each change or without what binds"
+        return found(None, words, (deciding["margin_corrected_us"], *judged))
     if key == "cheapest_change":
         is_for_more = verdict.change is not None and verdict.change.nodes > verdict.deciding.nodes
         purpose = "carries another node" if is_for_more else "holds every constraint of a plan"

@@ -177,11 +177,12 @@ def assumptions(profile: Profile) -> tuple[Input, ...]:
             found.setdefault(one.name, one)
     # An execution time is a fact, not a choice: without a grade it is the least well known input.
     choices = bus_of(profile).choosing_keys
+    executions = tuple(one.node_key("execution.") for one in profile.alike_nodes)
     known = (
         one
         for one in found.values()
         if one.grade != "given"
-        or (one.name.startswith("node.execution.") and one.name not in choices and not one.source.startswith("default"))
+        or (one.name.startswith(executions) and not one.name.endswith(choices) and not one.source.startswith("default"))
     )
     return tuple(sorted(known, key=lambda one: -1 if one.grade == "given" else _GRADES.index(one.grade)))
 

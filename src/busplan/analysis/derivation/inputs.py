@@ -6,8 +6,8 @@ from typing import Any, Final
 from busplan.analysis.derivation.origin import GivenTable, Input
 from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of
-from busplan.profile.kinds import cycle_keys
-from busplan.sections.base import with_unchecked
+from busplan.profile.kinds import cycle_keys, models_of
+from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
 from busplan.sourced import SYMBOLS
@@ -32,7 +32,7 @@ _SYMBOLS: Final = MappingProxyType(
     }
 )
 """Symbol of a key in formulas, unless the equations or a kind of bus define it."""
-_TABLE: Final = "node.execution.time_us"
+_TABLE: Final = "execution.time_us"
 
 
 def given(profile: Profile, key: str) -> Input:
@@ -55,8 +55,8 @@ def given(profile: Profile, key: str) -> Input:
     section: Any = profile
     is_set, own_grade, graded_by = True, None, ""
     for number, part in enumerate(sections, start=1):
-        is_set = is_set and part in section.model_fields_set
-        section = getattr(section, part)
+        is_set = is_set and (isinstance(section, tuple) or part in section.model_fields_set)
+        section = value_at(profile, ".".join(sections[:number]))
         if getattr(section, "grade", None):
             own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
             grades = getattr(section, "grades", None)
@@ -71,15 +71,17 @@ def given(profile: Profile, key: str) -> Input:
     value = getattr(section, name)
     bus = bus_of(profile)
     # What is off by default is nobody's measurement, and a word that chooses is none.
-    is_no_measurement = (not is_set and not value) or key in bus.choosing_keys
+    is_no_measurement = (not is_set and not value) or _chooses(profile, key)
     grade = "given" if own_grade is None or is_no_measurement else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
-    default = bus.key_sources.get(key)
+    default = bus.key_sources.get(_of_alike_nodes(profile, key)[0])
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
     # A plain number shows no unit.
     unit = "" if unit == "1" else unit
-    symbol = _SYMBOLS.get(key) or bus.key_symbols.get(key) or SYMBOLS.get(name) or name
+    alike_key, group = _of_alike_nodes(profile, key)
+    symbol = _SYMBOLS.get(alike_key) or bus.key_symbols.get(alike_key) or SYMBOLS.get(name) or name
+    symbol = f"{symbol},{group}" if group else symbol
     return Input(symbol, key, value, unit, grade, source, description)
 
 
@@ -95,16 +97,33 @@ def traced_profile(profile: Profile) -> Profile:
     So are words that choose between numbers.
     """
     found = profile
-    for key in cycle_keys(profile.bus.kind):
-        value: Any = profile
-        for part in key.split("."):
-            value = getattr(value, part, None)
+    for key in cycle_keys(profile):
+        value = value_at(profile, key)
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if is_number or (isinstance(value, str) and key in bus_of(profile).choosing_keys):
+        if is_number or (isinstance(value, str) and _chooses(profile, key)):
             found = with_unchecked(found, key, traced(profile, key))
-    execution = profile.node.execution
-    if isinstance(execution, TableExecution):
-        table = GivenTable(execution.time_us)
-        table.given = given(profile, _TABLE)._replace(symbol="table", value=f"{len(execution.time_us)} points")
-        found = with_unchecked(found, _TABLE, table)
+    for one in profile.alike_nodes:
+        execution, key = one.node.execution, one.node_key(_TABLE)
+        if isinstance(execution, TableExecution):
+            table = GivenTable(execution.time_us)
+            symbol = f"table,{one.name}" if one.name else "table"
+            table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
+            found = with_unchecked(found, key, table)
     return found
+
+
+def _chooses(profile: Profile, key: str) -> bool:
+    """Whether the word of a key chooses between numbers."""
+    own = bus_of(profile).choosing_keys
+    return any(key == one.node_key(name) for one in profile.alike_nodes for name in own)
+
+
+def _of_alike_nodes(profile: Profile, key: str) -> tuple[str, str]:
+    """The key as it is where all nodes are alike, and the name of the group that it is of."""
+    if not key.startswith("group."):
+        return key, ""
+    _, group, name = key.split(".", 2)
+    if name == "nodes":
+        return "bus.nodes", group
+    (payload,) = models_of(type(profile).model_fields["payload"].annotation)
+    return f"{'payload' if name in payload.model_fields else 'node'}.{name}", group

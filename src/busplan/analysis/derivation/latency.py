@@ -13,7 +13,7 @@ def latency_names(profile: Profile) -> tuple[str, ...]:
     """Names of the transactions in `latency`, or of the cycle."""
     bus = bus_of(profile)
     model = bus.timing_models[0].name
-    return tuple(one.name for one in bus.cycle(network_of(profile), model=model).latencies())
+    return tuple(one.label for one in bus.cycle(network_of(profile), model=model).latencies())
 
 
 def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Traced]:
@@ -34,7 +34,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
         By key, all figures of `latency`.
     """
     bus, network = bus_of(profile), network_of(traced_profile(profile))
-    (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.name == kind)
+    (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.label == kind)
     found: dict[str, Number | None] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         "transaction": chosen(kind, "transaction", "transaction asked for"),

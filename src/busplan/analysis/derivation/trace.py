@@ -90,6 +90,10 @@ class Traced(SpecialNumber):
         self.key = ""
         self.symbol = given.symbol if given else ""
 
+    def same_as(self, other: SpecialNumber) -> bool:
+        """Whether both have one value."""
+        return isinstance(other, Traced) and bool(self.value == other.value)
+
     def named(self, key: str, symbol: str) -> "Traced":
         """Name a number, unless it has a name: it becomes a line of its own."""
         if not self.symbol:

@@ -84,8 +84,10 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     own = cure(profile, circle=circle)
     if own.changes is None or own.changes:
         return _change(profile, own, nodes=now.nodes), own.why
+    if now.safe_nodes is None:
+        return None, ""  # nodes differ, and nobody asked for more of which
     bound = bus_of(profile).limit(now.safe_limited_by or TIME)
-    nodes = (now.safe_nodes or 0) + 1
+    nodes = now.safe_nodes + 1
     if nodes > MAX_COUNT or (bound is not None and not bound.is_safety):
         return None, ""
     more = cure(override(profile, dict(with_nodes(nodes))), circle=circle)

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.machine import asked_nodes
+from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
 from busplan.sections.profile import Profile
 from busplan.servo.checks import no_multiple
@@ -63,10 +63,10 @@ def utilisation(profile: Profile) -> Iterator[Need]:
 
 def spare(profile: Profile) -> Iterator[Need]:
     """[limits] min_spare_nodes and min_spare_axes: more nodes must be shown to fit, too."""
-    network = network_of(profile)
-    for key, nodes in asked_nodes(profile).items():
-        found = shown(network.with_nodes(nodes))
-        yield found._replace(key=key, why=found.why and f"{key} asks for room for {nodes} nodes: {found.why}")
+    for room in rooms(profile):
+        found = shown(room.network)
+        why = found.why and f"{room.key} asks for room for {room.words}: {found.why}"
+        yield found._replace(key=room.key, why=why)
 
 
 CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, utilisation, spare)

@@ -10,14 +10,15 @@ from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.grid import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, Grid
 from busplan.analysis.planning.machine import (
-    NODES_KEYS,
-    PAYLOAD_KEYS,
+    NODES_KEY,
     Changes,
-    asked_nodes,
+    payload_keys,
+    rooms,
     with_nodes,
     with_payload_within,
 )
 from busplan.buses.bus import Cost
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_TIME_US
 
@@ -49,16 +50,18 @@ class Freedom(NamedTuple):
 
 def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
     """Everything that may be changed in a network, the cheapest first."""
+    network = network_of(profile)
     own = (
         Freedom(one.name, one.label, one.cost, one.keys, partial(_of_bus, one.name))
-        for one in bus_of(profile).settings(network_of(profile))
+        for one in bus_of(profile).settings(network)
     )
     found = (
         *own,
         Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
-        Freedom("payload", "payload", Cost.PAYLOAD, PAYLOAD_KEYS, _payloads),
+        Freedom("payload", "payload", Cost.PAYLOAD, payload_keys(profile), _payloads),
         Freedom("period", "period", Cost.PERIOD, (PERIOD,), _periods),
-        Freedom("nodes", "nodes", Cost.NODES, NODES_KEYS, _fewer_nodes),
+        # Where nodes differ, nobody but the user knows which can go.
+        *((Freedom("nodes", "nodes", Cost.NODES, (NODES_KEY,), _fewer_nodes),) if network.is_uniform else ()),
     )
     return tuple(sorted(found, key=lambda one: one.cost))
 
@@ -108,10 +111,8 @@ def freed(
 def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
     """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
     profile = search.profile(changes)
-    asked = asked_nodes(profile)
-    network = network_of(profile)
-    if asked:
-        network = network.with_nodes(max(asked.values()))
+    networks = (network_of(profile), *(room.network for room in rooms(profile)))
+    network = max(networks, key=lambda one: float(plain(one.nodes)))
     for setting in bus_of(profile).settings(network):
         if setting.name == name:
             yield from setting.values

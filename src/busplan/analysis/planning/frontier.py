@@ -29,7 +29,8 @@ def frontier(goal: Profile, search: Search, levels: Sequence[Freedom]) -> Iterat
     cheap = [one for one in levels if one.cost < Cost.PAYLOAD]
     yield _shortest_period(goal, search, cheap)
     yield _largest_payload(goal, search, cheap)
-    yield _most_nodes(search, cheap)
+    if not goal.group:
+        yield _most_nodes(search, cheap)
 
 
 def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
@@ -60,7 +61,8 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
     for size in range(largest, 0, -step):
         one = with_payload(goal, size)
         if one is None:
-            return Impossible(title, "the payload follows the axes of a node")
+            why = "each group has its own" if goal.group else "the payload follows the axes of a node"
+            return Impossible(title, why)
         if not search.allows(one):
             continue
         found = search.least(cheap, one) if search.reaches(one, cheap) else None

@@ -12,12 +12,13 @@ import numpy as np
 
 from busplan.analysis.capacity.certainty import VERDICTS, certainty, limits_to_be_safe, verdict_code
 from busplan.analysis.capacity.cycle import TIME, fits_in, limits_with_time
-from busplan.analysis.capacity.figures import certainty_numbers, numeric_figures
-from busplan.analysis.capacity.node_limit import MostNodes, most_nodes
+from busplan.analysis.capacity.figures import COUNTS, certainty_numbers, numeric_figures
+from busplan.analysis.capacity.node_limit import most_nodes
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
-from busplan.buses.bus import BusCycle
+from busplan.buses.bus import BusCycle, Limit
 from busplan.buses.figure import CERTAINTY, Sort
+from busplan.buses.network import Network
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
@@ -35,13 +36,15 @@ _TYPES: Final[Mapping[Sort, type]] = {"number": float, "count": int, "truth": bo
 
 
 def figure_names(profile: Profile) -> tuple[str, ...]:
-    """Columns of a sweep after the varied keys; `timing_model` is the first."""
-    return tuple(figure.key for figure in bus_of(profile).capacity_figures)
+    """Columns of a sweep after the varied keys; `timing_model` is the first, counts of groups are the last."""
+    groups = (f"group.{one.name}.{key}" for one in profile.group for key in COUNTS)
+    return (*(figure.key for figure in bus_of(profile).capacity_figures), *groups)
 
 
 def word_figures(profile: Profile) -> tuple[str, ...]:
     """Columns whose values are words."""
-    return tuple(figure.key for figure in bus_of(profile).capacity_figures if figure.sort in ("word", "words"))
+    words = [figure.key for figure in bus_of(profile).capacity_figures if figure.sort in ("word", "words")]
+    return (*words, *(f"group.{one.name}.{key}" for one in profile.group for key in COUNTS if key in words))
 
 
 class Column(NamedTuple):
@@ -164,57 +167,82 @@ def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
 def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     bus, network = bus_of(where), network_of(where)
     cycle = bus.cycle(network, model=model)
-    numbers = {**numeric_figures(cycle), **cycle.figures(), **{term.key: term.us for term in cycle.terms}}
+    figures = numeric_figures(cycle)
+    numbers = {**figures, **cycle.figures(), **{term.key: term.us for term in cycle.terms}}
     limits = limits_with_time(network, model=model)
-    late = np.logical_not(np.asarray(fits_in(numbers["required_us"], available_us=numbers["available_us"])))
+    late = np.logical_not(np.asarray(fits_in(figures["required_us"], available_us=figures["available_us"])))
     flags = [late if limit.key == TIME else np.asarray(limit.is_broken(network)) for limit in limits]
     bits = np.min_scalar_type((1 << len(flags)) - 1)
     exceeded: Array = np.asarray(sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags)))
-    most = most_nodes(network, limits)
-    numbers |= {"max_nodes": most.nodes, "max_axes": network.groups[0].axes * most.nodes, "fits": np.equal(exceeded, 0)}
+    numbers |= {"fits": np.equal(exceeded, 0)}
     keys = tuple(limit.key for limit in limits)
-    own = _certainty(cycle, most) if model == bus.deciding_model else _UNDECIDED
+    own = _certainty(cycle) if model == bus.deciding_model else _UNDECIDED
     words = {
+        **_counts(network, limits, model=model),
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
         "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
-        "limited_by": Column(np.asarray(most.limit, np.uint8), keys),
         "exceeded": Column(exceeded, _combinations(keys)),
         **own,
     }
+    sorts = {figure.key: figure.sort for figure in bus.capacity_figures}
     found = {
-        figure.key: words[figure.key] if figure.key in words else Column(_typed(numbers[figure.key], figure.sort))
-        for figure in bus.capacity_figures
+        key: words[key] if key in words else _number(numbers[key], sorts[key]) for key in figure_names(network.profile)
     }
     return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
 
 
 _NO_WORD: Final = Column(np.zeros((), np.uint8), (None,))
 _NO_NUMBER: Final = Column(np.full((), np.nan))
-_UNDECIDED: Final = {figure.key: _NO_WORD if figure.sort == "word" else _NO_NUMBER for figure in CERTAINTY}
+_UNDECIDED: Final = {
+    figure.key: _NO_WORD if figure.sort == "word" else _NO_NUMBER for figure in CERTAINTY if figure.key not in COUNTS
+}
 """Figures that a timing model does not have."""
 
 
-def _certainty(cycle: BusCycle, most: MostNodes) -> dict[str, Column]:
+def _number(number: Number | None, sort: Sort) -> Column:
+    return _NO_NUMBER if number is None else Column(_typed(number, sort))
+
+
+def _counts(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Column]:
+    """How many nodes fit: of the whole where all are alike, otherwise of each group, the others as they are."""
+    whole = {**dict.fromkeys(COUNTS, _NO_NUMBER), "limited_by": _NO_WORD, "safe_limited_by": _NO_WORD}
+    if network.is_uniform:
+        return _counts_of(network, limits, model=model)
+    each = ((name, _counts_of(network.asking(name), limits, model=model)) for name in network.names)
+    return {**whole, **{f"group.{name}.{key}": column for name, found in each for key, column in found.items()}}
+
+
+def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict[str, Column]:
+    most, axes = most_nodes(network, limits), network.asked_nodes.node.axes
+    found = {
+        "max_nodes": _number(most.nodes, "count"),
+        "max_axes": _number(axes * most.nodes, "count"),
+        "limited_by": Column(np.asarray(most.limit, np.uint8), tuple(limit.key for limit in limits)),
+    }
+    if model != bus_of(network.profile).deciding_model:
+        return {**found, "safe_nodes": _NO_NUMBER, "safe_axes": _NO_NUMBER, "safe_limited_by": _NO_WORD}
+    to_be_safe = limits_to_be_safe(network)
+    # No more nodes are shown to fit than fit.
+    safe = most_nodes(network, to_be_safe, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
+    return {
+        **found,
+        "safe_nodes": _number(safe.nodes, "count"),
+        "safe_axes": _number(axes * safe.nodes, "count"),
+        "safe_limited_by": Column(np.asarray(safe.limit, np.uint8), tuple(limit.key for limit in to_be_safe)),
+    }
+
+
+def _certainty(cycle: BusCycle) -> dict[str, Column]:
     """Figures of how sure the verdict is, of a cycle under the timing model that decides."""
     network, bus = cycle.network, bus_of(cycle.network.profile)
-    found, limits = certainty(cycle), limits_to_be_safe(network)
-    # No more nodes are shown to fit than fit.
-    safe = most_nodes(network, limits, ceiling=int(np.max(np.asarray(most.nodes))) + 1)
+    found = certainty(cycle)
     broken: Array = np.asarray(False)
     for limit in bus.limits:
         if not limit.is_safety:
             broken = np.logical_or(broken, np.asarray(limit.is_broken(network)))
     sorts = {figure.key: figure.sort for figure in CERTAINTY}
-    numbers = {
-        **certainty_numbers(found, cycle),
-        "safe_nodes": safe.nodes,
-        "safe_axes": network.groups[0].axes * safe.nodes,
-    }
     return {
-        **{
-            key: _NO_NUMBER if number is None else Column(_typed(number, sorts[key])) for key, number in numbers.items()
-        },
-        "safe_limited_by": Column(np.asarray(safe.limit, np.uint8), tuple(limit.key for limit in limits)),
+        **{key: _number(number, sorts[key]) for key, number in certainty_numbers(found, cycle).items()},
         "verdict": Column(np.asarray(verdict_code(found, network, is_broken=broken), np.uint8), VERDICTS),
     }
 

@@ -1,6 +1,6 @@
 """A full grid of profile values in row-major order, in chunks: no axis is in memory as a whole."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from math import prod
 from typing import Any, Final, NamedTuple
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from busplan.analysis.network import known_model, model_names
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
+from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
@@ -181,13 +182,10 @@ def checked_grid(
     BusplanError
         A key that is unknown, not a number, or without effect here; a value that the profile's schema refuses.
     """
-    for key in axes:
-        _require_known(profile, key, name=f"{option} {key}")
+    require_keys(profile, axes, option=option, circle_option=None if with_circle else circle_option)
     samples = {key: _samples(axis) for key, axis in axes.items()}
     first: dict[str, object] = {key: values[0] for key, values in samples.items()}
     override(profile, first)
-    for key in axes:
-        _require_read(profile, key, name=f"{option} {key}", circle_option=None if with_circle else circle_option)
     for key, values in samples.items():
         for value in values[1:]:
             override(profile, {**first, key: value})
@@ -200,6 +198,30 @@ def checked_grid(
             f"{option}: {grid.points:,} points are more than the {MAX_POINTS:,} a sweep takes; vary less"
         )
     return grid
+
+
+def require_keys(profile: Profile, keys: Iterable[str], *, option: str, circle_option: str | None) -> None:
+    """Refuse keys that cannot vary, whatever their values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    keys
+        Dotted keys.
+    option
+        What gives them, for messages.
+    circle_option
+        What requests circle tests, for messages; None where they are run.
+
+    Raises
+    ------
+    BusplanError
+        A key that is unknown, not a number, or without effect here.
+    """
+    for key in keys:
+        _require_known(profile, key, name=f"{option} {key}")
+        _require_read(profile, key, name=f"{option} {key}", circle_option=circle_option)
 
 
 def grid_models(profile: Profile, grid: Grid, asked: Sequence[str] | None, *, name: str) -> tuple[str, ...]:
@@ -235,12 +257,13 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
     *tables, last = key.split(".")
     table: Any = profile.model_dump()
     for part in tables:
-        table = table.get(part) if isinstance(table, dict) else None
+        named = named_tables(table)
+        table = named.get(part) if named else table.get(part) if isinstance(table, dict) else None
     if not isinstance(table, dict) or last not in table:
         section = ".".join(tables)
         siblings = list(table) if isinstance(table, dict) and tables else []
         close = [f"{section}.{one}" for one in get_close_matches(last, siblings, n=1, cutoff=0.7)]
-        read = cycle_keys(profile.bus.kind)
+        read = cycle_keys(profile)
         close = close or get_close_matches(key, read, n=1, cutoff=0.8) * (not siblings)
         known = f"known in {section} are {', '.join(siblings)}" if siblings else f"try {', '.join(read)}"
         hint = f"did you mean {close[0]}?" if close else known
@@ -252,7 +275,7 @@ def _require_known(profile: Profile, key: str, *, name: str) -> None:
 
 def _require_read(profile: Profile, key: str, *, name: str, circle_option: str | None) -> None:
     """Refuse a key that no computed figure depends on; without `circle_option`, circle tests are computed."""
-    if key in cycle_keys(profile.bus.kind):
+    if key in cycle_keys(profile):
         return
     section = key.partition(".")[0]
     if section not in CIRCLE_SECTIONS:

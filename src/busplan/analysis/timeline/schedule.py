@@ -134,7 +134,8 @@ def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
     if nodes > MOST_NODES:
         limit = bus.limit("nodes")
         carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
-        raise BusplanError(f"bus.nodes = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
+        where = "bus.nodes" if network.is_uniform else "nodes of all groups"
+        raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
     model = leading_model(profile) if model is None else model
     closed = figures(profile, model=model)
     events = list(islice(_laid_out(cycle_of(profile, model=model).events()), MOST_EVENTS + 1))

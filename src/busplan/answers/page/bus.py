@@ -6,9 +6,11 @@ from typing import Final
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.capacity import capacity_table
+from busplan.answers.capacity import capacity_table, groups_table
 from busplan.answers.latency import latency_tables
+from busplan.answers.map import headline, map_chart, regions_table
 from busplan.answers.page.commands import Sources
+from busplan.answers.sensitivity import sensitivity_blocks
 from busplan.answers.timeline import timeline_chart, totals_table
 from busplan.answers.verdict import places_of, verdict_sentences
 from busplan.buses.figure import (
@@ -62,6 +64,7 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     facts = tuple(
         (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
         for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
+        if figure is not SAFE_AXES or not answer.profile.group
     )
     question = Question(
         "Does the cycle fit its period?",
@@ -82,6 +85,7 @@ def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
         Sentence(("The timing models, side by side" if several else "The timing model",)),
         (
             capacity.gives(capacity_table(answer.profile, answer.capacity.results)),
+            *(map(capacity.gives, [groups_table(answer.capacity.results)] if answer.profile.group else [])),
             *map(latency.gives, latency_tables(answer.latency, answer.profile)),
             capacity.line,
             latency.line,
@@ -133,8 +137,17 @@ def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
         yield attribute_value(term, one, at=f"/results/{number}")
 
 
+def sensitivity_part(answer: AllAnswers, sources: Sources) -> Chapter:
+    """What moves the margin, and what binds next."""
+    source = sources["capacity"]
+    blocks = map(source.gives, sensitivity_blocks(answer.sensitivity, at="/verdicts/0"))
+    return Chapter(Sentence(("What moves the margin",)), (*blocks, source.line), "sensitivity")
+
+
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
-    """The most axes over the period, as a chart and as a table."""
+    """The most axes over the period, as a chart and as a table; of groups, the most nodes of each."""
+    if answer.profile.group:
+        return _groups_part(answer, sources)
     source, steps = sources["axes"], answer.steps
     network = network_of(answer.profile)
     nodes, axes = int(network.nodes), int(network.axes)
@@ -158,6 +171,37 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
     )
     chart = Chart(AxesDrawing(answer.profile, steps), caption)
     return Chapter(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
+
+
+def map_part(answer: AllAnswers, sources: Sources) -> Chapter:
+    """The map of period against axes, and what limits each region."""
+    source, found = sources["map"], answer.trade_off
+    table = source.gives(regions_table(found))
+    return Chapter(
+        Sentence(("What fits, and what limits it",)), (headline(found), map_chart(found), table, source.line), "map"
+    )
+
+
+def _groups_part(answer: AllAnswers, sources: Sources) -> Chapter:
+    source = sources["axes"]
+    columns = [TableColumn("period", "us")]
+    for one in answer.profile.group:
+        columns += (
+            TableColumn(SAFE_NODES.label, group=one.name),
+            TableColumn("limited by", kind="words", group=one.name),
+        )
+    rows, number = [], 0
+    for results in answer.periods.periods:
+        cells = [attribute_value(PERIOD, results[0], at=f"/results/{number}")]
+        for place, figures in enumerate(results, start=number):
+            for index, group in enumerate(figures.groups if figures.verdict is not None else ()):
+                at = f"/results/{place}/groups/{index}"
+                cells += (attribute_value(figure, group, at=at) for figure in (SAFE_NODES, SAFE_LIMITED_BY))
+        number += len(results)
+        rows.append(TableRow(tuple(cells), highlighted=results[0].period_us == answer.profile.cycle.period_us))
+    caption = Sentence(("Nodes of each group that a period carries, the others as they are, all shown to fit",))
+    table = Table(tuple(columns), tuple(rows), caption)
+    return Chapter(Sentence(("Nodes against period",)), (source.gives(table), source.line), "axes")
 
 
 def _over_period(answer: AllAnswers) -> Iterator[TableRow]:

@@ -12,6 +12,8 @@ from busplan.answers.capacity import capacity_document
 from busplan.answers.circle import circle_document
 from busplan.answers.documents import changed_document
 from busplan.answers.latency import latency_document
+from busplan.answers.map import map_document
+from busplan.answers.sensitivity import sensitivity_document
 from busplan.answers.timeline import timeline_document
 from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
 from busplan.printable import has_controls
@@ -103,12 +105,14 @@ def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges)
     # Neither latency nor the list of explain takes --period.
     elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
     bus, periods = answer.capacity, answer.periods
-    add("capacity", "verdict, timing models, terms", capacity_document(bus, (answer.verdict,)))
+    document = sensitivity_document(bus, (answer.verdict,), (answer.sensitivity,))
+    add("capacity", "verdict, timing models, terms, what moves the margin", document, "--sensitivity")
     add("latency", "latencies, part by part", latency_document(answer.latency), own=elsewhere)
     if answer.schedule is not None:
         add("timeline", "the cycle event by event", timeline_document(answer.schedule))
     others = changes.without(key="cycle.period_us")
     add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
+    add("map", "period against axes, cell by cell", map_document(answer.trade_off))
     if answer.circle is not None:
         document = circle_document(answer.circle, with_contributions=True)
         add("circle", "the circle and its error sources", document, "--contributions")

@@ -9,7 +9,15 @@ from busplan.analysis.network import bus_of
 from busplan.answers.assumptions import assumptions_table
 from busplan.answers.circle_verdict import verdict_words
 from busplan.answers.documents import document
-from busplan.answers.page.bus import axes_part, bus_question, models_part, terms_part, timeline_part
+from busplan.answers.page.bus import (
+    axes_part,
+    bus_question,
+    map_part,
+    models_part,
+    sensitivity_part,
+    terms_part,
+    timeline_part,
+)
 from busplan.answers.page.circle import circle_part, circle_question, sources_part
 from busplan.answers.page.commands import Sources, shell_word, sources
 from busplan.buses.figure import (
@@ -131,7 +139,9 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     yield models_part(answer, found)
     yield timeline_part(answer, found)
     yield terms_part(answer, found)
+    yield sensitivity_part(answer, found)
     yield axes_part(answer, found)
+    yield map_part(answer, found)
     yield circle_part(answer, found)
     ranked = sources_part(answer, found)
     if ranked is not None:

@@ -1,12 +1,13 @@
 """Answer of `busplan sweep` for people: how many points fit, and the top rows."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isnan
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
+from busplan.analysis.capacity.figures import COUNTS
 from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
@@ -31,7 +32,7 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import nouns
 from busplan.sections.profile import Profile
 
-DEFAULT_COLUMNS: Final = (
+_DEFAULT_COLUMNS: Final = (
     "required_us",
     "available_us",
     "margin_us",
@@ -45,6 +46,14 @@ DEFAULT_COLUMNS: Final = (
 """Default figures of a table."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
 """Default figures of circle tests."""
+
+
+def default_columns(profile: Profile) -> tuple[str, ...]:
+    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole."""
+    if not profile.group:
+        return _DEFAULT_COLUMNS
+    whole = (key for key in _DEFAULT_COLUMNS if key not in COUNTS)
+    return (*whole, *(f"group.{one.name}.safe_nodes" for one in profile.group))
 
 
 class Tally:
@@ -114,9 +123,7 @@ class Tally:
                 Sentence((".",)),
                 by="",
             )
-        if "node.axes" in self._varied and not self.profile.payload.follows_axes:
-            keys = Code("payload.read_bytes_per_axis"), Code("payload.write_bytes_per_axis")
-            yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
+        yield from payload_sentences(self.profile, self._varied)
         safety = self.bus.safety_figure
         if self._unsafe and safety is not None:
             words = f"At {{}} points the {self.bus.safety} is unsafe ({safety.key})."
@@ -140,6 +147,24 @@ class Tally:
             for count, model in zip(counts, self._models, strict=True)
         )
         return joined(*parts, by=" and ")
+
+
+def payload_sentences(profile: Profile, varied: Collection[str]) -> Iterator[Sentence]:
+    """Say that the payload does not follow the axes of a node, where these vary.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    varied
+        Keys that vary.
+    """
+    for one in profile.alike_nodes:
+        if one.node_key("axes") not in varied or one.payload.follows_axes:
+            continue
+        section = f"group.{one.name}" if one.name else "payload"
+        keys = Code(f"{section}.read_bytes_per_axis"), Code(f"{section}.write_bytes_per_axis")
+        yield sentence("The payload does not depend on the axes of a node: {} and {} say what each adds.", *keys)
 
 
 def _share(flags: Array, points: int) -> int:

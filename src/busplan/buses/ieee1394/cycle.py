@@ -1,7 +1,8 @@
 """One communication cycle on an IEEE 1394 bus: as terms, as events, and the figures that go with it."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, reduce
+from itertools import repeat
 from typing import Final
 
 from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
@@ -15,12 +16,21 @@ from busplan.buses.ieee1394.constants import (
     SYNC_PACKET_BYTES,
     safe_gap_count,
 )
-from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Phases, TimingModelName, delays
-from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, Exchange, events, exchange, link_of
+from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
+from busplan.buses.ieee1394.transactions import (
+    LATENCY_SYMBOLS,
+    Exchange,
+    Ways,
+    charges_own_hops,
+    events,
+    exchange,
+    link_of,
+    ways,
+)
 from busplan.buses.network import Network
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number, is_off, is_one, larger, named, plain, rounded_down, total
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 _OF_TRANSACTIONS: Final = (
     "cycle_arbitration_us",
@@ -33,12 +43,18 @@ _OF_TRANSACTIONS: Final = (
     "cycle_host_us",
 )
 """Terms that add up the parts of all transactions."""
+_SHOWN: Final = (
+    *("latency_us", "latency_with_gaps_us", "transaction_us"),
+    *("gaps_us", "subaction_gap_us", "arbitration_reset_gap_us"),
+)
+"""Phases of a transaction that are figures of a cycle."""
 
 
 class Ieee1394Cycle(BusCycle):
     """The synchronous packet, a read and then a write of every node, and the window for non-periodic data.
 
-    Every node is charged the hops of the farthest.
+    Every node is charged the hops of the farthest, or, with `charge_hops = "own"`, its own. What all nodes hear, as the
+    synchronous packet, goes to the farthest.
 
     References
     ----------
@@ -55,16 +71,29 @@ class Ieee1394Cycle(BusCycle):
     @cached_property
     def exchanges(self) -> tuple[Exchange, ...]:
         """Every transaction of the cycle, group by group."""
-        network, model, link, common = self.network, self.model, self.link, self._delays
         return tuple(
-            exchange(network, group, kind, model=model, link=link, common=common, suffix=f",{kind}")
+            self._exchange(place, kind, None, suffix=f",{kind}{group.name and f',{group.name}'}")
             for kind in TRANSACTION_KINDS
-            for group in network.groups
+            for place, group in enumerate(self.network.groups)
         )
 
     @cached_property
+    def _ways(self) -> tuple[Ways, ...]:
+        return ways(self.network)
+
+    def _exchange(self, place: int, kind: TransactionKind, hops: Number | None, *, suffix: str = "") -> Exchange:
+        """The transaction of a group by its place, with a node at some hops or, without them, on the mean."""
+        network, own = self.network, charges_own_hops(self.network)
+        link = self.link._replace(hops=self._ways[place].mean if hops is None else hops) if own else self.link
+        common = self._delays_of(link, self._delays) if own else self._delays
+        return exchange(network, network.groups[place], kind, model=self.model, link=link, common=common, suffix=suffix)
+
+    @cached_property
     def _delays(self) -> Delays:
-        found = delays(self.link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes))
+        return self._delays_of(self.link, None)
+
+    def _delays_of(self, link: Link, shared: Delays | None) -> Delays:
+        found = delays(link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes), shared=shared)
         for key, number in (
             ("arbitration_us", found.arbitration_us),
             ("acknowledge_us", found.acknowledge_us),
@@ -191,9 +220,9 @@ class Ieee1394Cycle(BusCycle):
         """Whether the error of the model is known: of the one that decides."""
         return self.model == "standard"
 
-    def figures(self) -> Mapping[str, Number]:
+    def figures(self) -> Mapping[str, Number | None]:
         """How the bus is set, the latencies, and the number of nodes as the paper has it."""
-        network, (read, write) = self.network, _one_of_each(self.exchanges)
+        network, read, write = self.network, self._longest("read"), self._longest("write")
         safe = safe_gap_count(self.link.hops)
         given_us = time_slice_us(network.period_us, slice_ratio=network.slice_ratio, nodes=1)
         return {
@@ -201,29 +230,54 @@ class Ieee1394Cycle(BusCycle):
             "gap_count": self.link.gap_count,
             "safe_gap_count": safe,
             "gap_count_safe": self.link.gap_count >= named(safe, "safe_gap_count", "g_safe"),
-            "read_latency_us": read.latency_us,
-            "write_latency_us": write.latency_us,
-            "read_latency_with_gaps_us": read.latency_with_gaps_us,
-            "write_latency_with_gaps_us": write.latency_with_gaps_us,
-            "read_transaction_us": read.transaction_us,
-            "write_transaction_us": write.transaction_us,
-            "gaps_us": read.gaps_us,
-            "subaction_gap_us": read.subaction_gap_us,
-            "arbitration_reset_gap_us": read.arbitration_reset_gap_us,
+            "read_latency_us": read["latency_us"],
+            "write_latency_us": write["latency_us"],
+            "read_latency_with_gaps_us": read["latency_with_gaps_us"],
+            "write_latency_with_gaps_us": write["latency_with_gaps_us"],
+            "read_transaction_us": read["transaction_us"],
+            "write_transaction_us": write["transaction_us"],
+            "gaps_us": read["gaps_us"],
+            "subaction_gap_us": read["subaction_gap_us"],
+            "arbitration_reset_gap_us": read["arbitration_reset_gap_us"],
             "nodes_eq11": equations.published_nodes(
                 named(given_us, AVAILABLE.key, AVAILABLE.symbol),
                 sync_us=self.sync_us,
-                latency_us=(read.latency_us + write.latency_us) / 2,
-                gaps_us=read.gaps_us,
-            ),
+                latency_us=(read["latency_us"] + write["latency_us"]) / 2,
+                gaps_us=read["gaps_us"],
+            )
+            if network.is_uniform
+            else None,
         }
 
+    def _longest(self, kind: TransactionKind) -> dict[str, Number]:
+        """Each of these times of the transactions of one kind with the farthest node of each group, the longest."""
+        each = [one.phases for one in self._farthest if one.kind == kind]
+        return {key: reduce(larger, (getattr(one, key) for one in each)) for key in _SHOWN}
+
+    @cached_property
+    def _farthest(self) -> tuple[Exchange, ...]:
+        """Transactions with the farthest node of each group."""
+        if not charges_own_hops(self.network):
+            return self.exchanges
+        return tuple(
+            self._exchange(place, kind, self._ways[place].last, suffix=f",{kind}{group.name and f',{group.name}'}")
+            for kind in TRANSACTION_KINDS
+            for place, group in enumerate(self.network.groups)
+        )
+
     def latencies(self) -> tuple[BusLatency, ...]:
-        """One read and one write of the farthest node."""
-        setup = {"hops": self.link.hops, "gap_count": self.link.gap_count}
-        (group,) = self.network.groups
-        found = (exchange(self.network, group, kind, model=self.model, link=self.link) for kind in TRANSACTION_KINDS)
-        return tuple(BusLatency(one.kind, one.payload_bytes, {**setup, **one.phases._asdict()}) for one in found)
+        """One read and one write of the farthest node of each group."""
+        places = range(len(self.network.groups))
+        found = (self._exchange(place, kind, self._ways[place].last) for place in places for kind in TRANSACTION_KINDS)
+        return tuple(
+            BusLatency(
+                one.kind,
+                one.payload_bytes,
+                {"hops": one.link.hops, "gap_count": one.link.gap_count, **one.phases._asdict()},
+                one.group.name,
+            )
+            for one in found
+        )
 
     def events(self) -> Iterator[BusEvent]:
         """The cycle in the order of its protocol, node by node; a cycle start goes when it is due, or at the end."""
@@ -245,8 +299,8 @@ class Ieee1394Cycle(BusCycle):
         yield [BusEvent("sync", "sync_us", plain(self.sync_us), "synchronous packet")]
         for kind in TRANSACTION_KINDS:
             node = 0
-            for one in self.exchanges:
-                for _ in range(int(one.nodes) if one.kind == kind else 0):
+            for place, group in enumerate(self.network.groups):
+                for one in self._of_each_node(place, kind, int(group.nodes)):
                     node += 1
                     yield [part._replace(node=node, transaction=kind) for part in events(one, model=self.model)]
         retries = 0 if self.model == "paper" else self.network.profile.cycle.retries
@@ -254,6 +308,15 @@ class Ieee1394Cycle(BusCycle):
             retry_us = plain(self.retries_us) / retries
             yield [BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request")]
         yield [BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")]
+
+    def _of_each_node(self, place: int, kind: TransactionKind, nodes: int) -> Iterable[Exchange]:
+        """The transaction with each node of a group."""
+        if not charges_own_hops(self.network):
+            return repeat(
+                next(one for one in self.exchanges if one.kind == kind and one.group is self.network.groups[place]),
+                nodes,
+            )
+        return (self._exchange(place, kind, self._ways[place].of_node(number)) for number in range(nodes))
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """What the cycle could have and does not say."""
@@ -273,9 +336,3 @@ def _sum(parts_us: Sequence[Number]) -> Number:
     """The sum of some parts, one or more; of equal ones as a product, which a derivation shows shorter."""
     first_us = parts_us[0]
     return len(parts_us) * first_us if all(one is first_us for one in parts_us) else total(parts_us)
-
-
-def _one_of_each(exchanges: tuple[Exchange, ...]) -> tuple[Phases, Phases]:
-    """Phases of the read and of the write of the one group."""
-    read, write = exchanges
-    return read.phases, write.phases

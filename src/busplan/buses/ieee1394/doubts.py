@@ -77,7 +77,9 @@ def of_cycle(
     # One reading is wrong by the same share in all: signs count.
     of_split_us = total(halves * _gap_term_us(_measured_at(node), link.gap_count, "d_split") for node, halves in split)
     gap_term_us = of_split_us + others * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
-    of_packets = total(one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) for one in exchanges)
+    of_packets = total(
+        one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) * one.link.hops for one in exchanges
+    )
     half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
@@ -109,19 +111,13 @@ def of_cycle(
             total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split) + others * spread_us,
         ),
         Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
-        *(
-            Doubt(
-                group.key("execution"),
-                f"execution time of {group.name}" if group.name else "execution time",
-                total(
-                    one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0)
-                    for one in exchanges
-                    if one.group is group
-                ),
-            )
-            for group in network.groups
+        Doubt(
+            "node.execution" if network.is_uniform else "group.execution",
+            "execution time",
+            # Times of several groups are measured, or guessed, in one way: they are taken to err together.
+            total(one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0) for one in exchanges),
         ),
-        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays) * link.hops * half_width_us / _RECTANGULAR),
+        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays * link.hops) * half_width_us / _RECTANGULAR),
         Doubt(
             "host.transaction_us",
             "host time",

@@ -3,7 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, Cost, EventKind, Halves, Limit, PayloadRange, Setting, TimingModel, Value
+from busplan.buses.bus import (
+    Bus,
+    Cost,
+    EventKind,
+    Halves,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    TimingModel,
+    Value,
+)
 from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
 from busplan.buses.ieee1394.constants import (
@@ -21,7 +32,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.limits import LIMITS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
-from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
+from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
@@ -33,6 +44,8 @@ if TYPE_CHECKING:
     from busplan.buses.published import PaperSection
 
 _PHASES: Final = by_key(figures.LATENCY)
+_HOST_STEP_US: Final = 10.0
+"""How much slower the host is made, to see what that does to the margin."""
 
 
 def _kind(key: str, label: str, phase: str, mark: str, ink: Ink) -> EventKind:
@@ -105,7 +118,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "cycle.sync.ping_us": "ping",
         "cycle.sync.ping_per_node_us": "ping_node",
     }
-    choosing_keys = ("node.execution.grade", "node.execution.residual")
+    choosing_keys = ("execution.grade", "execution.residual")
     warning_keys = ("bus.cable_length_m",)
     warning_constants = (REFERENCE_CABLE_M,)
     change_meanings: ClassVar[Mapping[str, str]] = {
@@ -116,6 +129,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "node.write_response": "if the nodes can",
     }
     reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
+    term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
+        {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
+        {"host.transaction_us": 0.0},
+        {"cycle.retries": 0},
+    )
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
@@ -123,7 +141,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "node.read_response": "reads {}",
         "node.write_response": "writes {}",
     }
-    way_charged = "every node at the hops of the farthest"
 
     def profile_model(self) -> "type[Ieee1394Profile]":
         """The model of its profiles."""
@@ -146,41 +163,43 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         own = {
             "bus.cycle_master": profile.bus.cycle_master,
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
+            "bus.charge_hops": profile.bus.charge_hops != "farthest",
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
-        for group in network.groups:
-            own[group.key("read_response")] = group.node.read_response != "split"
-            own[group.key("write_response")] = group.node.write_response != "split"
-            own[group.key("execution.worst_extra_us")] = group.node.execution.worst_extra_us
+        for one in network.alike:
+            own[one.node_key("read_response")] = one.node.read_response != "split"
+            own[one.node_key("write_response")] = one.node.write_response != "split"
+            own[one.node_key("execution.worst_extra_us")] = one.node.execution.worst_extra_us
         return tuple(key for key, is_set in own.items() if is_set) if model == "paper" else ()
 
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""
         nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
-        return ", ".join((f"farthest of {nodes}", *self.setup_words(network)))
+        farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
+        return ", ".join((farthest, *self.setup_words(network)))
 
-    def halves(self, network: Network, *, model: str, kind: str, payload_bytes: int) -> Halves:
-        """What the packets of a split transaction with the farthest node take.
+    def halves(self, network: Network, *, group: str, model: str, kind: str, payload_bytes: int) -> Halves:
+        """What the packets of a split transaction with the farthest node of a group take.
 
         Raises
         ------
         BusplanError
             Nodes do not answer such a transaction split: then no execution time is on the bus.
         """
-        (group,) = network.groups
-        answer = getattr(group.node, f"{kind}_response")
+        said = next(one for one in network.alike if one.name == group)
+        answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
         if answer != "split":
             raise BusplanError(
-                f'node.{kind}_response = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
-                f'be found from its latency; leave its lines out, or calibrate with node.{kind}_response = "split"'
+                f'{key} = "{answer}": a {answer} {kind} has no execution time on the bus, so none can '
+                f'be found from its latency; leave its lines out, or calibrate with {key} = "split"'
             )
         phases = transaction(
             kind,  # type: ignore[arg-type]
             model=TIMING_MODELS[model],  # type: ignore[index]
-            link=link_of(network),
+            link=farthest_link(network, group),
             payload_bytes=payload_bytes,
-            overhead_bytes=network.profile.payload.overhead_bytes,
+            overhead_bytes=said.payload.overhead_bytes,
             responder=Responder(0.0),
         )
         parts_us = (phases.latency_us, phases.request_and_acknowledge_us, phases.subaction_gap_us)
@@ -198,10 +217,32 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """The gap count, one register in each node, and how the nodes answer. Transactions have no other schedule."""
         return (_gap_count(network), _responses(network))
 
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """One hop, one busy retry, and a slower host."""
+        profile = network.profile
+        is_chain = profile.bus.max_hops is None
+        return (
+            Perturbation(
+                "one hop more",
+                {"bus.max_hops": int(hops_of(network)) + 1},
+                why_not="in a chain the hops follow the nodes" if is_chain else "",
+            ),
+            Perturbation("one busy retry more", {"cycle.retries": profile.cycle.retries + 1}),
+            Perturbation(
+                f"host time +{_HOST_STEP_US:g} us",
+                {"host.transaction_us": profile.host.transaction_us + _HOST_STEP_US},
+                if_nothing="the gaps behind the transactions hide it",
+            ),
+        )
+
     def payloads(self, network: Network) -> PayloadRange:
         """Whole quadlets up to the largest packet of the speed."""
         speed = network.profile.bus.speed
         return PayloadRange(QUADLET_BYTES, int(MAX_PAYLOAD_BYTES[speed]), "speed", carrier=speed)
+
+    def way_charged(self, network: Network) -> str:
+        """Say whose hops each node is charged."""
+        return f"every node at {'its own hops' if charges_own_hops(network) else 'the hops of the farthest'}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Hops and gap count."""
@@ -212,13 +253,13 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """An unsafe gap count, and cables that the table does not hold for."""
         bus, found = network.profile.bus, []
         limit = "" if bus.cable_is_standard else f" for cables of up to {REFERENCE_CABLE_M:g} m"
-        for number in nodes:
-            with_them = network.with_nodes(number)
-            if not self.is_safe(with_them):
-                hops, given = hops_of(with_them), gap_count_of(with_them)
+        for one in [network.with_nodes(number) for number in nodes] if network.is_uniform else [network]:
+            if not self.is_safe(one):
+                hops, given = hops_of(one), gap_count_of(one)
                 found.append(
                     f"Warning: gap count {given} is unsafe for {hops} hop{'s' * (hops != 1)} "
-                    f"({number} node{'s' * (number != 1)}); the smallest safe one is {safe_gap_count(hops)}{limit}."
+                    f"({one.nodes} node{'s' * (one.nodes != 1)}); "
+                    f"the smallest safe one is {safe_gap_count(hops)}{limit}."
                 )
                 break
         if not bus.cable_is_standard:

@@ -1,6 +1,7 @@
 """Rules of the gate that only an IEEE 1394 bus has: its limits, its gap count, its packets, its two timing models."""
 
 from collections.abc import Iterator
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 from busplan.buses.ieee1394.constants import (
@@ -49,9 +50,10 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
 def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More nodes than one bus has addresses for."""
     if "nodes" in subject.deciding.exceeded:
-        nodes = subject.profile.bus.nodes
+        each = subject.profile.alike_nodes
+        nodes = sum(one.nodes for one in each)
         yield RuleProblem(
-            "bus.nodes", f"{nodes} nodes are over the {MAX_NODES:g} of one bus; put the others on a second bus"
+            each[-1].nodes_key, f"{nodes} nodes are over the {MAX_NODES:g} of one bus; put the others on a second bus"
         )
 
 
@@ -61,7 +63,7 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
         chain = _bus(subject).max_hops is None
         cure = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
         yield RuleProblem(
-            "bus.nodes" if chain else "bus.max_hops",
+            subject.profile.alike_nodes[-1].nodes_key if chain else "bus.max_hops",
             f"{subject.deciding.hops} hops are over the {MAX_HOPS:g} of one bus; {cure}",
         )
 
@@ -89,9 +91,8 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def _payloads(subject: RuleSubject) -> Iterator[tuple[str, int]]:
-    payload, axes = subject.profile.payload, subject.profile.node.axes
-    for kind in TRANSACTION_KINDS:
-        yield payload.key_of(kind), int(payload.bytes_of(kind, axes=axes))
+    for alike, kind in product(subject.profile.alike_nodes, TRANSACTION_KINDS):
+        yield alike.payload_key(kind), int(alike.bytes_of(kind))
 
 
 def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -113,13 +114,17 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
         return  # no time is left, so none can be saved
     if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
         after = subject.after({"bus.gap_count": "optimal"})
-        won = (after.safe_nodes or 0) - (one.safe_nodes or 0)
+        won = "" if one.safe_nodes is None else _won((after.safe_nodes or 0) - one.safe_nodes)
         yield RuleProblem(
             "bus.gap_count",
             f"gap count {one.gap_count} is above the {one.safe_gap_count} that {one.hops} hops need; "
-            f"the latter would save {microseconds(one.required_us - after.required_us)} a cycle "
-            f"and win {won} node{'s' * (won != 1)}",
+            f"the latter would save {microseconds(one.required_us - after.required_us)} a cycle"
+            f"{won}",
         )
+
+
+def _won(nodes: int) -> str:
+    return f" and win {nodes} node{'s' * (nodes != 1)}"
 
 
 RULES: Final = (

@@ -18,7 +18,15 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
-from busplan.sections.cycle import BusSection, CycleSection, NodeSection, PayloadSection, SliceRatio
+from busplan.sections.cycle import (
+    BusSection,
+    CycleSection,
+    GroupAxes,
+    GroupSection,
+    NodeSection,
+    PayloadSection,
+    SliceRatio,
+)
 from busplan.sections.execution import UNKNOWN_SHARE, LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
@@ -57,7 +65,7 @@ class Ieee1394Bus(BusSection):
         description='Gap count of all nodes, 0..63, or "optimal": the smallest safe one for the hops',
         examples=[MAX_GAP_COUNT],
     )
-    nodes: Count = Field(description="Distributed nodes N, host not counted", examples=[2])
+    nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[2])
     max_hops: Count | None = Field(
         default=None,
         description="Most cable hops between any two nodes of a tree, the host counted among them; "
@@ -66,6 +74,12 @@ class Ieee1394Bus(BusSection):
     )
     cable_length_m: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = Field(
         default=float(REFERENCE_CABLE_M), description="Length of one cable [m]", examples=[4.5]
+    )
+    charge_hops: Literal["farthest", "own"] = Field(
+        default="farthest",
+        description="Which way each node is charged: that to the farthest node, or its own; in a tree its own is "
+        "the hops of its group",
+        examples=["own"],
     )
     timing_model: TimingModelName = Field(
         default="standard",
@@ -97,7 +111,7 @@ class Ieee1394Bus(BusSection):
                 Problem(
                     f"the table behind it holds for cables of up to {REFERENCE_CABLE_M:g} m, "
                     f"and cable_length_m is {self.cable_length_m:g}: give the gap count as a number",
-                    key="bus.gap_count",
+                    key="gap_count",
                     kind="inconsistent",
                 )
             )
@@ -109,7 +123,7 @@ class Ieee1394Bus(BusSection):
             raise refused(
                 Problem(
                     "isochronous traffic follows cycle starts, and cycle_master is false: set bus.cycle_master = true",
-                    key="bus.isochronous_us",
+                    key="isochronous_us",
                     kind="inconsistent",
                 )
             )
@@ -207,6 +221,17 @@ class Ieee1394Node(NodeSection):
     )
 
 
+class Ieee1394Group(Ieee1394Node, Ieee1394Payload, GroupSection):
+    """One of the sections [[group]]: nodes that are alike, in the order of the chain."""
+
+    axes: GroupAxes = Field(examples=[4])
+    hops: Count | None = Field(
+        default=None,
+        description="Cable hops from the host to each node of the group, in a tree; in a chain their place says it",
+        examples=[2],
+    )
+
+
 class Host(Section):
     """Section [host]: the host that sends the requests."""
 
@@ -231,8 +256,35 @@ class Host(Section):
 class Ieee1394Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
-    node: Ieee1394Node = Field(description="One distributed node")
+    node: Ieee1394Node | None = Field(default=None, description="One distributed node, where nodes are alike")
+    group: Annotated[tuple[Ieee1394Group, ...], Field(strict=False)] = Field(
+        default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
+    )
     host: Host = Field(default_factory=Host, description="The host that sends the requests")
     bus: Ieee1394Bus = Field(description="The bus")
     cycle: Ieee1394CycleSection = Field(description="The communication cycle")
-    payload: Ieee1394Payload = Field(description="What travels in a cycle")
+    payload: Ieee1394Payload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+
+    @model_validator(mode="after")
+    def _hops_are_known(self) -> Self:
+        problems: list[Problem] = []
+        most, given = self.bus.max_hops, [(place, one.hops) for place, one in enumerate(self.group)]
+        for place, hops in given:
+            key = f"group.{place}.hops"
+            if most is None and hops is not None:
+                problems.append(
+                    Problem(
+                        "the order of the groups says it in a chain; set bus.max_hops for a tree", key, "inconsistent"
+                    )
+                )
+            elif most is not None and hops is not None and hops > most:
+                problems.append(Problem(f"is over the {most} hops of bus.max_hops", key, "inconsistent"))
+            elif most is not None and hops is None and self.bus.charge_hops == "own":
+                why = 'missing key: bus.charge_hops = "own" needs the hops of each group of a tree'
+                problems.append(Problem(why, key, "missing-key"))
+        if most is not None and not given and self.bus.charge_hops == "own":
+            why = "needs the hops of each node of a tree: describe them as groups, [[group]] with hops"
+            problems.append(Problem(why, "bus.charge_hops", "inconsistent"))
+        if problems:
+            raise refused(*problems)
+        return self

@@ -179,7 +179,7 @@ class Delays(NamedTuple):
     gaps: Gaps
 
 
-def delays(link: Link, *, model: PacketTiming, alone: Number) -> Delays:
+def delays(link: Link, *, model: PacketTiming, alone: Number, shared: Delays | None = None) -> Delays:
     """Arbitration, acknowledge and gaps of any transaction, equations (4), (6), (9) and (10).
 
     Parameters
@@ -190,21 +190,31 @@ def delays(link: Link, *, model: PacketTiming, alone: Number) -> Delays:
         Timing model, of `TIMING_MODELS`.
     alone
         Whether one node alone answers on the bus.
+    shared
+        The delays over other hops of the bus, where they have been computed: those of a hop and the gaps are the same.
     """
     clock_mbit_s = alike(model.gap_clock_mbit_s(link.data_rate_mbit_s), link.data_rate_mbit_s)
-    phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
-    hop_us = named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+    hop_us = _hop_us(link, clock_mbit_s) if shared is None else shared.hop_us
     arbitration_us = equations.arbitration_phase_us(
         link.hops, hop_us=hop_us, gap_count=link.gap_count, gap_clock_mbit_s=clock_mbit_s
     )
     acknowledge_us = equations.acknowledge_us(equations.acknowledge_phase_us(link.hops, hop_us=hop_us))
-    gaps = Gaps(
+    gaps = _gaps(link, clock_mbit_s, alone) if shared is None else shared.gaps
+    return Delays(hop_us, arbitration_us, acknowledge_us, gaps)
+
+
+def _hop_us(link: Link, clock_mbit_s: Number) -> Number:
+    phy_us = equations.phy_delay_us(clock_mbit_s) if link.phy_delay_us is None else link.phy_delay_us
+    return named(equations.hop_delay_us(link.cable_length_m, phy_delay_us=phy_us), "hop_us", "hop")
+
+
+def _gaps(link: Link, clock_mbit_s: Number, alone: Number) -> Gaps:
+    return Gaps(
         equations.subaction_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
         equations.arbitration_reset_gap_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
         equations.gaps_us(link.gap_count, gap_clock_mbit_s=clock_mbit_s),
         alone,
     )
-    return Delays(hop_us, arbitration_us, acknowledge_us, gaps)
 
 
 def transaction(

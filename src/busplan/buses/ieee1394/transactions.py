@@ -43,16 +43,68 @@ def gap_count_of(network: Network) -> Number:
     return worded(safe_gap_count(hops_of(network)), 'g_safe, for bus.gap_count is "optimal"')
 
 
-def link_of(network: Network) -> Link:
-    """Rate, gap count and distance of the farthest node."""
+def link_of(network: Network, hops: Number | None = None) -> Link:
+    """Rate, gap count and distance of a node.
+
+    Parameters
+    ----------
+    network
+        The network.
+    hops
+        Cable hops between the host and the node [1]; by default most hops of the bus.
+    """
     bus = network.profile.bus
     return Link(
         data_rate_mbit_s=alike(DATA_RATE_MBIT_S[bus.speed], network.nodes),
         gap_count=named(gap_count_of(network), "gap_count", "g"),
-        hops=named(hops_of(network), "hops", "H"),
+        hops=named(hops_of(network), "hops", "H") if hops is None else hops,
         cable_length_m=bus.cable_length_m,
         phy_delay_us=bus.phy_delay_us,
     )
+
+
+def charges_own_hops(network: Network) -> bool:
+    """Whether each node is charged its own way, and not that to the farthest."""
+    found: bool = network.profile.bus.charge_hops == "own"
+    return found
+
+
+class Ways(NamedTuple):
+    """Cable hops between the host and the nodes of a group that each node is charged [1]."""
+
+    first: Number
+    """Of the first node of the group."""
+    mean: Number
+    """Of the nodes of the group, on the mean. What grows with the hops grows by the same with each."""
+    last: Number
+    """Of the last node of the group."""
+
+    def of_node(self, place: int) -> Number:
+        """Of the node at a place in its group, from 0."""
+        return self.first if self.first is self.last else self.first + place
+
+
+def ways(network: Network) -> tuple[Ways, ...]:
+    """Hops of each group's nodes: in a chain their place in it, in a tree what the group says."""
+    if not charges_own_hops(network):
+        return (Ways(*(hops_of(network),) * 3),) * len(network.groups)
+    if network.profile.bus.max_hops is not None:
+        return tuple(Ways(*(group.node.hops,) * 3) for group in network.groups)
+    found: list[Ways] = []
+    for group in network.groups:
+        mean = (group.nodes + 1) / 2
+        before = found[-1].last if found else None
+        own = Ways(1, mean, group.nodes)
+        if before is not None:
+            own = Ways(before + 1, before + mean, before + group.nodes)
+        found.append(own._replace(mean=named(own.mean, "hops", f"H_mean{group.name and f',{group.name}'}")))
+    return tuple(found)
+
+
+def farthest_link(network: Network, name: str) -> Link:
+    """The way that the farthest node of a group is charged, by the name of the group."""
+    place = next(place for place, group in enumerate(network.groups) if name in [one.name for one in group.members])
+    return link_of(network, ways(network)[place].last)
 
 
 class TransactionPart(NamedTuple):
@@ -70,6 +122,8 @@ class Exchange(NamedTuple):
 
     kind: TransactionKind
     group: Group
+    link: Link
+    """The way that is charged, of the group's nodes on the mean."""
     payload_bytes: Number
     responder: Responder
     execution_uncertainty_us: Number
@@ -131,14 +185,14 @@ def exchange(
         model=TIMING_MODELS[model],
         link=link,
         payload_bytes=size,
-        overhead_bytes=network.profile.payload.overhead_bytes,
+        overhead_bytes=group.said.payload.overhead_bytes,
         responder=responder,
         alone=is_one(network.nodes),
         common=common,
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
     phases = _with_names(phases, suffix)
-    return Exchange(kind, group, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
+    return Exchange(kind, group, link, size, responder, uncertainty_us, phases, tuple(_parts(phases, answer)))
 
 
 def _with_names(phases: Phases, suffix: str) -> Phases:

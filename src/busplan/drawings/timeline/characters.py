@@ -1,11 +1,12 @@
 """A timeline to scale, in ASCII characters."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Event, Schedule
 from busplan.buses.bus import IDLE
+from busplan.drawings.legend import legend_lines
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import (
     Lane,
@@ -65,7 +66,7 @@ def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
     for label, row in rows.items():
         yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "fails" if label == "over" else "drawn")
     yield bar.scale(gutter + 2)
-    yield from _wrapped("Legend: ", legend, width=width)
+    yield from legend_lines(legend, width=width)
 
 
 def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
@@ -82,7 +83,7 @@ def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:
     shown = {event.kind for event in window.events}
     kinds = (*bus_of(window.profile).event_kinds, IDLE)
     legend = [f"{kind.mark} {kind.label}" for kind in kinds if kind.key in shown]
-    yield from _wrapped("Legend: ", legend, width=width)
+    yield from legend_lines(legend, width=width)
 
 
 def _marked(window: Schedule, lane: Lane) -> list[tuple[str, Event]]:
@@ -147,15 +148,3 @@ class _Bar:
                 continue
             text = f"{text[:at]}{tick.label}{text[at + len(tick.label) :]}"
         return Line(f"{'us':<{indent}}{text.rstrip()}", "drawn")
-
-
-def _wrapped(head: str, words: Sequence[str], *, width: int) -> Iterator[Line]:
-    """Wrap a list of words to the width."""
-    line = head
-    for number, word in enumerate(words):
-        piece = word if number == len(words) - 1 else f"{word}, "
-        if len(line) + len(piece.rstrip()) > width and line.strip():
-            yield Line(line.rstrip(), "drawn")
-            line = " " * len(head)
-        line += piece
-    yield Line(line.rstrip(), "drawn")

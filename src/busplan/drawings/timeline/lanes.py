@@ -48,7 +48,7 @@ def subject(plan: Schedule) -> Sentence:
 
 def charged(plan: Schedule) -> Sentence:
     """Say what is shown, and which distance on the wire each node is charged with."""
-    return joined(subject(plan), Sentence((bus_of(plan.profile).way_charged,)), by=", ")
+    return joined(subject(plan), Sentence((bus_of(plan.profile).way_charged(network_of(plan.profile)),)), by=", ")
 
 
 def overruns(plan: Schedule) -> bool:

@@ -1,7 +1,6 @@
 """A timeline as SVG, in a page or as a file: bars scale with the width, text keeps its size; light and dark."""
 
 from collections.abc import Iterable, Sequence
-from textwrap import wrap
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
@@ -27,14 +26,10 @@ from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import figure_text
-from busplan.forms.svg import LINE, Scale, drawing, inside, markup, text_at
+from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
 
-_LINE_CHARACTERS: Final = 44
-"""Characters in a line of text: fits on a phone."""
 _BAR: Final = 18
 _GAP: Final = 14
-_PHONE: Final = 335
-"""Width of a phone without margins, in px."""
 _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _MOST_BARS: Final = 400
@@ -81,23 +76,14 @@ def is_coarse(window: Schedule) -> bool:
 
 def _above(body: Element, plan: Schedule, window: Schedule, *, title: str) -> int:
     """Draw the verdict and the subject as text, and return the y below them."""
-    height = _words(body, title, y=8, css="head" if plan.figures.fits else "head bad")
-    return _words(body, sentence_text(charged(window)), y=height, css="small")
-
-
-def _words(parent: Element, text: str, *, y: int, css: str) -> int:
-    """Draw wrapped text, and return the y below it."""
-    # Letters of other scripts may be twice as wide.
-    for line in wrap(text, _LINE_CHARACTERS if text.isascii() else _LINE_CHARACTERS // 2):
-        y += LINE
-        text_at(parent, line, x="0", y=y - 5, css=css)
-    return y
+    height = paragraph(body, title, y=8, css="head" if plan.figures.fits else "head bad")
+    return paragraph(body, sentence_text(charged(window)), y=height, css="small")
 
 
 def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
     """Draw the whole slice as one bar, transaction by transaction, with the window of the lanes."""
     parts = stretches(plan.cycle_events)
-    y = _strip_legend(body, plan, parts, y=_words(body, strip_title(plan), y=y, css="head")) + 4
+    y = _strip_legend(body, plan, parts, y=paragraph(body, strip_title(plan), y=y, css="head")) + 4
     scale = Scale(0.0, plan.end_us)
     if overruns(plan):
         _over(body, plan, scale, y=y - 3, height=_BAR + 6)
@@ -116,7 +102,7 @@ def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], *, y:
     for key in dict.fromkeys(one.kind for one in parts):
         kind = kind_of(plan.profile, key)
         width = 30 + 7 * len(kind.label)
-        if x + width > _PHONE:
+        if x + width > PHONE:
             x, y = 0, y + LINE
         SubElement(body, "rect", {"class": kind.ink, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
         text_at(body, kind.label, x=str(x + 15), y=y + 15, css="small")
@@ -166,7 +152,7 @@ class _Bars(NamedTuple):
 def _node_lanes(body: Element, window: Schedule, *, y: int, coarse: bool) -> int:
     """Draw a lane for the bus and one for each node, and return the y below them."""
     lanes = node_lanes(window)
-    y = _words(body, f"{time_text(window.from_us)} to {time_text(window.to_us)} us, by node", y=y, css="head") + 4
+    y = paragraph(body, f"{time_text(window.from_us)} to {time_text(window.to_us)} us, by node", y=y, css="head") + 4
     scale = Scale(window.from_us, window.to_us)
     pitch = _BAR + 4 if len(lanes) <= _MOST_TALL_LANES else _BAR - 3
     area = inside(body, x_percent=_GUTTER_PERCENT, width_percent=100 - _GUTTER_PERCENT, y=0)
@@ -190,7 +176,7 @@ def _event_lanes(body: Element, window: Schedule, *, y: int) -> int:
     """Draw a lane for each event, its name above it, and return the y below them."""
     owner = only_owner(window)
     title = f"{time_text(window.from_us)} to {time_text(window.to_us)} us{'' if owner is None else f', {owner}'}"
-    y = _words(body, title, y=y, css="head")
+    y = paragraph(body, title, y=y, css="head")
     scale = Scale(window.from_us, window.to_us)
     pitch = LINE + _BAR
     over = shows_overrun(window)

@@ -1,0 +1,107 @@
+"""A cell of a map: the verdict at one setting, and what limits it."""
+
+from collections.abc import Mapping
+from typing import Any, Final, Literal, NamedTuple, get_args
+
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, VerdictWord
+from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.network import bus_of, network_of
+from busplan.buses.bus import Value
+from busplan.sections.profile import Profile
+
+State = Literal["fits", "circle fails", "circle not judged", "not shown to fit", "unsafe", "does not fit"]
+STATES: Final[tuple[State, ...]] = get_args(State)
+"""In the order of reports."""
+CELL_FIGURES: Final = (
+    *("nodes", "axes", "verdict", "binding_term", "exceeded"),
+    *("margin_corrected_us", "uncertainty_us"),
+)
+"""Columns of a sweep that a cell is made of."""
+
+
+class Setting(NamedTuple):
+    """One combination of values that a profile can have."""
+
+    changes: dict[str, Value]
+    """New values by key of the profile."""
+    profile: Profile
+    """The profile with them."""
+
+
+class Cell(NamedTuple):
+    """The verdict at one setting."""
+
+    x: Value
+    y: Value
+    nodes: int
+    axes: int
+    state: State
+    limited_by: tuple[str, ...]
+    """Limits that are broken; of a circle that fails, what it does not hold; none where it fits."""
+    binding_term: str
+    """The largest term of the cycle."""
+    verdict: VerdictWord
+    margin_corrected_us: float
+    uncertainty_us: float
+    is_safe: bool
+    circle_passed: bool | None = None
+    """None where no circle was run, or no tolerance judges it."""
+
+
+class NotDrawn(NamedTuple):
+    """A combination of values that no profile can have."""
+
+    x: Value
+    y: Value
+    reason: str
+
+
+class Region(NamedTuple):
+    """All cells of one state with one limit."""
+
+    state: State
+    limited_by: tuple[str, ...]
+    binding_term: str | None
+    """The largest term of the cycle, where time is the limit."""
+    cells: int
+
+
+def cell_of(setting: Setting, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
+    """Make a cell before any circle.
+
+    Parameters
+    ----------
+    setting
+        The setting.
+    figures
+        `CELL_FIGURES` of a sweep at the setting, under the timing model that decides.
+    x, y
+        Values of the map's directions.
+    """
+    network = network_of(setting.profile)
+    unsafe = tuple(one.key for one in bus_of(setting.profile).limits if one.is_safety and one.is_broken(network))
+    verdict = figures["verdict"]
+    broken = tuple(key for key in figures["exceeded"] if key != TIME) or (TIME,)
+    state, limits = _judged(verdict, broken=broken, unsafe=unsafe)
+    return Cell(
+        x=x,
+        y=y,
+        nodes=int(figures["nodes"]),
+        axes=int(figures["axes"]),
+        state=state,
+        limited_by=limits,
+        binding_term=figures["binding_term"],
+        verdict=verdict,
+        margin_corrected_us=figures["margin_corrected_us"],
+        uncertainty_us=figures["uncertainty_us"],
+        is_safe=not unsafe,
+    )
+
+
+def _judged(verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...]) -> tuple[State, tuple[str, ...]]:
+    """State and limits: what does not fit is never called unsafe, and what is unsafe never a fit."""
+    if verdict == DOES_NOT_FIT:
+        return verdict, broken
+    if unsafe:
+        return "unsafe", unsafe
+    return (verdict, ()) if verdict == FITS else (verdict, broken)

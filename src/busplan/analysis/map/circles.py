@@ -1,0 +1,107 @@
+"""Circle tests of the cells of a map that fit."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final, NamedTuple, Protocol, TypeVar
+
+from busplan.analysis.circle.estimate import NOTHING, announce, estimate
+from busplan.analysis.circle.roundness import circle_test
+from busplan.analysis.circle.setup import setup
+from busplan.analysis.map.cells import Cell, Setting
+from busplan.errors import BusplanError
+from busplan.profile.toml import override
+from busplan.progress import Progress
+from busplan.sections.profile import Profile
+
+_AT_ONCE: Final = 16
+"""Circle tests between two reports of the progress."""
+
+Place = tuple[int, int]
+"""Row and column of a cell."""
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class Mapper(Protocol):
+    """The built-in `map`, here or in other processes."""
+
+    def __call__(self, function: Callable[[Task], Result], tasks: Iterable[Task], /) -> Iterable[Result]:
+        """Return the results in the order of the tasks."""
+
+
+class _Task(NamedTuple):
+    """The circle test of one setting; a process can be handed it."""
+
+    profile: Profile
+    changes: dict[str, object]
+
+
+class _Judgement(NamedTuple):
+    passed: bool | None
+    failures: tuple[str, ...]
+
+
+class _Judged(NamedTuple):
+    """Circle tests of a map."""
+
+    cells: dict[Place, Cell]
+    reasons: dict[Place, str]
+    """Why a cell that fits has no circle test."""
+
+
+def _judge(task: _Task) -> _Judgement:
+    (result,) = circle_test(override(task.profile, task.changes), explain=False).results
+    return _Judgement(result.passed, tuple(failure.name for failure in result.failures))
+
+
+def judged(
+    profile: Profile,
+    fitting: Mapping[Place, tuple[Cell, Setting]],
+    *,
+    mapper: Mapper,
+    progress: Progress | None,
+) -> _Judged:
+    """Run the circle tests of cells that fit, after saying what many of them cost.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    fitting
+        Cells and their settings.
+    mapper
+        How the tests are run.
+    progress
+        Called now and then with the tests that are done, and all of them.
+
+    Returns
+    -------
+    _Judged
+        The same cells, with what their circle says.
+    """
+    cost, runs = NOTHING, dict[Place, _Task]()
+    cells = {place: cell for place, (cell, _) in fitting.items()}
+    reasons: dict[Place, str] = {}
+    for place, (cell, setting) in fitting.items():
+        try:
+            cost = cost.then(estimate((), [setup(setting.profile)]))
+        except BusplanError as error:
+            cells[place] = cell._replace(state="circle not judged")
+            reasons[place] = error.problems[0]
+        else:
+            runs[place] = _Task(profile, dict(setting.changes))
+    announce(cost)
+    places = list(runs)
+    for start in range(0, len(places), _AT_ONCE):
+        part = places[start : start + _AT_ONCE]
+        for place, found in zip(part, mapper(_judge, [runs[one] for one in part]), strict=True):
+            cells[place] = _with_circle(cells[place], found)
+        if progress is not None:
+            progress(start + len(part), len(places))
+    return _Judged(cells, reasons)
+
+
+def _with_circle(cell: Cell, found: _Judgement) -> Cell:
+    cell = cell._replace(circle_passed=found.passed)
+    if found.passed is False:
+        return cell._replace(state="circle fails", limited_by=found.failures)
+    return cell if found.passed else cell._replace(state="circle not judged")

@@ -1,0 +1,218 @@
+"""What moves the margin, of `busplan capacity --sensitivity`: sentences, a table and a chart for each period."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.capacity.figures import Capacity
+from busplan.analysis.capacity.sensitivity import Effect, Sensitivity, Standing
+from busplan.analysis.capacity.verdict import Verdict
+from busplan.analysis.network import bus_of
+from busplan.answers.capacity import capacity_document, capacity_report
+from busplan.answers.documents import with_profile
+from busplan.answers.next_bottleneck import next_bottleneck_record, next_bottleneck_sentence
+from busplan.buses.figure import MARGIN_CORRECTED, VERDICT, unit_of
+from busplan.drawings.sensitivity import SensitivityDrawing
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Chart,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+    figure_value,
+    joined,
+    sentence,
+)
+from busplan.forms.numbers import listed, period_value
+from busplan.sections.profile import Profile
+
+_DIGITS = 4
+"""Digits of what changes: enough to see a tenth of it."""
+
+
+def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], found: Sequence[Sensitivity]) -> Report:
+    """Report of `capacity --sensitivity`.
+
+    Parameters
+    ----------
+    result
+        The capacity.
+    verdicts
+        One for each period.
+    found
+        What moves the margin, one for each period.
+    """
+    report = capacity_report(result, verdicts)
+    return report._replace(
+        blocks=lambda: (*report.blocks(), *_of_periods(found)),
+        document=partial(sensitivity_document, result, verdicts, found),
+        records=lambda: with_profile(result.profile.name, [row for one in found for row in _rows(one)]),
+    )
+
+
+def _of_periods(found: Sequence[Sensitivity]) -> Iterator[Block]:
+    for number, one in enumerate(found):
+        yield from sensitivity_blocks(one, at=f"/verdicts/{number}")
+
+
+def sensitivity_blocks(found: Sensitivity, *, at: str) -> Iterator[Block]:
+    """What moves the margin at one period.
+
+    Parameters
+    ----------
+    found
+        The effects of all changes.
+    at
+        JSON pointer to the verdict of the period.
+    """
+    yield sensitivity_table(found, at=at)
+    drawn = SensitivityDrawing(found)
+    if not drawn.is_empty:
+        caption = Sentence(("Change of the margin, us: a bar to the left takes from it, one to the right adds to it",))
+        legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
+        yield Chart(drawn, caption, legend)
+    yield _headline(found, at=at)
+    yield from (Sentence((f"{_capital(one.change)}: {one.note}.",)) for one in found.effects if one.note)
+    yield next_bottleneck_sentence(found.next_bottleneck, found.profile, at=f"{at}/next_bottleneck")
+
+
+def sensitivity_table(found: Sensitivity, *, at: str) -> Table:
+    """Every change with what it does to the margin, the largest effect first.
+
+    Parameters
+    ----------
+    found
+        The effects of all changes.
+    at
+        JSON pointer to the verdict of the period.
+    """
+    caption = sentence(
+        f"What moves the margin of {{}} at {{}}, by the {found.timing_model} model",
+        figure_value(MARGIN_CORRECTED, found.now.margin_corrected_us, at=f"{at}/margin_corrected_us"),
+        period_value(found.profile.cycle.period_us, at=f"{at}/period_us"),
+    )
+    columns = (
+        TableColumn("what changes", kind="words"),
+        TableColumn("from -> to", kind="words"),
+        TableColumn("change", "us", group="margin"),
+        TableColumn("then", "us", group="margin"),
+        TableColumn("verdict then", kind="words"),
+    )
+    rows = (
+        TableRow(tuple(_cells(one, found, at=f"{at}/sensitivity/{number}"))) for number, one in enumerate(found.effects)
+    )
+    return Table(columns, tuple(rows), caption)
+
+
+def _cells(one: Effect, found: Sensitivity, *, at: str) -> Iterator[Cell]:
+    yield one.change
+    yield _step(one, at=at)
+    yield ShownValue(one.margin_change_us, "margin_change_us", "us", 3, signed=True, at=f"{at}/margin_change_us")
+    then = None if one.then is None else one.then.margin_corrected_us
+    yield figure_value(MARGIN_CORRECTED, then, at=f"{at}/{MARGIN_CORRECTED.key}")
+    yield _verdict(one.then, found.profile, at=f"{at}/{VERDICT.key}")
+
+
+def _step(one: Effect, *, at: str) -> Cell:
+    """From which value to which; nothing where the change has no single one."""
+    if one.before is None or one.after is None:
+        return ""
+    before = ShownValue(one.before, one.key, digits=_DIGITS, at=f"{at}/from")
+    after = ShownValue(one.after, one.key, unit_of(one.key), digits=_DIGITS, at=f"{at}/to")
+    return sentence("{} -> {}", before, after)
+
+
+def _verdict(then: Standing | None, profile: Profile, *, at: str) -> Cell:
+    """The verdict with the limits that are broken, or that the bus is unsafe."""
+    shown = figure_value(VERDICT, None if then is None else then.verdict, at=at)
+    if then is None:
+        return shown
+    why = [key for key in then.exceeded if key != TIME]
+    if not why and then.verdict == FITS and not then.safe:
+        why = [f"unsafe {bus_of(profile).safety}"]
+    return Sentence((shown, *(f", {one}" for one in why)), "neutral" if _is_well(then) else "fails")
+
+
+def _is_well(one: Standing) -> bool:
+    return one.verdict == FITS and one.safe
+
+
+def _headline(found: Sensitivity, *, at: str) -> Sentence:
+    """Say which change moves the margin most, and after which ones all is no longer well."""
+    first = found.effects[0]
+    if not first.margin_change_us:
+        return Sentence(("None of these changes moves the margin.",))
+    then = None if first.then is None else first.then.margin_corrected_us
+    most = sentence(
+        f"{_capital(first.change)} moves the margin most, by {{}} to {{}}.",
+        ShownValue(
+            first.margin_change_us, "margin_change_us", "us", 3, signed=True, at=f"{at}/sensitivity/0/margin_change_us"
+        ),
+        figure_value(MARGIN_CORRECTED, then, at=f"{at}/sensitivity/0/{MARGIN_CORRECTED.key}"),
+    )
+    return joined(most, *_after_each(found))
+
+
+def _after_each(found: Sensitivity) -> Iterator[Sentence]:
+    """Say what becomes of a cycle that is shown to fit."""
+    if found.now.verdict != FITS:
+        return
+    made = [(one.change, one.then) for one in found.effects if one.then is not None]
+    lost = [change for change, then in made if then.verdict != FITS]
+    unsafe = [change for change, then in made if then.verdict == FITS and found.now.safe and not then.safe]
+    if lost:
+        yield Sentence((f"The cycle is no longer shown to fit after {listed(lost, 'or')}.",))
+    if unsafe:
+        yield Sentence((f"Its {bus_of(found.profile).safety} is unsafe after {listed(unsafe, 'or')}.",))
+    if not lost and not unsafe:
+        yield Sentence(("The cycle is shown to fit after each of them alone.",))
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+def sensitivity_document(result: Capacity, verdicts: Sequence[Verdict], found: Sequence[Sensitivity]) -> JsonDocument:
+    """Document of `busplan capacity --sensitivity --format json`: that of `capacity`, with more in each verdict."""
+    whole = capacity_document(result, verdicts)
+    for verdict, one in zip(whole["verdicts"], found, strict=True):
+        verdict["sensitivity"] = [_record(effect, one.profile) for effect in one.effects]
+        verdict["next_bottleneck"] = next_bottleneck_record(one.next_bottleneck, one.profile)
+    return whole
+
+
+def _rows(found: Sensitivity) -> Iterator[Record]:
+    """One row for each change."""
+    for one in found.effects:
+        yield {
+            "period_us": found.profile.cycle.period_us,
+            "timing_model": found.timing_model,
+            **_record(one, found.profile),
+        }
+
+
+def _record(one: Effect, profile: Profile) -> Record:
+    then = one.then
+    safety = bus_of(profile).safety_figure
+    own: dict[str, Any] = {} if safety is None else {safety.key: None if then is None else then.safe}
+    return {
+        "change": one.change,
+        "key": one.key,
+        "from": one.before,
+        "to": one.after,
+        "margin_change_us": one.margin_change_us,
+        "margin_corrected_us": None if then is None else then.margin_corrected_us,
+        "uncertainty_us": None if then is None else then.uncertainty_us,
+        "verdict": None if then is None else then.verdict,
+        "exceeded": None if then is None else list(then.exceeded),
+        **own,
+        "note": one.note or None,
+    }

@@ -1,0 +1,138 @@
+"""`busplan.trade_off`."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from busplan.analysis.map import trade_off as analysis
+from busplan.analysis.map.cells import Cell, NotDrawn, Region
+from busplan.analysis.map.direction import Direction, checked_direction
+from busplan.analysis.map.trade_off import TradeOff
+from busplan.answers.map import headline, map_report
+from busplan.api.answer import Answer
+from busplan.api.inputs import ProfileLike, load_profile
+from busplan.api.sweep import axis_values
+from busplan.drawings.map.svg import map_svg
+from busplan.errors import BusplanError
+from busplan.forms.blocks import Report
+from busplan.forms.columns import sentence_text
+from busplan.sections.profile import Profile
+
+Along = Mapping[str, str | Iterable[object]]
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class TradeOffAnswer(Answer):
+    """Answer of `trade_off`: a map, which a notebook draws.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    x, y
+        What lies across and what lies up: a key and its values.
+    rows
+        A row for each value of `y`, in it one for each value of `x`: a `Cell`, or a `NotDrawn` with the reason.
+    with_circle
+        Whether the circle of every setting that fits was tested.
+    not_judged
+        Why a circle could not be run somewhere; empty if each could.
+    """
+
+    profile: Profile
+    x: Direction
+    y: Direction
+    rows: tuple[tuple[Cell | NotDrawn, ...], ...]
+    with_circle: bool
+    not_judged: str
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Cells of all settings that can exist, row by row."""
+        return self._found.cells
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """How many cells each state and limit has."""
+        return self._found.regions
+
+    @property
+    def own(self) -> Cell | None:
+        """Cell of the profile's own setting; None if it is not on the map."""
+        return self._found.own
+
+    def _repr_svg_(self) -> str:
+        return map_svg(self._found, title=sentence_text(headline(self._found)))
+
+    def _repr_html_(self) -> str:
+        # A notebook prefers HTML to SVG.
+        return self._repr_svg_()
+
+    def _report(self) -> Report:
+        return map_report(self._found)
+
+    @property
+    def _found(self) -> TradeOff:
+        return TradeOff(self.profile, self.x, self.y, self.rows, self.with_circle, self.not_judged)
+
+
+def trade_off(
+    profile: ProfileLike,
+    *,
+    x: Along | None = None,
+    y: Along | None = None,
+    with_circle: bool = False,
+) -> TradeOffAnswer:
+    """Tell where over two keys a design fits, and what limits it elsewhere: `busplan map`.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    x, y
+        What lies across and what lies up: one dotted key, or "axes" for the axes of all nodes, with up to 64 values in
+        its unit, as `sweep` takes them: {"bus.gap_count": [7, 63, "optimal"]}. By default the axes, and the period
+        [us].
+    with_circle
+        Also run the circle test of every setting that fits, up to 1,000.
+
+    Returns
+    -------
+    TradeOffAnswer
+        Its `rows` have the shape (values of y, values of x). In a notebook it is a picture.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, an invalid key or values, no setting that can exist, or too many circle tests.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.trade_off("paper-4ms", x={"axes": range(4, 13, 4)}, y={"cycle.period_us": [500, 1000]})
+    >>> [[cell.state for cell in row] for row in answer.rows]
+    [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
+    """
+    network = load_profile(profile)
+    return TradeOffAnswer(
+        *analysis.trade_off(
+            network,
+            x=_direction(network, x, name="x", with_circle=with_circle),
+            y=_direction(network, y, name="y", with_circle=with_circle),
+            with_circle=with_circle,
+        )
+    )
+
+
+def _direction(profile: Profile, along: Along | None, *, name: str, with_circle: bool) -> Direction | None:
+    if along is None:
+        return None
+    if not isinstance(along, Mapping) or len(along) != 1 or not all(isinstance(key, str) for key in along):
+        raise BusplanError(f'{name} {along!r}: expected one key and its values, as {{"bus.nodes": range(1, 17)}}')
+    ((key, values),) = along.items()
+    return checked_direction(
+        profile,
+        key,
+        axis_values(profile, key, values, name=name),
+        option=name,
+        circle_option=None if with_circle else "with_circle=True",
+    )

@@ -1,0 +1,1 @@
+"""The map of a profile in characters, as SVG and PNG."""
