@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.grid import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, Grid
 from busplan.analysis.planning.machine import (
     NODES_KEY,
     Changes,
@@ -17,6 +16,7 @@ from busplan.analysis.planning.machine import (
     with_nodes,
     with_payload_within,
 )
+from busplan.analysis.planning.short_numbers import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, ShortNumbers
 from busplan.buses.bus import Cost
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -192,12 +192,12 @@ def most_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom], *
     return low
 
 
-def period_grid(profile: "Profile") -> Grid:
+def period_grid(profile: "Profile") -> ShortNumbers:
     """Periods that are advised: multiples of the circle's step, where the profile asks for a circle."""
-    return Grid(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
+    return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 
-def place_of(grid: Grid, needed_us: float, *, each_us: float) -> int:
+def place_of(grid: ShortNumbers, needed_us: float, *, each_us: float) -> int:
     """The place of the smallest number of a grid with which the slice gives some time.
 
     Parameters
