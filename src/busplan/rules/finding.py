@@ -8,9 +8,11 @@ from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.cures import Change, change_for_room, change_to_fit, changeable, listed
-from busplan.buses.rule import Severity
+from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.document import Spot
 from busplan.profile.toml import LoadedProfile, override
+from busplan.profile.write import value_text
 
 
 class Finding(NamedTuple):
@@ -20,9 +22,40 @@ class Finding(NamedTuple):
     rule: str
     severity: Severity
     message: str
+    """What is wrong and how it is mended, in one line."""
     key: str
     line: int
     column: int
+    marked_column: int
+    """First column of the value, or of what stands for it: a name, a comment."""
+    marked_end_column: int
+    """The column behind its last."""
+    problem: str
+    """What is wrong."""
+    help: str | None = None
+    """How it is mended, in words."""
+    cure: str | None = None
+    """How it is mended, as lines of TOML: key = value."""
+
+
+def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> Finding:
+    """Make the finding of a problem.
+
+    Parameters
+    ----------
+    rule
+        The rule that is broken.
+    problem
+        The problem, with its key and how it is mended.
+    spot
+        Its place.
+    words
+        What is wrong, with the key and the circumstances.
+    """
+    cure = f"cheapest cure: {', '.join(problem.cure)}" if problem.cure else ""
+    message = "; ".join(filter(None, (words, problem.help, cure)))
+    mending = problem.help or None, "\n".join(problem.cure) or None
+    return Finding(rule.code, rule.name, rule.severity, message, problem.key, *spot, words, *mending)
 
 
 class Subject:
@@ -62,15 +95,15 @@ class Subject:
         """Capacity under the timing model that decides, with new values by dotted key."""
         return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
-    def cure(self) -> str:
-        """The cheapest change after which the profile is shown to fit, in words."""
-        return self._words(change_to_fit(self.profile))
+    def cure(self) -> Mending:
+        """The cheapest change after which the profile is shown to fit."""
+        return self._mending(change_to_fit(self.profile))
 
-    def room(self, nodes: int, *, utilisation: float = 1.0) -> str:
-        """The cheapest change that makes room for some nodes, in words."""
-        return self._words(change_for_room(self.profile, nodes=nodes, utilisation=utilisation))
+    def room(self, nodes: int, *, utilisation: float = 1.0) -> Mending:
+        """The cheapest change that makes room for some nodes."""
+        return self._mending(change_for_room(self.profile, nodes=nodes, utilisation=utilisation))
 
-    def _words(self, change: Change | None) -> str:
+    def _mending(self, change: Change | None) -> Mending:
         if change is None:
-            return f"no change of {listed(changeable(self.profile, structure=False), 'or')} alone is a cure"
-        return "cheapest cure: " + ", ".join(f"{key} = {value}" for key, value in change.changes.items())
+            return Mending(f"no change of {listed(changeable(self.profile, structure=False), 'or')} alone is a cure")
+        return Mending(cure=tuple(f"{key} = {value_text(value)}" for key, value in change.changes.items()))
