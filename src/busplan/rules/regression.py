@@ -104,13 +104,13 @@ def _keys(changes: Mapping[str, Change]) -> str:
     first, *others = (f"{_shown(one.now)}, was {_shown(one.before)}" for one in changes.values())
     named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], others, strict=True)][: _MOST_NAMED - 1]
     more = len(changes) - 1 - len(named)
-    return "; ".join((first, *named, *([f"and {more} more keys"] if more else ())))
+    return "; ".join((first, *named, *([f"and {more} more"] if more else ())))
 
 
 def _shown(value: object) -> str:
     if value is None:
         return "not set"
-    text = value_text(value)
+    text = f"{value:.12g}" if isinstance(value, float) else value_text(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
@@ -120,8 +120,13 @@ def _figures(lost: Mapping[str, tuple[float, float]], *, deciding: str) -> str:
     for name in sorted(lost, key=_order):
         model, _, figure = name.partition(".")
         by_model.setdefault(model, []).append(_fell(figure, *lost[name]))
-    said = (f"by the {model} timing {', '.join(words)}" for model, words in by_model.items() if words)
-    return f"fell {'; '.join(said)}"
+    said = (
+        f"{'' if model == deciding else f'by the {model} timing '}{', '.join(words)}"
+        for model, words in by_model.items()
+        if words
+    )
+    # The first says the verb for all of them.
+    return "; ".join(said).replace(" from ", " fell from ", 1)
 
 
 def _order(name: str) -> int:
