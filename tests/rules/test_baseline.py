@@ -25,9 +25,19 @@ def record(result: FileResult, *, keys: bool = True) -> Record:
     ("old", "new", "key", "words"),
     [
         ("axes = 4", "axes = 3", "node.axes", "3, was 4: safe axes fell from 56 to 42, most axes from 60 to 45"),
-        ("nodes = 2", "nodes = 3", "bus.nodes", "3, was 2: corrected margin fell from 1806.3 to 1704.4 us, margin from "),
+        (
+            "nodes = 2",
+            "nodes = 3",
+            "bus.nodes",
+            "3, was 2: corrected margin fell from 1806.3 to 1704.4 us, margin from ",
+        ),
         # A hundredth of a microsecond has two decimals.
-        ("period_us = 4000", "period_us = 3999.98", "cycle.period_us", "corrected margin fell from 1806.28 to 1806.27 us"),
+        (
+            "period_us = 4000",
+            "period_us = 3999.98",
+            "cycle.period_us",
+            "corrected margin fell from 1806.28 to 1806.27 us",
+        ),
         ("period_us = 4000", "period_us = 3000", "cycle.period_us", "3000, was 4000: safe axes fell from 56 to "),
         ("base_us = 30", "base_us = 31", "node.execution.base_us", "31, was 30: corrected margin fell from "),
     ],
@@ -53,7 +63,7 @@ def test_keys_that_cost_nothing_are_not_blamed(clean: str, changed: Changed, che
 
 
 def test_several_keys_that_cost_something_are_one_finding(clean: str, changed: Changed, check: Check) -> None:
-    pairs = [("gap_count = \"optimal\"", "gap_count = 10"), ("nodes = 2", "nodes = 3"), ("base_us = 30", "base_us = 40")]
+    pairs = [('gap_count = "optimal"', "gap_count = 10"), ("nodes = 2", "nodes = 3"), ("base_us = 30", "base_us = 40")]
     text = changed(*pairs, ("period_us = 4000", "period_us = 3900  # busplan: ignore[BP301] meant"))
     found = check(text, baseline=record(check(clean))).findings
     (finding,) = [one for one in found if one.code == "BP301"]

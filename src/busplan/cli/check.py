@@ -54,9 +54,10 @@ def check_command(
         typer.Option(
             "--format",
             envvar="BUSPLAN_FORMAT",
+            metavar="FORM",
             help="Form of the report: concise is one line a finding, full shows the line of the file with the value "
-            f"underlined; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for the build service; text is "
-            "the old name of concise.  [default: full on a terminal, otherwise concise]",
+            f"underlined, json is the document of all; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are "
+            "for the build service.  [default: full on a terminal, otherwise concise]",
         ),
     ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,

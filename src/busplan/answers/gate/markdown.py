@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.answers.check import summary_sentence
+from busplan.answers.documents import changes_sentences
 from busplan.answers.gate import GateFormat
 from busplan.buses.rule import told_apart
 from busplan.forms.columns import sentence_text
@@ -25,7 +26,8 @@ class Markdown(GateFormat):
 
 
 def _lines(report: CheckReport) -> Iterator[str]:
-    yield from ("### Check of profiles", "", escaped(sentence_text(summary_sentence(report))))
+    said = (*changes_sentences(report.changes), summary_sentence(report))
+    yield from ("### Check of profiles", "", escaped(" ".join(map(sentence_text, said))))
     if report.files:
         yield from ("", *table(_PROFILES, map(_profile, report.files), left=3))
     if report.located:
@@ -36,7 +38,7 @@ def _profile(file: FileResult) -> list[str]:
     fit = file.fit or Fit(None, None, None)
     margin = MISSING
     if fit.margin_corrected_us is not None and fit.uncertainty_us is not None:
-        margin = f"{told_apart(fit.margin_corrected_us, 0.0)[0]} ± {fit.uncertainty_us:.1f}"
+        margin = f"{told_apart(fit.margin_corrected_us, 0.0)[0]} +/- {fit.uncertainty_us:.1f}"
     return [code(file.path), _result(file), fit.verdict or MISSING, margin]
 
 
