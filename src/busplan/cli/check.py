@@ -1,6 +1,5 @@
 """`busplan check`."""
 
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
@@ -12,7 +11,7 @@ from busplan.cli.answering import columns
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
-from busplan.cli.output import PlanFailsError, emit_text, is_styled, say, write_document
+from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -234,7 +233,7 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
 
 def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
     """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
-    name = format_ or ("full" if output is None and sys.stdout.isatty() else "concise")
+    name = format_ or ("full" if output is None and is_terminal() else "concise")
     chosen = gate_format(name)
     if output is not None or FORMATS[name].reader != "people":
         write_document(chosen.write(report), output, quiet=True)
