@@ -826,7 +826,7 @@ def test_the_action_writes_a_summary_and_says_what_came_of_it(folder: Path) -> N
     work = folder / "work"
     (folder / "p").rename(work / "p")
 
-    def outputs(**inputs: str) -> list[str]:
+    def outputs(**inputs: Any) -> list[str]:
         for name in ("output", "summary"):
             (folder / name).unlink(missing_ok=True)
         action_step(CHECK, work, path=os.environ["PATH"], **inputs)
