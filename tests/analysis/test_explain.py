@@ -260,7 +260,7 @@ WITHOUT_EQUATION = {
     "capacity.limited_by": "a search: ",
     "capacity.safe_nodes": "a search: the largest whole N with T_safe <= alpha T_s, on a bus set safely for N, ",
     "capacity.safe_limited_by": "a search: ",
-    "capacity.cheapest_change": "a search: the first of gap count, slice ratio, period, speed and wiring that ",
+    "capacity.cheapest_change": "a search: the least change of gap count, slice ratio and period that ",
     "capacity.models_agree": "a comparison: ",
     "capacity.text": "sentences ",
     "capacity.warnings": "sentences ",

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import broken_limits, cycle_of, fits_in
 from busplan.analysis.capacity.figures import COUNTS, figures
-from busplan.analysis.circle.setup import loop_delays_us
+from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.trace import value_of
 from busplan.analysis.network import bus_of, model_names, network_of

@@ -48,6 +48,9 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "plan paper-1ms --nodes 6 --period 500us --gap-count 63 --max-circles 2": lambda: busplan.plan(
         "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
     ),
+    "plan paper-1ms --axes 28 --reserve 12.5% --free responses,gap_count --no-circle": lambda: busplan.plan(
+        "paper-1ms", axes=28, reserve=0.125, free=["gap_count", "responses"], with_circle=False
+    ),
     "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
     ),

@@ -115,6 +115,12 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "nodes and axes": (lambda: busplan.plan("paper-4ms", nodes=2, axes=8), "nodes 2 and axes 8: give one of them"),
     "no axes": (lambda: busplan.plan("paper-4ms", axes=0), "axes 0: expected a whole number from 1"),
     "no nodes": (lambda: busplan.plan("paper-4ms", nodes=0), "bus.nodes 0: must be 1 or more"),
+    "one freedom": (
+        lambda: busplan.plan("paper-4ms", free="gap_count"),
+        "free 'gap_count': expected several values, as a list",
+    ),
+    "unknown freedom": (lambda: busplan.plan("paper-4ms", free=["speed"]), "free speed: there is nothing of that name"),
+    "no reserve": (lambda: busplan.plan("paper-4ms", reserve=1), "limits.reserve 1.0: must be 0.99 or less"),
     "no circles": (lambda: busplan.plan("paper-4ms", max_circles=0), "max_circles 0: expected a whole number from 1"),
     "a window of nothing": (
         lambda: busplan.timeline("paper-4ms", from_us=50, to_us=20),

@@ -9,7 +9,7 @@ from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.comparison.difference import KeyDifference
 from busplan.analysis.derivation.explain import Step
 from busplan.analysis.map.cells import Cell
-from busplan.analysis.planning.options import Option
+from busplan.analysis.planning.option import Option
 from busplan.rules.report import Located
 
 

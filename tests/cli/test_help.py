@@ -13,7 +13,7 @@ from unittest import mock
 import pytest
 from typer.main import get_command
 
-from busplan.analysis.planning.best_values import MAX_CIRCLES
+from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.cli import app
 from busplan.cli.help import FAILURES
 from busplan.cli.lazy import COMMANDS

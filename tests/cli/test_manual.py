@@ -11,7 +11,7 @@ from busplan.manual import FOLDER, topics
 Run = Callable[..., CompletedProcess[str]]
 Refused = Callable[..., str]
 
-TOPICS = ["circle", "gate", "json", "limits", "models", "profile", "python"]
+TOPICS = ["circle", "gate", "json", "limits", "models", "plan", "profile", "python"]
 
 
 def test_without_a_topic_it_lists_them_a_line_each_and_says_how_to_show_one(run: Run) -> None:
@@ -57,7 +57,7 @@ def test_a_file_that_cannot_be_written_is_said(refused: Refused, tmp_path: Path)
     assert said.startswith("no/x.md: cannot be written: there is no folder")
 
 
-@pytest.mark.parametrize(("typed", "offered"), [("busplan man", "manual"), ("busplan manual p", "profile python")])
+@pytest.mark.parametrize(("typed", "offered"), [("busplan man", "manual"), ("busplan manual p", "plan profile python")])
 def test_its_name_and_topics_are_completed(run: Run, typed: str, offered: str) -> None:
     at = str(len(typed.split()) - 1)
     done = run(env={"_BUSPLAN_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": at})

@@ -178,6 +178,15 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
         (["mine.toml", "--period", "1"], "--period 1"),
         (["mine.toml", "-o", "no/such/folder.toml"], "no folder"),
         (["none.toml"], "no such file"),
+        (
+            ["mine.toml", "--free", "schedule"],
+            "--free schedule: there is nothing of that name to free on a bus of kind",
+        ),
+        (["mine.toml", "--free", ""], "there are gap_count, slice_ratio, responses, payload, period, nodes"),
+        (["mine.toml", "--free", "period", "--period", "1ms"], "--free period: cycle.period_us was given a value"),
+        (["mine.toml", "--reserve", "20"], "--reserve 20, as a share 20.0: must be 0.99 or less"),
+        (["mine.toml", "--reserve", "-1%"], "--reserve -1%: expected a number"),
+        (["mine.toml", "--reserve", "20%", "--set", "limits.reserve=0.1"], "both set limits.reserve"),
     ],
 )
 def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: list[str], words: str) -> None:
@@ -187,6 +196,34 @@ def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: lis
     assert words in run.stderr
     assert "Traceback" not in run.stderr
     assert profile.read_text(encoding="utf-8") == PROFILE
+
+
+def test_a_reserve_is_kept_and_written_and_the_gate_passes(busplan: Run, run: Run, profile: Path) -> None:
+    done = busplan("mine.toml", "--axes", 16, "--reserve", "20%", "--apply", "--format", "json", cwd=profile.parent)
+    assert done.returncode == 0
+    assert tomllib.loads(profile.read_text(encoding="utf-8"))["limits"] == {"reserve": 0.2}
+    assert json.loads(done.stdout)["recommended_changes"]["limits.reserve"] == 0.2
+    checked = run("check", "mine.toml", cwd=profile.parent)
+    assert (checked.returncode, "error" in checked.stdout) == (0, False)
+    # Nothing is left to change.
+    again = busplan("mine.toml", "--apply", cwd=profile.parent)
+    assert again.stderr == "mine.toml: nothing to change, left as it is\n"
+
+
+def test_only_what_is_freed_is_changed(busplan: Run, profile: Path) -> None:
+    asked = ("mine.toml", "--nodes", 7, "--period", "1ms", "--format", "json")
+    for free, code, keys in (
+        ("slice_ratio", 1, None),
+        ("gap_count, slice_ratio", 0, {"bus.nodes", "cycle.slice_ratio", "bus.gap_count"}),
+        ("gap_count, responses", 0, {"bus.nodes", "node.read_response", "node.write_response", "bus.gap_count"}),
+    ):
+        done = busplan(*asked, "--free", free, cwd=profile.parent)
+        document = json.loads(done.stdout)
+        assert done.returncode == code
+        assert document["free"] == [name.strip() for name in free.split(",")]
+        changes = document["recommended_changes"]
+        assert (changes if changes is None else set(changes)) == keys
+        assert bool(document["relaxations"]) == (code == 1)
 
 
 def test_the_circle_is_asked_for_and_can_be_left_out(busplan: Run, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.derivation.explain import explain
 from busplan.analysis.latency import latency
 from busplan.analysis.network import network_of
-from busplan.analysis.planning.options import plan
+from busplan.analysis.planning.plan import plan
 from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Steps, checked_grid
 from busplan.errors import PlacedError

@@ -22,7 +22,7 @@ from busplan.servo.checks import ParameterError, Refused
 EXAMPLES = Path(__file__).parent / "examples"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
 VALID = sorted(EXAMPLES.glob("*/valid*.toml"))
-CURED = ("BP101", "BP103", "BP104", "BP105", "BP114")
+CURED = ("BP101", "BP103", "BP104", "BP105", "BP109", "BP114")
 """Rules whose message ends with the cheapest cure."""
 EXPECT = re.compile(rb"# expect: ((?:\d+:\d+ ?)+)")
 
@@ -118,18 +118,18 @@ def test_codes_are_stable() -> None:
         # Two nodes at gap count 7 need 177.992 us and 205.094 us to be safe: bias 8 (0.827 + 1.139), U 11.372 us.
         (
             "BP101",
-            ["177.992 us of 150.000 us", "margin is -43.7 +/- 11.4 us", "cheapest cure: cycle.slice_ratio = 0.6837"],
+            ["177.992 us of 150.000 us", "margin is -43.7 +/- 11.4 us", "cheapest cure: cycle.slice_ratio = 0.69"],
         ),
         # At S100 the paper counts gaps as fast as the standard, and more of them: 329.254 us against 279.975 us.
         ("BP102", ["cycle.period_us: the paper's equations say that it does not fit; the verdict is: fits"]),
         # 177.992 us of 2000 us; 177.992 us / 0.05 / 4000 us is 0.88996.
         ("BP103", ["8.9%", "5.0% allowed", "cheapest cure: cycle.slice_ratio = 0.89"]),
         # 14 nodes need 1911.497 us to be safe, 15 need 2097.465 us: 0.524366 of 4000 us.
-        ("BP104", ["12 to spare that are shown to fit", "13 asked for", "cheapest cure: cycle.slice_ratio = 0.5244"]),
-        ("BP105", ["48 to spare that are shown to fit", "49 asked for", "cheapest cure: cycle.slice_ratio = 0.5244"]),
+        ("BP104", ["12 to spare that are shown to fit", "13 asked for", "cheapest cure: cycle.slice_ratio = 0.53"]),
+        ("BP105", ["48 to spare that are shown to fit", "49 asked for", "cheapest cure: cycle.slice_ratio = 0.53"]),
         ("BP106", ["63 nodes", "62 of one bus", "second bus"]),
         ("BP107", ["17 hops", "16 of one bus", "bus.max_hops = 16"]),
-        ("BP108", ["516 bytes", "512 bytes", 'cheapest cure: bus.speed = "S200"']),
+        ("BP108", ["516 bytes", "512 bytes", 'bus.speed = "S200" would do']),
         ("BP109", ["gap count 4", "3 hops", "smallest safe one is 8"]),
         # 253.187 us less 177.992 us; 13 nodes are safe at gap count 63, and 14 at that of their hops.
         ("BP110", ["gap count 63", "7 that 2 hops need", "75.195 us", "win 1 node"]),
@@ -138,7 +138,7 @@ def test_codes_are_stable() -> None:
         # 253.187 us and a bias of 8 * 0.827 us, U 4.306 us.
         ("BP113", ["gap count 7 alone", "with the 63", "does not fit", "253.187 us of 250.000 us", "-9.8 +/- 4.3 us"]),
         # 269.053 us and the same bias and U at S100 with cables of 10 m; 279.975 us / 550 us is 0.50905.
-        ("BP114", ["not shown to fit", "269.053 us of 275.000 us", "-0.7 +/- 4.3 us", "cycle.slice_ratio = 0.5091"]),
+        ("BP114", ["not shown to fit", "269.053 us of 275.000 us", "-0.7 +/- 4.3 us", "cycle.slice_ratio = 0.51"]),
         ("BP201", ["20.012 um", "1 um", "attack velocity_feedforward first"]),
         ("BP202", ["unstable", "lower servo.position_gain_per_s"]),
         ("BP203", ["feed_mm_per_min", "choose at most"]),
@@ -170,7 +170,7 @@ def test_a_reserve_is_named_where_it_is_what_is_missing() -> None:
     (finding,) = checked(EXAMPLES / "BP114" / "invalid-reserve.toml").findings
     assert "269.053 us of 310.000 us" in finding.message
     assert "limits.reserve asks for 14% of the slice" in finding.message
-    assert finding.message.endswith("cheapest cure: cycle.slice_ratio = 0.5251")  # 279.975 / 0.86 / 620
+    assert finding.message.endswith("cheapest cure: cycle.slice_ratio = 0.53")  # 279.975 / 0.86 / 620
 
 
 def test_the_paper_alone_is_no_reason_to_build() -> None:

@@ -5,13 +5,16 @@ from functools import partial
 
 from busplan.analysis.capacity.verdict import after_reset
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.cures import changeable, listed
-from busplan.analysis.planning.options import Option, Plan
+from busplan.analysis.planning.constraints import CIRCLE
+from busplan.analysis.planning.freedoms import PERIOD, freedoms
+from busplan.analysis.planning.option import Option
+from busplan.analysis.planning.plan import Plan
+from busplan.analysis.planning.relaxations import Relaxation
 from busplan.answers.documents import document, with_profile
 from busplan.answers.key_values import NewValues, settings_sentence
 from busplan.answers.plan_options import option_margin, options_table
 from busplan.answers.verdict import reset_sentence, warning_sentences
-from busplan.buses.figure import AXES, NODES, UTILISATION
+from busplan.buses.figure import AXES, NODES
 from busplan.forms.blocks import (
     Block,
     Code,
@@ -25,7 +28,7 @@ from busplan.forms.blocks import (
     sentence,
 )
 from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, period_value
+from busplan.forms.numbers import listed, nouns, period_value
 from busplan.profile.keys import flat
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
@@ -50,14 +53,15 @@ def plan_report(plan: Plan, *, with_circle: bool) -> Report:
 
 
 def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
-    """The recommendation, a row for each option, and the settings that have no value."""
+    """The recommendation, or what stands in its way; a row for each step of the search, and what could be reached."""
     yield _headline(plan, with_circle=with_circle)
+    yield from (_relaxed(plan, number, one) for number, one in enumerate(plan.relaxations))
     yield from _warnings(plan)
     yield options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
-    yield Sentence((f"{mark}'Held by' is what keeps the value from being better.",))
+    yield Sentence((f"{mark}'Held by' is what keeps a row from passing, or its value from being better.",))
     if not all(option.proven for option in plan.options):
-        yield Sentence(("? not proven: the search for a smaller period was cut short (--max-circles).",))
+        yield Sentence(("? not proven: the search for a period was cut short (--max-circles).",))
     for number, one in enumerate(plan.impossible):
         proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
         reason = ShownValue(one.reason, "reason", at=f"/impossible/{number}/reason")
@@ -86,25 +90,45 @@ def _settings(profile: Profile, changes: NewValues, *, at: str = "") -> Sentence
 
 
 def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
-    option, circle = plan.recommended, " and passes the circle" if with_circle else ""
-    subject = _goal(plan)
-    if option is None:
-        kind = bus_of(plan.goal)
-        safe = "" if kind.safety_figure is None else f" with a safe {kind.safety}"
-        none = (
-            f": NO PLAN. Of {listed(changeable(plan.goal), 'and')}, no change of what is left open "
-            f"is shown to fit{safe}{circle}{_why_none(plan)}."
-        )
-        return Sentence((*subject, none), "fails")
-    if with_circle and not plan.goal.tolerance.judges_contour:
-        circle = ", and its circle is not judged"
+    option, subject = plan.recommended, _goal(plan)
+    if option is None or plan.binding is not None:
+        why = ShownValue("" if plan.binding is None else plan.binding.why, "why", at="/binding/why")
+        return Sentence((*subject, f": NO PLAN. No change of {_freed(plan)} is enough: ", why, "."), "fails")
+    judged = plan.goal.tolerance.judges_contour
+    circle = (" and passes the circle" if judged else ", and its circle is not judged") if with_circle else ""
     number = plan.options.index(option)
     margin, doubt = option_margin(option, at=f"/options/{number}")
     result = ("fits with a margin of ", margin, " +/- ", doubt, f"{circle}.")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
+    first = (
+        "" if plan.period_is_kept else f"the period must change, for no change of {_freed(plan, PERIOD)} is enough: "
+    )
     changes = _settings(plan.goal, option.changes, at="/recommended_changes")
-    return Sentence((*subject, ": set ", *changes.parts, "; then it ", *result), "passes")
+    return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
+
+
+def _freed(plan: Plan, before: str | None = None) -> str:
+    """What may be changed, in words; only what is cheaper than the freedom of a key."""
+    known = [one for one in freedoms(plan.goal) if one.name in plan.free]
+    cost = next((one.cost for one in known if before in one.keys), None)
+    labels = [one.label for one in known if cost is None or one.cost < cost]
+    return listed(labels, "and") if labels else "anything else"
+
+
+def _relaxed(plan: Plan, number: int, one: Relaxation) -> Sentence:
+    """Say what would be enough, and what to set then."""
+    at = f"/relaxations/{number}"
+    changes = _settings(plan.goal, one.changes, at=f"{at}/changes").parts if one.changes else ("nothing to change",)
+    if one.value is not None:
+        value = ShownValue(one.value, one.relaxed, at=f"{at}/value")
+        return Sentence((f"Enough would be {one.relaxed} = ", value, ": ", *changes, "."))
+    what = "leave out the circle" if one.relaxed == CIRCLE else f"free the {_label(plan, one.relaxed)}"
+    return Sentence((f"Enough would be to {what}: ", *changes, "."))
+
+
+def _label(plan: Plan, name: str) -> str:
+    return next(one.label for one in freedoms(plan.goal) if one.name == name)
 
 
 def _goal(plan: Plan) -> tuple[Part, ...]:
@@ -120,11 +144,6 @@ def _goal(plan: Plan) -> tuple[Part, ...]:
     )
 
 
-def _why_none(plan: Plan) -> str:
-    failures = next((one.circle_failures for one in plan.options if one.circle_failures), None)
-    return f"; as it is, {failures[0]}" if failures else ""
-
-
 def _warnings(plan: Plan) -> Iterator[Sentence]:
     option = plan.recommended
     profile = plan.goal if option is None else option.profile
@@ -132,13 +151,6 @@ def _warnings(plan: Plan) -> Iterator[Sentence]:
     yield from warning_sentences(profile, nodes=nodes, most=nodes)
     if option is not None:
         yield from reset_sentence(after_reset(option.profile, option.deciding), option.profile)
-    limit = profile.limits.max_utilisation
-    if option is not None and limit is not None and option.deciding.utilisation > limit:
-        yield sentence(
-            "Warning: {} of the slice is used, and limits.max_utilisation allows {}: `busplan check` will say so.",
-            *(figure_value(UTILISATION, share)._replace(decimals=1) for share in (option.deciding.utilisation, limit)),
-            state="warns",
-        )
 
 
 # --- plain data -----------------------------------------------------------------------------------------------
@@ -165,7 +177,8 @@ def _record(plan: Plan, option: Option) -> Record:
         "margin_corrected_us": one.margin_corrected_us,
         "uncertainty_us": one.uncertainty_us,
         "binding_term": one.binding_term,
-        "bounded_by": option.bounded_by,
+        "passes": option.passes,
+        "held_by": option.held_by,
         "proven": option.proven,
         "circle_passed": option.circle_passed,
         "circle_failures": list(option.circle_failures or ()),
@@ -180,7 +193,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "period_us": one.period_us,
         "slice_ratio": profile.cycle.slice_ratio,
         **{key: getattr(one, key) for key in bus_of(profile).planned_figures},
-        **{f"{kind}_bytes": profile.alike_nodes[0].bytes_of(kind) for kind in TRANSACTION_KINDS},
+        **{f"{kind}_bytes": int(getattr(network_of(profile).groups[0], f"{kind}_bytes")) for kind in TRANSACTION_KINDS},
     }
 
 
@@ -204,7 +217,11 @@ def plan_document(plan: Plan) -> JsonDocument:
         "plan",
         profile=plan.profile.name,
         goal={"nodes": int(goal.nodes), "axes": int(goal.axes)},
+        free=list(plan.free),
+        period_is_kept=plan.period_is_kept,
         recommended_changes=recommended,
+        binding=None if plan.binding is None else {"constraint": plan.binding.key, "why": plan.binding.why},
+        relaxations=[one._asdict() for one in plan.relaxations],
         options=_options(plan),
         impossible=[one._asdict() for one in plan.impossible],
     )

@@ -4,7 +4,8 @@ from typing import Final
 
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of
-from busplan.analysis.planning.options import Option, Plan
+from busplan.analysis.planning.option import Option
+from busplan.analysis.planning.plan import Plan
 from busplan.answers.key_values import NewValues, key_value, settings_sentence
 from busplan.buses import bus
 from busplan.buses.figure import BINDING_TERM, MARGIN_CORRECTED, SAFE_AXES, SAFE_NODES, UNCERTAINTY
@@ -46,7 +47,7 @@ def _row(option: Option, *, at: str) -> TableRow:
         "*" * option.recommended + "?" * (not option.proven),
         _short(option.profile, option.changes, at=f"{at}/changes"),
         figure_value(BINDING_TERM, option.deciding.binding_term, at=f"{at}/{BINDING_TERM.key}"),
-        ShownValue(option.bounded_by, "bounded_by", at=f"{at}/bounded_by"),
+        ShownValue(option.held_by, "held_by", at=f"{at}/held_by"),
         circle,
         *option_margin(option, at=at),
         *(attribute_value(one, option.deciding, at=at) for one in (SAFE_NODES, SAFE_AXES)),
@@ -74,24 +75,28 @@ _SHORT: Final = {
     "cycle.slice_ratio": "ratio {}",
     "payload.read_bytes": "read {} bytes",
     "payload.write_bytes": "write {} bytes",
+    "payload.read_bytes_per_axis": "read {} bytes an axis",
+    "payload.write_bytes_per_axis": "write {} bytes an axis",
 }
+
+
+_BOTH: Final = ("payload.read_bytes", "payload.write_bytes")
 
 
 def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
     """The settings of an option, in a few words."""
     if not changes:
         return MISSING
-    payloads = {value for key, value in changes.items() if key.startswith("payload.")}
-    if len(changes) == 2 and len(payloads) == 1 and all(key.startswith("payload.") for key in changes):  # noqa: PLR2004
-        key, value = next(iter(changes.items()))
-        return sentence("payload {} bytes", key_value(key, value, at=at))
-    words = {**_SHORT, **bus_of(profile).change_words}
+    sizes = {key: value for key, value in changes.items() if key in _BOTH}
+    alike = len(sizes) == len(_BOTH) and len(set(sizes.values())) == 1
+    shown = {key: value for key, value in changes.items() if not alike or key != _BOTH[-1]}
+    words = {**_SHORT, **bus_of(profile).change_words, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(
             sentence(words[key], _short_value(key, value, at=at))
             if key in words
             else settings_sentence({key: value}, meanings={}, at=at)
-            for key, value in changes.items()
+            for key, value in shown.items()
         ),
         by=", ",
     )

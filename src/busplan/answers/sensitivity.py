@@ -10,7 +10,6 @@ from busplan.analysis.capacity.figures import Capacity
 from busplan.analysis.capacity.sensitivity import Effect, Sensitivity, Standing
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of
-from busplan.analysis.planning.cures import listed
 from busplan.answers.capacity import capacity_document, capacity_report
 from busplan.answers.documents import with_profile
 from busplan.answers.next_bottleneck import next_bottleneck_record, next_bottleneck_sentence
@@ -32,7 +31,7 @@ from busplan.forms.blocks import (
     joined,
     sentence,
 )
-from busplan.forms.numbers import period_value
+from busplan.forms.numbers import listed, period_value
 from busplan.sections.profile import Profile
 
 _DIGITS = 4

@@ -7,7 +7,8 @@ from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.cures import changeable, listed
+from busplan.analysis.planning.advice import changeable
+from busplan.analysis.planning.freedoms import PERIOD
 from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import (
     AVAILABLE,
@@ -37,7 +38,7 @@ from busplan.forms.blocks import (
     sentence,
     state_of,
 )
-from busplan.forms.numbers import nouns, period_value
+from busplan.forms.numbers import listed, nouns, period_value
 from busplan.sections.profile import Profile
 
 Places = Mapping[str, str]
@@ -291,38 +292,38 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
     settings = settings_sentence(
         change.changes, meanings=bus_of(profile).change_meanings, at=_place(at, "changes"), quotes=False
     ).parts
-    if verdict.all_well:
+    first = f"{period_must_change(profile)} " if PERIOD in change.changes else ""
+    if change.nodes > figures.nodes:
         more = change.nodes - (figures.safe_nodes or 0)
-        return Sentence(
-            (
-                *(
-                    "Cheapest way to ",
-                    count_value(more),
-                    f" more {nouns(more, 'node')}: ",
-                    *settings,
-                    ", which carries ",
-                ),
-                *_nodes(change.nodes, change.nodes * network_of(profile).asked_nodes.node.axes).parts,
-                ".",
-            )
+        way = (
+            f"{first}Cheapest way to ",
+            count_value(more),
+            f" more {nouns(more, 'node')}: ",
+            *settings,
+            ", which carries ",
         )
-    purpose = "make it safe" if figures.verdict == FITS else "make it fit"
+        carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
+        return Sentence((*way, *carried, "."))
+    purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
-    return Sentence(
-        (f"Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ", margin, " +/- ", doubt, ".")
-    )
+    way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
+    return Sentence((*way, margin, " +/- ", doubt, "."))
+
+
+def period_must_change(profile: Profile) -> str:
+    """Say that nothing cheaper than another period is enough."""
+    *cheaper, _ = changeable(profile)
+    return f"The period must change, for no change of {listed(cheaper, 'and')} is enough."
 
 
 def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     """Say that no change is advised, and why."""
     bus, figures = bus_of(profile), verdict.deciding
-    if not verdict.all_well:
-        if figures.verdict == FITS:
-            return sentence(bus.no_safe_setting, state="fails")
-        return sentence(f"No change of {listed(changeable(profile), 'or')} alone makes it fit.", state="fails")
     limit = bus.limit(figures.safe_limited_by or TIME)
-    if limit is None or limit.is_safety:
-        return sentence(f"No change of {listed(changeable(profile, structure=False), 'or')} alone carries more nodes.")
+    if verdict.no_change or limit is None:
+        purpose = "helps" if verdict.all_well else "makes it safe" if figures.verdict == FITS else "makes it fit"
+        words = f"No change of {listed(changeable(profile), 'and')} {purpose}: {verdict.no_change}."
+        return Sentence((words,), "neutral" if verdict.all_well else "fails")
     most = count_value(plain(limit.most(network_of(profile))))
     return sentence(f"No setting carries more nodes: {{}} {limit.key} are the {bus.limits_of}'s limit.", most)
 

@@ -4,13 +4,13 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from busplan.analysis.circle.check import MOST_STEPS
 from busplan.answers.check import check_report, summary_sentence
 from busplan.api.answer import Answer
 from busplan.api.inputs import Path, argument, items
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.profile.collect import collect
-from busplan.rules.circle import MOST_STEPS
 from busplan.rules.gate import FileResult, check_source
 from busplan.rules.report import CheckReport, Located, Summary
 

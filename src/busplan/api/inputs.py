@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final, TypeVar
 
 from busplan.analysis.network import bus_of, known_model, model_names
-from busplan.analysis.planning.cures import listed
 from busplan.errors import BusplanError
+from busplan.forms.numbers import listed
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT

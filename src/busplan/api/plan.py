@@ -1,14 +1,20 @@
 """`busplan.plan`."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from busplan.analysis.planning import options as analysis
-from busplan.analysis.planning.best_values import MAX_CIRCLES
-from busplan.analysis.planning.options import Impossible, Option, Plan
+from busplan.analysis.circle.check import CircleCheck
+from busplan.analysis.planning import plan as analysis
+from busplan.analysis.planning.constraints import Need
+from busplan.analysis.planning.machine import nodes_for_axes
+from busplan.analysis.planning.option import Impossible, Option
+from busplan.analysis.planning.plan import Plan
+from busplan.analysis.planning.relaxations import Relaxation
+from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.answers.plan import plan_report
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, finite, load_profile, plain, whole
+from busplan.api.inputs import ProfileLike, finite, items, load_profile, plain, whole
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -27,10 +33,16 @@ class PlanAnswer(Answer):
         The profile with the wanted values.
     wanted
         Wanted values that differ from the profile, by dotted key.
+    free
+        Names of what may be changed, the cheapest first.
     options
-        Ways to set the network, each with its figures.
+        The steps of the search, each with its figures, and what the network could reach.
     impossible
-        Settings that have no suitable value, with the reason.
+        Steps that have no suitable value, with the reason.
+    binding
+        The constraint that stands in the way of a plan; None if there is one.
+    relaxations
+        What alone would make a plan possible, with what to set then; empty if there is a plan.
     with_circle
         Whether the circle test was run.
     """
@@ -38,8 +50,11 @@ class PlanAnswer(Answer):
     profile: Profile
     goal: Profile
     wanted: dict[str, Value]
+    free: tuple[str, ...]
     options: tuple[Option, ...]
     impossible: tuple[Impossible, ...]
+    binding: Need | None
+    relaxations: tuple[Relaxation, ...]
     with_circle: bool
 
     @property
@@ -58,7 +73,16 @@ class PlanAnswer(Answer):
 
     @property
     def _found(self) -> Plan:
-        return Plan(self.profile, self.goal, self.wanted, self.options, self.impossible)
+        return Plan(
+            self.profile,
+            self.goal,
+            self.wanted,
+            self.free,
+            self.options,
+            self.impossible,
+            self.binding,
+            self.relaxations,
+        )
 
 
 def plan(
@@ -68,10 +92,12 @@ def plan(
     axes: int | None = None,
     period_us: float | None = None,
     gap_count: int | Literal["optimal"] | None = None,
+    reserve: float | None = None,
+    free: Iterable[str] | None = None,
     with_circle: bool = True,
     max_circles: int = MAX_CIRCLES,
 ) -> PlanAnswer:
-    """Tell what to set: gap count, period, slice ratio, payload, and how many nodes would do.
+    """Tell what to set, with all changes together, for a number of nodes or axes.
 
     Parameters
     ----------
@@ -85,6 +111,11 @@ def plan(
         Communication period T_s to keep [us].
     gap_count
         Gap count to keep, 0 to 63, or "optimal" [1].
+    reserve
+        Share of the slice that must stay free, 0..0.99, instead of the profile's limits.reserve [1].
+    free
+        Names of what may be changed, of gap_count, slice_ratio, responses, payload, period and nodes; by default gap
+        count, slice ratio up to 0.9, and period.
     with_circle
         Run the circle test, if the profile has a section for it.
     max_circles
@@ -93,13 +124,14 @@ def plan(
     Returns
     -------
     PlanAnswer
-        The options, and the recommended one: the cheapest after which the goal fits under all timing models with a
-        safe gap count, and passes the circle. Times are in us.
+        The steps of the search, and the recommended one: the least change of the dearest freedom with all cheaper ones
+        free, after which the goal is shown to fit with a safe gap count, within [limits], and passes the circle. Times
+        are in us.
 
     Raises
     ------
     BusplanError
-        Not a profile, or a goal that no profile can have. "No plan" is an answer, not an error.
+        Not a profile, a goal that no profile can have, or an unknown freedom. "No plan" is an answer, not an error.
 
     References
     ----------
@@ -118,20 +150,22 @@ def plan(
     if nodes is not None and axes is not None:
         raise BusplanError(f"nodes {nodes} and axes {axes}: give one of them")
     if axes is not None:
-        nodes = analysis.nodes_for_axes(network, whole(axes, name="axes"))
+        nodes = nodes_for_axes(network, whole(axes, name="axes"))
     period = None if period_us is None else finite(period_us, name="period_us")
-    asked = {"bus.nodes": nodes, "cycle.period_us": period, "bus.gap_count": gap_count}
+    least = None if reserve is None else finite(reserve, name="reserve")
+    asked = {
+        "bus.nodes": nodes,
+        "cycle.period_us": period,
+        "bus.gap_count": gap_count,
+        "limits.reserve": least,
+    }
     with_circle = with_circle and network.asks_for_circle
     tries = whole(max_circles, name="max_circles")
-    check = None
-    if with_circle:
-        from busplan.analysis.circle.check import CircleCheck
-
-        check = CircleCheck()
     found = analysis.plan(
         network,
         wanted={key: plain(value) for key, value in asked.items() if value is not None},
-        circle=check,
+        free=None if free is None else [str(one) for one in items(free, name="free")],
+        circle=CircleCheck() if with_circle else None,
         max_circles=tries,
     )
     return PlanAnswer(*found, with_circle=with_circle)

@@ -7,6 +7,7 @@ alike. They branch on words, never on numbers.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import IntEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
@@ -105,21 +106,39 @@ class Limit(NamedTuple):
         return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
 
 
-class Setting(NamedTuple):
-    """A key that a plan may turn without new parts."""
+class Cost(IntEnum):
+    """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
 
-    key: str
+    REGISTER = 1
+    """A number in the nodes, such as a gap count."""
+    HOST_TIME = 2
+    """The slice ratio: the host computes in the rest of the period."""
+    RESPONSES = 3
+    """How nodes answer: their firmware."""
+    SCHEDULE = 4
+    """How the host asks them: the firmware of all."""
+    PAYLOAD = 5
+    """What travels in a cycle."""
+    PERIOD = 6
+    """A requirement of the machine."""
+    NODES = 7
+    """Nodes that go to a second bus."""
+
+
+class Setting(NamedTuple):
+    """What of the bus a plan may turn without new parts."""
+
+    name: str
+    """What a user calls it who lets a plan turn it: gap_count."""
     label: str
-    best: Value | None
-    """The value that needs the least time and is safe for the network; None where no value is known to be."""
-    values: tuple[Value, ...]
-    """Safe values that it has not yet, the smallest change first."""
-    bound: str
-    """What keeps the best value from being better."""
+    """What it is called in a sentence: gap count."""
+    cost: Cost
+    keys: tuple[str, ...]
+    """Dotted keys that it turns."""
+    values: tuple[Mapping[str, Value], ...]
+    """What it may be for this very network and is not yet, safe and the smallest change first: new values by key."""
     reason: str = ""
-    """Why there is no best value."""
-    follows: Value | None = None
-    """A value that means the best one for any number of nodes."""
+    """Why there is none."""
 
 
 class Perturbation(NamedTuple):
@@ -280,8 +299,6 @@ class Bus(ABC):
     """Keys of the set-up figures that a page's heading shows."""
     safety: ClassVar[str] = "setting"
     """What an unsafe bus has set wrongly, in words."""
-    no_safe_setting: ClassVar[str] = "No safe setting is known."
-    """What is said where nothing is known to be safe."""
     safety_figure: ClassVar[Figure | None] = None
     """The figure that says whether every safety limit holds."""
     table_figures: ClassVar[tuple[Figure, ...]] = ()
@@ -314,8 +331,6 @@ class Bus(ABC):
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()
     """Constants that its warnings look at."""
-    structural_changes: ClassVar[tuple[str, ...]] = ()
-    """What else of the machine may be changed for it to fit, in words."""
     change_meanings: ClassVar[Mapping[str, str]] = {}
     """What a change of a key means on the machine, where the key does not say so."""
     reset_changes: ClassVar[Mapping[str, Value]] = {}
@@ -386,12 +401,8 @@ class Bus(ABC):
         return True
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
-        """What of the bus a plan may turn, with the values that are safe for this very network."""
+        """What of the bus a plan may turn; it is asked again after each change of the network."""
         return ()
-
-    def repairs(self, network: Network) -> dict[str, Value]:  # noqa: ARG002 - a kind may know none
-        """The nearest values that keep the limits of the standard, for each that a network breaks."""
-        return {}
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:  # noqa: ARG002 - a kind may have none
         """Small changes that only this kind of bus has, beside those of every kind."""

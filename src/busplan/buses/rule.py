@@ -94,10 +94,7 @@ class RuleSubject(Protocol):
         """Capacity under the timing model that decides, with other values by dotted key."""
 
     def cure(self) -> str:
-        """The cheapest change after which the profile is shown to fit, in words."""
-
-    def room(self, nodes: int, *, utilisation: float = 1.0) -> str:
-        """The cheapest change that makes room for some nodes, in words."""
+        """The least change after which the profile holds every constraint of a plan, in words."""
 
 
 class Rule(NamedTuple):

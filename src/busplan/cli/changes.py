@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from decimal import Decimal
 from functools import wraps
 from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
@@ -41,6 +42,15 @@ GapCountOption = Annotated[
         metavar="0..63|optimal",
         help="Gap count of all nodes; optimal is the smallest safe one for the hops.  "
         "[default: the profile's bus.gap_count]",
+        show_default=False,
+    ),
+]
+ReserveOption = Annotated[
+    str | None,
+    typer.Option(
+        "--reserve",
+        metavar="SHARE",
+        help="Share of the slice that must stay free, as 20% or 0.2.  [default: the profile's limits.reserve]",
         show_default=False,
     ),
 ]
@@ -90,8 +100,18 @@ def period_form(words: str) -> ShortForm:
     return ShortForm("--period", _PERIOD, Annotated[str | None, option], _period)
 
 
+def _share(text: str) -> tuple[object, str]:
+    """Read 20% or 0.2. Other text is passed on: the profile's schema refuses it."""
+    match = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(%?)", text.strip())
+    if match is None:
+        return text, ""
+    share = float(Decimal(match[1]) / (100 if match[2] else 1))
+    return share, f", as a share {share}"
+
+
 NODES: Final = ShortForm("--nodes", "bus.nodes", NodesOption)
 GAP_COUNT: Final = ShortForm("--gap-count", "bus.gap_count", GapCountOption, _gap_count)
+RESERVE: Final = ShortForm("--reserve", "limits.reserve", ReserveOption, _share)
 
 
 def _set_option(words: str) -> Any:

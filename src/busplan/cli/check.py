@@ -110,8 +110,8 @@ def check_command(
     _require_baseline(baseline, update=update_baseline)
     if update_baseline and changes.each:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
+    from busplan.analysis.circle.check import MOST_STEPS
     from busplan.profile.collect import collect
-    from busplan.rules.circle import MOST_STEPS
     from busplan.rules.gate import check_source
     from busplan.rules.report import CheckReport
 

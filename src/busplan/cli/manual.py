@@ -27,7 +27,7 @@ def manual_command(
     ] = None,
     output: Annotated[Path | None, output_option("Write the page to FILE, as Markdown whatever its name")] = None,
 ) -> None:
-    """Show a reference page: profile keys, timing models, the circle test, the gate, JSON, Python or limits.
+    """Show a reference page: profile keys, timing models, the circle test, the plan, the gate, JSON, Python, limits.
 
     Pages are Markdown, and come as they are. Without a topic it lists the topics. What a command and its options do is
     in `busplan COMMAND --help`. It exits 0 when the page is written.

@@ -9,7 +9,7 @@ import typer
 
 from busplan.cli.answering import answer, report_with
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.changes import GAP_COUNT, NODES, period_form, takes_changes
+from busplan.cli.changes import GAP_COUNT, NODES, RESERVE, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, FormatOption, ProfileArgument
 from busplan.cli.output import NewFile, PlanFailsError, emit_document, new_file, say
@@ -19,7 +19,7 @@ from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.planning.options import Plan
+    from busplan.analysis.planning.plan import Plan
     from busplan.forms.blocks import Report
     from busplan.profile.toml import LoadedProfile
     from busplan.sections.profile import Profile
@@ -45,6 +45,7 @@ _NodesOption = Annotated[
         "[default: the profile's cycle.period_us, which may be changed]"
     ),
     GAP_COUNT,
+    RESERVE,
     words="Part of the goal: it is kept, and --apply and -o write it.",
 )
 def plan_command(
@@ -59,6 +60,16 @@ def plan_command(
             max=_MAX_AXES,
             help="Goal: so many axes, on the nodes they need at the profile's node.axes each; instead of --nodes.  "
             "[default: those of the nodes]",
+        ),
+    ] = None,
+    free: Annotated[
+        str | None,
+        typer.Option(
+            "--free",
+            metavar="NAMES",
+            help="What may be changed, with commas: gap_count, slice_ratio, responses (reads concatenated, writes "
+            "unified), schedule (where the bus has one), payload (less), period, nodes (fewer), in the order of their "
+            "cost.  [default: gap_count,slice_ratio,period]",
         ),
     ] = None,
     circle: Annotated[
@@ -76,10 +87,10 @@ def plan_command(
             metavar="N",
             min=1,
             max=100_000,
-            help="Periods in a row to test for the smallest that passes the circle; then the strides double, and the "
+            help="Periods in a row to test for the nearest that passes the circle; then the strides double, and the "
             "answer is marked as not proven.",
         ),
-    ] = 50,  # best_values.MAX_CIRCLES, which --help must not load
+    ] = 50,  # search.MAX_CIRCLES, which --help must not load
     apply: Annotated[
         bool,
         typer.Option(
@@ -102,16 +113,17 @@ def plan_command(
     ] = False,
     format_: FormatOption = None,
 ) -> None:
-    """Tell what to set: gap count, period, slice ratio, payload, and how many nodes would do.
+    """Tell what to set for a number of nodes or axes: gap count, slice ratio and period, several where one is too few.
 
-    Each option changes the profile in one way, and is computed again with it in place: the smallest period that fits
-    the bus and passes the circle, the best gap count for the hops, the largest payload (read and write alike), the
-    smallest slice ratio, the most nodes: all as far as they are shown to fit. Margins are in us, less the model's bias.
+    One plan is recommended: the least change of the dearest thing that is changed, with all cheaper ones free, after
+    which the goal is shown to fit with its reserve, at a safe gap count, within all [limits], with a circle that passes
+    and a period that servo.step_us divides. The order of cost is that of --free. The slice ratio goes up to 0.9, and a
+    period is changed only where nothing cheaper is enough. What is given by an option is kept.
 
-    One is recommended: the cheapest after which the goal is shown to fit with a safe gap count, and passes the circle.
-    Cheapest comes first: nothing, gap count, slice ratio (up to 0.9), both, period, period and gap count. What is given
-    by an option is kept, and so is the number of nodes; a payload, speed or wiring is changed only where the standard's
-    limits demand it. Exits 0 when there is such a plan, 1 when there is none.
+    The table has the steps of the search, and what could be reached: the smallest period, the largest payload (read and
+    write alike) and the most nodes, with all that is cheaper free. Margins are in us, less the model's bias. Without a
+    plan it says what stands in the way, and what would be enough. `busplan manual plan` has more. Exits 0 when there is
+    a plan, 1 when there is none.
 
     Example: busplan plan paper-1ms --axes 16
     """
@@ -126,26 +138,28 @@ def plan_command(
     piped = new == STANDARD_OUTPUT
     require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
     with answer(format_, report_file, inputs=profile_files(profile), changes=changes) as give:
-        from busplan.analysis.planning.options import plan
+        from busplan.analysis.circle.check import CircleCheck
+        from busplan.analysis.planning.freedoms import freed
+        from busplan.analysis.planning.plan import plan
         from busplan.answers.plan import plan_report
+        from busplan.profile.keys import flat
         from busplan.profile.shipped import load
 
         if apply:
             require_own_file(profile)
         loaded = load(profile)
         wanted = _wanted(loaded.profile, changes, axes=axes)
-        with_circle = wanted.applied(loaded.profile).asks_for_circle and circle
+        goal = wanted.applied(loaded.profile)
+        with_circle = goal.asks_for_circle and circle
         values: dict[str, Any] = wanted.values
+        names = _names(free)
+        freed(goal, names, asked=dict(flat(values)), option="--free")
         with ExitStack() as files:
             # Opened before the search, so that a path that cannot be written fails at once.
             file = files.enter_context(new_file(new, overwrite=force)) if new and not piped else None
             with progress_bar("circle tests") as progress:
-                check = None
-                if with_circle:
-                    from busplan.analysis.circle.check import CircleCheck
-
-                    check = CircleCheck(progress=progress, expected=max_circles)
-                result = plan(loaded.profile, wanted=values, circle=check, max_circles=max_circles)
+                check = CircleCheck(progress=progress, expected=max_circles) if with_circle else None
+                result = plan(loaded.profile, wanted=values, free=names, circle=check, max_circles=max_circles)
             if new is not None:
                 _write_profile(result, file)
         if result.recommended is None:
@@ -159,6 +173,11 @@ def plan_command(
         (partial(_say_report, changes) if piped else give)(report)
     if result.recommended is None:
         raise PlanFailsError
+
+
+def _names(free: str | None) -> list[str] | None:
+    """The names of --free; an empty one is refused as unknown."""
+    return None if free is None else [name.strip() for name in free.split(",")]
 
 
 def _check_options(
@@ -182,7 +201,7 @@ def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> Key
     """The changes, with the nodes that --axes needs."""
     if axes is None:
         return changes
-    from busplan.analysis.planning.options import nodes_for_axes
+    from busplan.analysis.planning.machine import nodes_for_axes
 
     of_nodes = KeyChanges(tuple(one for one in changes.each if one.key in ("node", "node.axes")))
     nodes = nodes_for_axes(of_nodes.applied(profile), axes)

@@ -1,5 +1,6 @@
 """Write figures: digits and unit."""
 
+from collections.abc import Sequence
 from math import isnan
 from typing import Final
 
@@ -116,6 +117,18 @@ def nouns(number: int, noun: str) -> str:
     if number == 1:
         return noun
     return f"{noun.removesuffix('is')}es" if noun.endswith("is") else f"{noun}s"
+
+
+def listed(words: Sequence[str], last: str) -> str:
+    """Write a list in words.
+
+    Examples
+    --------
+    >>> listed(("speed", "slice ratio", "period"), "or")
+    'speed, slice ratio or period'
+    """
+    *before, end = words
+    return f"{', '.join(before)} {last} {end}" if before else end
 
 
 def _factor(value: ShownValue) -> float:

@@ -41,6 +41,17 @@ def value_text(value: object) -> str:
     raise TypeError(f"{value!r} is no value of a profile")
 
 
+def short_text(value: object) -> str:
+    """Write a value as TOML, a whole float without its fraction: where the schema has a float, both mean the same.
+
+    Examples
+    --------
+    >>> short_text(1200.0), short_text(0.83), short_text("unified")
+    ('1200', '0.83', '"unified"')
+    """
+    return value_text(int(value) if isinstance(value, float) and value.is_integer() else value)
+
+
 def profile_text(profile: Profile) -> str:
     """Write a profile as TOML, without keys that it does not set.
 

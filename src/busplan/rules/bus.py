@@ -1,7 +1,6 @@
 """Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
 
 from collections.abc import Iterator, Sequence
-from math import ceil
 from typing import Any, Final
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
@@ -36,10 +35,9 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The slice is fuller than [limits] allows."""
     limit, one = subject.profile.limits.max_utilisation, subject.deciding
     if limit is not None and one.utilisation > limit:
-        cure = subject.room(one.nodes, utilisation=limit)
         yield RuleProblem(
             "limits.max_utilisation",
-            f"{one.utilisation:.1%} of the slice is used, {limit:.1%} allowed; {cure}",
+            f"{one.utilisation:.1%} of the slice is used, {limit:.1%} allowed; {subject.cure()}",
         )
 
 
@@ -49,8 +47,7 @@ def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     for counts in _counted(one):
         spare = (counts.safe_nodes or 0) - counts.nodes
         if limit is not None and spare < limit:
-            room = _room(subject, counts, one.nodes + limit)
-            yield RuleProblem("limits.min_spare_nodes", f"{_of_group(counts)}{_spare(spare, limit)}; {room}")
+            yield RuleProblem("limits.min_spare_nodes", _too_few(subject, counts, spare, limit))
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -59,9 +56,7 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     for counts in _counted(one):
         spare = (counts.safe_axes or 0) - counts.axes
         if limit is not None and counts.axes and spare < limit:
-            nodes = ceil((counts.axes + limit) * counts.nodes / counts.axes)
-            room = _room(subject, counts, one.nodes - counts.nodes + nodes)
-            yield RuleProblem("limits.min_spare_axes", f"{_of_group(counts)}{_spare(spare, limit)}; {room}")
+            yield RuleProblem("limits.min_spare_axes", _too_few(subject, counts, spare, limit))
 
 
 def _counted(one: RuleFigures) -> Sequence[Any]:
@@ -69,20 +64,13 @@ def _counted(one: RuleFigures) -> Sequence[Any]:
     return one.groups or (one,)
 
 
-def _of_group(counts: Any) -> str:
-    name = getattr(counts, "name", "")
-    return f"group {name}: " if name else ""
-
-
-def _spare(spare: int, limit: int) -> str:
-    return f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
-
-
-def _room(subject: RuleSubject, counts: Any, nodes: int) -> str:
-    """What limits the nodes, and how to make room for a number of them."""
-    limit = bus_of(subject.profile).limit(counts.safe_limited_by)
-    cure = subject.room(nodes) if limit is None or limit.is_safety else limit.way_out
-    return f"limited by {counts.safe_limited_by}; {cure}"
+def _too_few(subject: RuleSubject, counts: Any, spare: int, limit: int) -> str:
+    """Say what is missing, what limits the nodes, and how to make room for more."""
+    of = f"group {counts.name}: " if subject.deciding.groups else ""
+    bound = bus_of(subject.profile).limit(counts.safe_limited_by)
+    cure = subject.cure() if bound is None or bound.is_safety else bound.way_out
+    said = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
+    return f"{of}{said}; limited by {counts.safe_limited_by}; {cure}"
 
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -105,9 +93,9 @@ RULES: Final = (
         "the cycle does not fit its time slice",
         "All terms of one cycle together (equation 2), with the bias of the timing model, take longer than "
         "slice_ratio * period_us (equation 1), by more than is not known; or a limit is broken that has no rule of its "
-        "own. The message names the cheapest cure: a "
-        "setting of the bus needs no new parts, the slice ratio is computing time of the host, the period is what the "
-        "machine is for.",
+        "own. The message names the cheapest cure, "
+        "which `busplan plan` finds: a setting of the bus needs no new parts, the slice ratio is computing time of the "
+        "host, the period is what the machine is for.",
         slice_overrun,
     ),
     Rule(

@@ -6,6 +6,7 @@ They share one run of the test, only for profiles with a section for it.
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from busplan.analysis.circle.check import MOST_STEPS
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.rules.finding import Subject
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -14,10 +15,6 @@ from busplan.servo.checks import ParameterError
 
 _NAMED: Final = ("circle", "servo", "delivery", "cycle")
 _NOT_RUN: Final = ("BP203", "BP204")
-
-
-MOST_STEPS: Final = 10_000_000
-"""Most steps of a circle that a check runs unless it is told otherwise: seconds, and a few hundred megabytes."""
 
 
 def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterator[tuple[str, RuleProblem]]:

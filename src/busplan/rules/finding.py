@@ -6,11 +6,15 @@ from typing import NamedTuple
 
 from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.circle.check import MOST_STEPS, CircleCheck
 from busplan.analysis.network import bus_of, model_names, network_of
-from busplan.analysis.planning.cures import Change, change_for_room, change_to_fit, changeable, listed
+from busplan.analysis.planning.advice import changeable, cure
+from busplan.analysis.planning.freedoms import PERIOD
 from busplan.buses.rule import Severity
+from busplan.forms.numbers import listed
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.toml import LoadedProfile, override
+from busplan.profile.write import short_text
 
 
 class Finding(NamedTuple):
@@ -26,10 +30,27 @@ class Finding(NamedTuple):
 
 
 class Subject:
-    """A profile with the figures that rules need, each computed once, at first use."""
+    """A profile with the figures that rules need, each computed once, at first use.
 
-    def __init__(self, loaded: LoadedProfile, changes: KeyChanges = NO_CHANGES) -> None:
+    Parameters
+    ----------
+    loaded
+        The profile and its text.
+    changes
+        Changes of the profile, which the text does not show.
+    circle_steps
+        Most simulated steps of each axis of a circle that a cure must pass; None for no circle.
+    """
+
+    def __init__(
+        self,
+        loaded: LoadedProfile,
+        changes: KeyChanges = NO_CHANGES,
+        *,
+        circle_steps: int | None = MOST_STEPS,
+    ) -> None:
         self.profile = loaded.profile
+        self._circle_steps = circle_steps
         self.document = loaded.document
         self.origin = f" (with {changes.words})" if changes.words else ""
         """End of the messages: the changes, which the document does not show."""
@@ -63,14 +84,15 @@ class Subject:
         return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
     def cure(self) -> str:
-        """The cheapest change after which the profile is shown to fit, in words."""
-        return self._words(change_to_fit(self.profile))
+        """The least change after which the profile holds every constraint of a plan, in words; one for all rules."""
+        return self._cure
 
-    def room(self, nodes: int, *, utilisation: float = 1.0) -> str:
-        """The cheapest change that makes room for some nodes, in words."""
-        return self._words(change_for_room(self.profile, nodes=nodes, utilisation=utilisation))
-
-    def _words(self, change: Change | None) -> str:
-        if change is None:
-            return f"no change of {listed(changeable(self.profile, structure=False), 'or')} alone is a cure"
-        return "cheapest cure: " + ", ".join(f"{key} = {value}" for key, value in change.changes.items())
+    @cached_property
+    def _cure(self) -> str:
+        circle = None if self._circle_steps is None else CircleCheck(most_steps=self._circle_steps)
+        found = cure(self.profile, circle=circle)
+        if found.changes is None:
+            return f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}"
+        lines = ", ".join(f"{key} = {short_text(value)}" for key, value in found.changes.items())
+        first = "the period must change; " if PERIOD in found.changes else ""
+        return f"{first}cheapest cure: {lines}"

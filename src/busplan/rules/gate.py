@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Literal, NamedTuple
 
+from busplan.analysis.circle.check import MOST_STEPS
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -47,7 +48,7 @@ def check_source(
     source: ProfileSource,
     *,
     with_circle: bool = True,
-    circle_steps: int = circle.MOST_STEPS,
+    circle_steps: int = MOST_STEPS,
     changes: KeyChanges = NO_CHANGES,
     recorded: Mapping[str, Recorded] | None = None,
     record: bool = False,
@@ -94,7 +95,7 @@ def check_document(
     document: Document,
     *,
     with_circle: bool = True,
-    circle_steps: int = circle.MOST_STEPS,
+    circle_steps: int = MOST_STEPS,
     changes: KeyChanges = NO_CHANGES,
     baseline: Recorded | None = None,
     record: bool = True,
@@ -131,7 +132,7 @@ def check_document(
     except BusplanError as error:
         failure = f"{document.name}: {'; '.join(error.problems)}"
         return FileResult(document.name, profile.name, (), {}, failure=failure)
-    subject = Subject(LoadedProfile(profile, document), changes)
+    subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
     own = cycle_rules(profile.bus.kind)
     found = list(_findings(subject, own))
     ran = {rule.code for rule in own}

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures, figures
 from busplan.analysis.network import bus_of
-from busplan.analysis.planning.cures import Change, change_for_more, change_to_fit
+from busplan.analysis.planning.advice import Change, advice
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -21,8 +21,10 @@ class Verdict(NamedTuple):
     after_reset: CapacityFigures | None
     """Figures after a bus reset, where the cycle fits as it is set and is not shown to fit then."""
     change: Change | None
-    """The cheapest change: one after which the cycle is shown to fit on a bus that is set safely; or, where all is well
-    already, one that carries more safe nodes."""
+    """The least change after which every constraint of a plan holds; or, where all do already, one that carries another
+    node."""
+    no_change: str
+    """What stands in the way of a change; empty if there is one."""
 
     @property
     def models_agree(self) -> bool | None:
@@ -44,15 +46,15 @@ def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
     profile = override(capacity.profile, {"cycle.period_us": results[0].period_us})
     model = bus_of(profile).deciding_model
     deciding = next((one for one in results if one.timing_model == model), None) or figures(profile, model=model)
-    verdict = Verdict(
+    change, no_change = advice(profile, deciding)
+    return Verdict(
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(one for one in results if one is not deciding),
         after_reset=after_reset(profile, deciding),
-        change=None,
+        change=change,
+        no_change=no_change,
     )
-    change = change_for_more(profile, now=deciding) if verdict.all_well else change_to_fit(profile)
-    return verdict._replace(change=change)
 
 
 def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:

@@ -1,12 +1,15 @@
-"""The circle test for a search: the failures of many variants of one profile."""
+"""The circle test for a search: the failures of many variants of one profile. Only a test loads the simulation."""
 
-from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.circle.setup import loop_delays_us
+from typing import Final
+
+from busplan.analysis.circle.delays import loop_delays_us
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
-_PARTS = 1000
+MOST_STEPS: Final = 10_000_000
+"""Most steps of a circle that is run where nobody asked for it: seconds, and a few hundred megabytes."""
+_PARTS: Final = 1000
 """Progress steps of one test."""
 
 
@@ -19,12 +22,28 @@ class CircleCheck:
         Called with the parts of tests done and those expected.
     expected
         Number of tests expected [1].
+    most_steps
+        Most simulated steps of each axis: a longer circle is not run, and is not said to fail. None for any number.
+    taken
+        Profile whose own circle, at its own period and with its own delays, is taken to pass.
     """
 
-    def __init__(self, *, progress: Progress | None = None, expected: int = 1) -> None:
+    def __init__(
+        self,
+        *,
+        progress: Progress | None = None,
+        expected: int = 1,
+        most_steps: int | None = None,
+        taken: Profile | None = None,
+    ) -> None:
         self._progress = progress
         self._expected = expected
+        self._most_steps = most_steps
         self._known: dict[tuple[float, tuple[float, float]], tuple[str, ...]] = {}
+        self._always: tuple[str, ...] = ()
+        """Failures that no period mends."""
+        if taken is not None:
+            self._known[_key(taken)] = ()
 
     def __call__(self, profile: Profile) -> tuple[str, ...]:
         """Run the circle test and list its failures, or why it cannot be run; empty if it passes.
@@ -34,20 +53,34 @@ class CircleCheck:
         profile
             A variant that is shown to fit its bus: its failures are those of the circle.
         """
-        # The cycle itself matters only where it lies inside a loop on the host.
-        key = (profile.cycle.period_us, loop_delays_us(profile))
+        key = _key(profile)
         if key not in self._known:
-            self._known[key] = self._run(profile)
+            self._known[key] = self._always or self._run(profile)
         return self._known[key]
 
     def _run(self, profile: Profile) -> tuple[str, ...]:
+        from busplan.analysis.circle.failures import STABILITY
+        from busplan.analysis.circle.roundness import circle_test
+        from busplan.analysis.circle.setup import path_steps
+
         try:
+            if self._most_steps is not None and path_steps(profile) > self._most_steps:
+                return ()
             result = circle_test(profile, explain=False, progress=self._report).results[0]
         except BusplanError as error:
             return error.problems
-        return tuple(failure.text for failure in result.failures)
+        texts = tuple(failure.text for failure in result.failures)
+        # A loop on the node knows neither the period nor the bus.
+        if profile.servo.loop == "node" and any(failure.name in STABILITY for failure in result.failures):
+            self._always = texts
+        return texts
 
     def _report(self, done: int, total: int) -> None:
         if self._progress is not None:
             tests = len(self._known)
             self._progress(tests * _PARTS + done * _PARTS // total, max(self._expected, tests + 1) * _PARTS)
+
+
+def _key(profile: Profile) -> tuple[float, tuple[float, float]]:
+    """What a circle rests on: the cycle itself matters only where it lies inside a loop on the host."""
+    return profile.cycle.period_us, loop_delays_us(profile)

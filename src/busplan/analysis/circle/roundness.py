@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.circle.contributions import Contribution, Setup, contributions, sources
+from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.circle.estimate import announce, estimate
 from busplan.analysis.circle.failures import (
     Failure,
@@ -16,7 +17,7 @@ from busplan.analysis.circle.failures import (
     circle_failures,
     tightest_margins,
 )
-from busplan.analysis.circle.setup import bus, loop_delays_us, loop_timing, path_setpoints, setup
+from busplan.analysis.circle.setup import bus, loop_timing, path_setpoints, setup
 from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.sections.machine import CONTOUR_MEASURES

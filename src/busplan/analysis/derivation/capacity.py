@@ -21,11 +21,12 @@ from busplan.analysis.derivation.latency import chosen, remembered
 from busplan.analysis.derivation.origin import short
 from busplan.analysis.derivation.trace import Traced, found, value_of
 from busplan.analysis.network import bus_of, model_names, network_of
-from busplan.analysis.planning.cures import changeable, listed
+from busplan.analysis.planning.advice import changeable
 from busplan.buses.bus import Bus, BusCycle, Term
 from busplan.buses.figure import CERTAINTY, MAX_NODES, SAFE_NODES, by_key
 from busplan.buses.network import Network
 from busplan.elementwise import Number
+from busplan.forms.numbers import listed
 from busplan.sections.profile import Profile
 
 _SENTENCES: Final = "sentences on what the command computes"
@@ -208,8 +209,9 @@ def verdict_figure(profile: Profile, key: str, *, model: str) -> Traced:
         words = "the cycle computed anew, after each change or without what binds"
         return found(None, words, (deciding["margin_corrected_us"], *judged))
     if key == "cheapest_change":
-        purpose = "carries more safe nodes" if verdict.all_well else "makes it shown to fit on a bus that is set safely"
-        words = f"a search: the first of {listed(changeable(profile), 'and')} that {purpose}"
+        is_for_more = verdict.change is not None and verdict.change.nodes > verdict.deciding.nodes
+        purpose = "carries another node" if is_for_more else "holds every constraint of a plan"
+        words = f"a search: the least change of {listed(changeable(profile), 'and')} that {purpose}"
         return found(None, words, (*judged, *safe))
     warned: tuple[Number, ...] = (*(traced(profile, key) for key in bus.warning_keys), *bus.warning_constants)
     return found(None, _SENTENCES, (*safe, *warned) if key == "warnings" else (*fits, *judged, *safe, *warned))

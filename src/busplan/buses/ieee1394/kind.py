@@ -1,17 +1,25 @@
 """IEEE 1394 (FireWire) up to S400, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
-from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, EventKind, Halves, Limit, PayloadRange, Perturbation, Setting, TimingModel, Value
+from busplan.buses.bus import (
+    Bus,
+    Cost,
+    EventKind,
+    Halves,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    TimingModel,
+    Value,
+)
 from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
     MAX_GAP_COUNT,
-    MAX_HOPS,
-    MAX_NODES,
     MAX_PAYLOAD_BYTES,
     PACKET_OVERHEAD_BYTES,
     PING_PER_NODE_US,
@@ -29,7 +37,6 @@ from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.sections.transactions import TRANSACTION_KINDS
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -64,7 +71,6 @@ class Ieee1394(Bus):
     planned_figures = ("gap_count", "gap_count_safe")
     facts = ("hops", "gap_count")
     safety = "gap count"
-    no_safe_setting = "No gap count is known to be safe for cables of this length."
     safety_figure = figures.GAP_COUNT_SAFE
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     limits_of = "standard"
@@ -115,11 +121,12 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     choosing_keys = ("execution.grade", "execution.residual")
     warning_keys = ("bus.cable_length_m",)
     warning_constants = (REFERENCE_CABLE_M,)
-    structural_changes = ("speed", "wiring")
     change_meanings: ClassVar[Mapping[str, str]] = {
         "bus.max_hops": "rewired as a tree",
         "bus.nodes": "the others on a second bus",
         "bus.speed": "if all nodes can",
+        "node.read_response": "if the nodes can",
+        "node.write_response": "if the nodes can",
     }
     reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
@@ -131,6 +138,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
         "bus.speed": "speed {}",
+        "node.read_response": "reads {}",
+        "node.write_response": "writes {}",
     }
 
     def profile_model(self) -> "type[Ieee1394Profile]":
@@ -205,29 +214,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return any("split" in (one.node.read_response, one.node.write_response) for one in network.groups)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """The gap count: one register in each node."""
-        key, label = "bus.gap_count", "gap count"
-        if not network.profile.bus.cable_is_standard:
-            reason = f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m"
-            return (Setting(key, label, None, (), "gap table", reason),)
-        safe = plain(safe_gap_count(hops_of(network)))
-        values = () if gap_count_of(network) == safe else (safe,)
-        return (Setting(key, label, safe, values, "gap table", follows="optimal"),)
-
-    def repairs(self, network: Network) -> dict[str, Value]:
-        """The nearest values that keep the standard's own limits and a safe gap count, for each that is broken."""
-        found: dict[str, Value] = {}
-        bus, broken = network.profile.bus, {one.key for one in self.broken(network)}
-        if "payload" in broken:
-            found |= _payload_repairs(network)
-        if "nodes" in broken and network.is_uniform:
-            found["bus.nodes"] = int(MAX_NODES)
-        hops = hops_of(network)
-        if "hops" in broken:
-            found["bus.max_hops"] = hops = int(MAX_HOPS)
-        if bus.cable_is_standard and gap_count_of(network) < safe_gap_count(hops):
-            found["bus.gap_count"] = plain(safe_gap_count(hops))
-        return found
+        """The gap count, one register in each node, and how the nodes answer. Transactions have no other schedule."""
+        return (_gap_count(network), _responses(network))
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """One hop, one busy retry, and a slower host."""
@@ -288,22 +276,30 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return bus_sections(network, published)
 
 
-def _payload_repairs(network: Network) -> dict[str, Value]:
-    """A faster bus that carries the payloads, or else the payloads that this one carries."""
-    largest = network.largest_payload_bytes
-    faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if largest <= limit]
-    if faster:
-        return {"bus.speed": faster[0]}
-    most = int(MAX_PAYLOAD_BYTES[network.profile.bus.speed])
-    repairs: dict[str, int] = {}
-    for alike, kind in product(network.alike, TRANSACTION_KINDS):
-        over = alike.bytes_of(kind) - most
-        if over > 0:
-            key, name = alike.payload_key(kind), alike.payload.key_of(kind)
-            each = alike.node.axes if name.endswith("_per_axis") else 1
-            repairs[key] = getattr(alike.payload, name) - -(-over // each)
-    # A payload needs a byte; where nothing is left of it, it must be shared out.
-    return {**repairs} if all(value > 0 for value in repairs.values()) else {}
+def _gap_count(network: Network) -> Setting:
+    """The smallest safe gap count."""
+    key = "bus.gap_count"
+    empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
+    if not network.profile.bus.cable_is_standard:
+        return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
+    safe = plain(safe_gap_count(hops_of(network)))
+    return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
+
+
+_UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}
+"""Answers that need no second arbitration."""
+
+
+def _responses(network: Network) -> Setting:
+    """Answers without a second arbitration: of reads, of writes, of both."""
+    of_reads, of_writes = (
+        {group.key(name): answer for group in network.groups if getattr(group.node, name) == "split"}
+        for name, answer in _UNSPLIT.items()
+    )
+    keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
+    both = {**of_reads, **of_writes} if of_reads and of_writes else {}
+    values = tuple(filter(None, (of_reads, of_writes, both)))
+    return Setting("responses", "responses", Cost.RESPONSES, keys, values, "" if values else "no node answers split")
 
 
 BUS: Final = Ieee1394()

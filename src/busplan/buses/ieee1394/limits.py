@@ -9,6 +9,7 @@ from busplan.buses.ieee1394.constants import (
     MAX_HOPS,
     MAX_NODES,
     MAX_PAYLOAD_BYTES,
+    REFERENCE_CABLE_M,
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
@@ -32,7 +33,7 @@ LIMITS: Final = (
         "a payload of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
         lambda network: network.largest_payload_bytes,
         _most_payload,
-        way_out="the payload fits no packet",
+        way_out="a faster bus or a smaller payload would do",
         failure="payload_bytes",
         has_rule=True,
     ),
@@ -64,6 +65,7 @@ LIMITS: Final = (
         "gap count {most:.0f} is unsafe for the hops; the smallest safe one is {value:.0f}",
         lambda network: safe_gap_count(hops_of(network)),
         gap_count_of,
+        way_out=f"for cables of more than {REFERENCE_CABLE_M:g} m none is known to be safe",
         is_safety=True,
     ),
 )

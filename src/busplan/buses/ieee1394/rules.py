@@ -75,7 +75,7 @@ def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     for key, size in _payloads(subject):
         if size > most:
             faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if size <= limit]
-            cure = f'cheapest cure: bus.speed = "{faster[0]}"' if faster else "share it out among several transactions"
+            cure = f'bus.speed = "{faster[0]}" would do' if faster else "share it out among several transactions"
             yield RuleProblem(key, f"{size} bytes are over the {most} bytes of a packet at {speed}; {cure}")
 
 
@@ -102,7 +102,8 @@ def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
         yield RuleProblem(
             "bus.gap_count",
             f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}"
-            f"{'' if _bus(subject).cable_is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
+            f"{'' if _bus(subject).cable_is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}; "
+            f"{subject.cure()}",
         )
 
 

@@ -1,0 +1,92 @@
+"""What a plan must hold: each constraint says what the slice must give, or that no slice is enough."""
+
+from collections.abc import Callable, Iterator
+from math import inf
+from typing import Final, NamedTuple
+
+from busplan.analysis.capacity.certainty import certainty
+from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.machine import rooms
+from busplan.buses.network import Network
+from busplan.sections.profile import Profile
+from busplan.servo.checks import no_multiple
+
+STEP: Final = "servo.step_us"
+CIRCLE: Final = "circle"
+_MOST_SLICE_US: Final = 1e12
+"""Longer than any slice of a profile: it keeps quotients finite."""
+
+
+class Need(NamedTuple):
+    """What one constraint asks of the slice."""
+
+    us: float
+    """What the slice must give; infinite where none is enough [us]."""
+    key: str
+    """What asks: time, the key of a limit of the bus, or a key of the profile."""
+    why: str = ""
+    """What no slice mends, in words."""
+
+    def words(self, most_us: float) -> str:
+        """Say what is asked, and what the slice can give at most [us]."""
+        needs = f"needs a slice of {self.us:.3f} us"
+        who = f"the cycle {needs} to be shown to fit" if self.key == TIME else f"{self.key} {needs}"
+        return self.why or f"{who}, and at most {most_us:.3f} us can be given"
+
+
+def shown(network: Network) -> Need:
+    """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely."""
+    bus = bus_of(network.profile)
+    for limit in bus.limits:
+        if limit.is_broken(network):
+            way_out = f" ({limit.way_out})" if limit.way_out else ""
+            return Need(inf, limit.key, f"{limit.words(network)}{way_out}")
+    return Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
+
+
+def verdict(profile: Profile) -> Iterator[Need]:
+    """The network itself."""
+    yield shown(network_of(profile))
+
+
+def utilisation(profile: Profile) -> Iterator[Need]:
+    """[limits] max_utilisation: the share of the slice that may be used."""
+    most, key = profile.limits.max_utilisation, "limits.max_utilisation"
+    if most is not None:
+        bus = bus_of(profile)
+        required_us = float(bus.cycle(network_of(profile), model=bus.deciding_model).required_us)
+        # A slice that gives just this must not be over the limit by rounding.
+        us = required_us * (1 + 2 * FIT_ROUNDING) / most if most * _MOST_SLICE_US > required_us else inf
+        yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
+
+
+def spare(profile: Profile) -> Iterator[Need]:
+    """[limits] min_spare_nodes and min_spare_axes: more nodes must be shown to fit, too."""
+    for room in rooms(profile):
+        found = shown(room.network)
+        why = found.why and f"{room.key} asks for room for {room.words}: {found.why}"
+        yield found._replace(key=room.key, why=why)
+
+
+CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, utilisation, spare)
+
+
+def needs(profile: Profile) -> list[Need]:
+    """What every constraint asks of the slice; the verdict's is the first."""
+    return [need for constraint in CONSTRAINTS for need in constraint(profile)]
+
+
+def refused_period(profile: Profile, period_us: float) -> str:
+    """Why a period does not go with the step of the circle that a profile asks for; empty where it does.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    period_us
+        Communication period [us].
+    """
+    if not profile.asks_for_circle:
+        return ""
+    return "; ".join(one.message for one in no_multiple(period_us=period_us, step_us=profile.servo.step_us))

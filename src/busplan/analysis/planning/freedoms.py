@@ -1,0 +1,213 @@
+"""What a plan may change, in the order of its cost; each is asked for its values again after each change."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import partial
+from itertools import count
+from math import inf
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from busplan.analysis.capacity.cycle import fits_in
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.grid import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, Grid
+from busplan.analysis.planning.machine import (
+    NODES_KEY,
+    Changes,
+    payload_keys,
+    rooms,
+    with_nodes,
+    with_payload_within,
+)
+from busplan.buses.bus import Cost
+from busplan.elementwise import plain
+from busplan.errors import BusplanError
+from busplan.sections.base import MAX_TIME_US
+
+if TYPE_CHECKING:
+    from busplan.analysis.planning.search import Search
+    from busplan.sections.profile import Profile
+
+RATIO: Final = "cycle.slice_ratio"
+PERIOD: Final = "cycle.period_us"
+DEFAULT_COSTS: Final = (Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
+"""What a plan may change where nobody says otherwise."""
+
+
+class Freedom(NamedTuple):
+    """One thing that a plan may change."""
+
+    name: str
+    label: str
+    cost: Cost
+    keys: tuple[str, ...]
+    values: "Callable[[Search, Changes, Sequence[Freedom]], Iterator[Changes]]"
+    """What it may be after some changes, with cheaper freedoms: the least change first, and nothing that cannot do."""
+
+    @property
+    def gives_time(self) -> bool:
+        """Whether it changes what the slice gives, and not what the cycle needs."""
+        return self.cost in (Cost.HOST_TIME, Cost.PERIOD)
+
+
+def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
+    """Everything that may be changed in a network, the cheapest first."""
+    network = network_of(profile)
+    own = (
+        Freedom(one.name, one.label, one.cost, one.keys, partial(_of_bus, one.name))
+        for one in bus_of(profile).settings(network)
+    )
+    found = (
+        *own,
+        Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
+        Freedom("payload", "payload", Cost.PAYLOAD, payload_keys(profile), _payloads),
+        Freedom("period", "period", Cost.PERIOD, (PERIOD,), _periods),
+        # Where nodes differ, nobody but the user knows which can go.
+        *((Freedom("nodes", "nodes", Cost.NODES, (NODES_KEY,), _fewer_nodes),) if network.is_uniform else ()),
+    )
+    return tuple(sorted(found, key=lambda one: one.cost))
+
+
+def freed(
+    profile: "Profile", names: Sequence[str] | None, *, asked: Collection[str] = (), option: str = "free"
+) -> tuple[Freedom, ...]:
+    """What a plan may change, the cheapest first.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    names
+        Names of freedoms; None for those of the bus's registers, the slice ratio and the period.
+    asked
+        Keys with a value that was asked for, which stays.
+    option
+        What messages call the names.
+
+    Raises
+    ------
+    BusplanError
+        The network has no freedom of that name, or its value was asked for.
+    """
+    known = freedoms(profile)
+    still = [one for one in known if not set(one.keys) <= set(asked)]
+    if names is None:
+        return tuple(one for one in still if one.cost in DEFAULT_COSTS)
+    said = ", ".join(one.name for one in known)
+    unknown = [
+        f"{option} {name}: there is nothing of that name to free on a bus of kind {profile.bus.kind}; there are {said}"
+        for name in names
+        if name not in {one.name for one in known}
+    ]
+    fixed = [
+        f"{option} {one.name}: {' and '.join(key for key in one.keys if key in asked)} was given a value, which is "
+        "kept; give one of them"
+        for one in known
+        if one.name in names and one not in still
+    ]
+    if unknown or fixed:
+        raise BusplanError(*unknown, *fixed)
+    return tuple(one for one in still if one.name in names)
+
+
+def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """Values of a setting of the bus, safe for all nodes that [limits] asks for."""
+    profile = search.profile(changes)
+    networks = (network_of(profile), *(room.network for room in rooms(profile)))
+    network = max(networks, key=lambda one: float(plain(one.nodes)))
+    for setting in bus_of(profile).settings(network):
+        if setting.name == name:
+            yield from setting.values
+
+
+def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """The smallest ratio for each combination of what is cheaper: between two of them nothing new fits."""
+    period_us, own = search.period_us(changes), search.ratio(changes)
+    found = set()
+    for one in search.combinations(changes, cheaper):
+        needed_us = search.need_us(one)
+        if fits_in(needed_us, available_us=MOST_RATIO * period_us):
+            found.add(_first(RATIOS, needed_us, lambda ratio: ratio * period_us))
+    yield from ({RATIO: ratio} for ratio in sorted(found) if own < ratio <= MOST_RATIO)
+
+
+def _payloads(search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """Smaller payloads, in the steps of the bus: the larger one of read and write is cut first."""
+    profile = search.profile(changes)
+    network = network_of(profile)
+    payloads = bus_of(profile).payloads(network)
+    before: Changes = {}
+    step, largest = payloads.step_bytes, min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
+    for most in range(largest // step * step, 0, -step):
+        one = with_payload_within(profile, most, kept=search.kept)
+        if one is None:
+            return
+        if one != before and search.allows({**changes, **one}):
+            yield one
+        before = one
+
+
+def _periods(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """Periods that the bus fits, the nearest first: the circle does not grow evenly with the period.
+
+    After some of them the strides double, and what is found then is not proven to be the nearest.
+    """
+    needed_us, ratio = search.least_need_us(changes, cheaper), search.most_ratio(changes, cheaper)
+    if needed_us == inf:
+        return
+    grid, own_us = period_grid(search.profile(changes)), search.period_us(changes)
+    least = place_of_period(grid, needed_us, ratio)
+    below = grid.place(own_us) - 1
+    above = below + 1 + (grid.number(below + 1) <= own_us)
+    above = max(above, least)
+    stride = 1
+    for tried in count():
+        if tried >= search.max_circles:
+            stride *= 2
+            search.proven = False
+        is_above = grid.number(above) <= MAX_TIME_US
+        if below >= least and (not is_above or own_us - grid.number(below) <= grid.number(above) - own_us):
+            yield {PERIOD: grid.number(below)}
+            below -= stride
+        elif is_above:
+            yield {PERIOD: grid.number(above)}
+            above += stride
+        else:
+            return
+
+
+def _fewer_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """Fewer nodes, from the most that the bus carries."""
+    own = int(network_of(search.profile(changes)).nodes)
+    for nodes in range(most_nodes(search, changes, cheaper, below=own), 0, -1):
+        yield with_nodes(nodes)
+
+
+def most_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom], *, below: int) -> int:
+    """The most nodes below a number that are within reach of some freedoms; no constraint is eased by nodes [1]."""
+    low, high = 0, below - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if search.reaches({**changes, **with_nodes(middle)}, cheaper):
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def period_grid(profile: "Profile") -> Grid:
+    """Periods that are advised: multiples of the circle's step, where the profile asks for a circle."""
+    return Grid(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
+
+
+def place_of_period(grid: Grid, needed_us: float, ratio: float) -> int:
+    """The place of the shortest period whose slice gives some time [us]."""
+    return grid.place(_first(grid, needed_us, lambda period_us: ratio * period_us, estimate=needed_us / ratio))
+
+
+def _first(
+    grid: Grid, needed_us: float, available_us: Callable[[float], float], *, estimate: float | None = None
+) -> float:
+    """The smallest number of a grid with which the slice gives some time [us]."""
+    place = grid.place(needed_us / available_us(1.0) if estimate is None else estimate)
+    while not fits_in(needed_us, available_us=available_us(grid.number(place))):
+        place += 1
+    return grid.number(place)

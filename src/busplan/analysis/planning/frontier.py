@@ -1,0 +1,86 @@
+"""What a network could reach with all that is cheap free: the shortest period, the largest payload, the most nodes."""
+
+from collections.abc import Iterator, Sequence
+from math import inf
+
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.constraints import CIRCLE
+from busplan.analysis.planning.freedoms import PERIOD, Freedom, most_nodes, period_grid, place_of_period
+from busplan.analysis.planning.machine import with_nodes, with_payload
+from busplan.analysis.planning.option import Impossible, Option, option
+from busplan.analysis.planning.search import Search
+from busplan.buses.bus import Cost
+from busplan.sections.base import MAX_COUNT, MAX_TIME_US
+from busplan.sections.profile import Profile
+
+
+def frontier(goal: Profile, search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impossible]:
+    """Find the shortest period, the largest payload and the most nodes, each with the others as they are.
+
+    Parameters
+    ----------
+    goal
+        The network.
+    search
+        A search for it.
+    levels
+        What may be changed, of which what is cheaper than a payload is.
+    """
+    cheap = [one for one in levels if one.cost < Cost.PAYLOAD]
+    yield _shortest_period(goal, search, cheap)
+    yield _largest_payload(goal, search, cheap)
+    if not goal.group:
+        yield _most_nodes(search, cheap)
+
+
+def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
+    title, grid = "smallest period", period_grid(goal)
+    needed_us = search.least_need_us({}, cheap)
+    if needed_us == inf:
+        return Impossible(title, search.binding(cheap).why)
+    first = place = place_of_period(grid, needed_us, search.most_ratio({}, cheap))
+    tried = 0
+    while grid.number(place) <= MAX_TIME_US:
+        found = search.least(cheap, {PERIOD: grid.number(place)})
+        proven = tried < search.max_circles
+        if found is not None:
+            held_by = CIRCLE if place > first else max(search.needs(found), key=lambda need: need.us).key
+            return option(search, title, found, held_by=held_by)._replace(proven=proven)
+        tried += 1
+        place += 1 if tried < search.max_circles else 2 ** (tried - search.max_circles + 1)
+    if not tried:
+        return Impossible(title, f"it would be over {MAX_TIME_US / 1e6:g} s")
+    return Impossible(title, search.binding(cheap, {PERIOD: grid.number(first)}).why, proven=False)
+
+
+def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
+    """For reads and writes alike. Every size is tried: an execution table need not ascend."""
+    title, payloads = "largest payload", bus_of(goal).payloads(network_of(goal))
+    step = payloads.step_bytes
+    largest, tried = payloads.most_bytes // step * step, None
+    for size in range(largest, 0, -step):
+        one = with_payload(goal, size)
+        if one is None:
+            why = "each group has its own" if goal.group else "the payload follows the axes of a node"
+            return Impossible(title, why)
+        if not search.allows(one):
+            continue
+        found = search.least(cheap, one) if search.reaches(one, cheap) else None
+        if found is not None:
+            bound = payloads.bound if size == largest else "execution"
+            held_by = bound if tried is None else search.binding(cheap, tried).key
+            return option(search, title, found, held_by=held_by)
+        tried = one
+    if tried is None:
+        return Impossible(title, "the execution table holds no whole step of the payload")
+    return Impossible(title, "not even the smallest fits")
+
+
+def _most_nodes(search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
+    title = "most nodes"
+    nodes = most_nodes(search, {}, cheap, below=MAX_COUNT + 1)
+    found = search.least(cheap, with_nodes(nodes)) if nodes else None
+    if found is None:
+        return Impossible(title, search.binding(cheap, with_nodes(max(nodes, 1))).why)
+    held_by = search.binding(cheap, with_nodes(nodes + 1)).key if nodes < MAX_COUNT else None
+    return option(search, title, found, held_by=held_by)

@@ -1,0 +1,217 @@
+"""The search: the least change of the dearest freedom with all cheaper ones free, then of the next dearest."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from math import inf
+from typing import Final
+
+from busplan.analysis.capacity.cycle import fits_in
+from busplan.analysis.planning.constraints import CIRCLE, STEP, Need, needs, refused_period
+from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom
+from busplan.analysis.planning.grid import MOST_RATIO
+from busplan.analysis.planning.machine import Changes
+from busplan.buses.bus import Cost, Value
+from busplan.errors import BusplanError
+from busplan.profile.toml import override
+from busplan.sections.base import MAX_TIME_US
+from busplan.sections.profile import Profile
+
+FindCircleFailures = Callable[[Profile], tuple[str, ...]]
+"""Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
+MAX_CIRCLES: Final = 50
+"""Periods tested in a row for the nearest one that passes the circle. Chosen: takes some seconds."""
+
+
+class Search:
+    """Finds what to change in one profile; everything is computed once.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    circle
+        Function that runs the circle test; None for none.
+    kept
+        Keys that must stay.
+    max_circles
+        Periods to test in a row with the circle before the strides double [1].
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        *,
+        circle: FindCircleFailures | None = None,
+        kept: Collection[str] = (),
+        max_circles: int = MAX_CIRCLES,
+    ) -> None:
+        self._own = profile
+        self._circle = circle if profile.asks_for_circle else None
+        self.runs_circle = self._circle is not None
+        """Whether the circle is tested where the bus fits."""
+        self.kept = frozenset(kept)
+        self.max_circles = max_circles
+        self.proven = True
+        """Whether no smaller change than the last one exists; False if the search for a period was cut short."""
+        self._profiles: dict[frozenset[tuple[str, Value]], Profile] = {}
+        self._circles: dict[float, tuple[str, ...]] = {}
+        self._needs: dict[frozenset[tuple[str, Value]], list[Need]] = {}
+
+    def least(self, levels: Sequence[Freedom], changes: Changes | None = None) -> Changes | None:
+        """Find the least change after which every constraint holds.
+
+        Parameters
+        ----------
+        levels
+            What may be changed, the cheapest first.
+        changes
+            What is changed already.
+
+        Returns
+        -------
+        dict or None
+            All changes, the dearest first; empty if none is needed, None if no change of these is enough.
+        """
+        self.proven = True
+        return self._least(levels, changes or {})
+
+    def _least(self, levels: Sequence[Freedom], changes: Changes) -> Changes | None:
+        if not levels:
+            return changes if self.passes(changes) else None
+        *cheaper, dearest = levels
+        kept = self._least(cheaper, changes)
+        if kept is not None:
+            return kept
+        for one in dearest.values(self, changes, cheaper):
+            found = None if self.kept & set(one) else self._least(cheaper, {**changes, **one})
+            if found is not None:
+                return found
+        return None
+
+    def passes(self, changes: Changes) -> bool:
+        """Whether every constraint holds after some changes; the circle is asked last."""
+        return (
+            self._fits(changes)
+            and not refused_period(self._own, self.period_us(changes))
+            and not self.circle_failures(changes)
+        )
+
+    def circle_failures(self, changes: Changes) -> tuple[str, ...]:
+        """What the circle does not hold after some changes that fit the bus; nothing where it is not run."""
+        if self._circle is None:
+            return ()
+        servo, period_us = self._own.servo, self.period_us(changes)
+        if servo.loop == "host" and servo.update == "on_arrival":
+            return self._circle(self.profile(changes))
+        # The loop knows nothing of the bus but its period.
+        if period_us not in self._circles:
+            self._circles[period_us] = self._circle(self.profile(changes))
+        return self._circles[period_us]
+
+    # --- what a network needs, and what its slice gives it --------------------------------------------------
+
+    def profile(self, changes: Changes) -> Profile:
+        """The profile after some changes.
+
+        Raises
+        ------
+        BusplanError
+            The profile's schema refuses them.
+        """
+        key = frozenset(changes.items())
+        if key not in self._profiles:
+            self._profiles[key] = override(self._own, dict(changes))
+        return self._profiles[key]
+
+    def allows(self, changes: Changes) -> bool:
+        """Whether the profile's schema takes some changes."""
+        try:
+            self.profile(changes)
+        except BusplanError:
+            return False
+        return True
+
+    def needs(self, changes: Changes) -> list[Need]:
+        """What each constraint asks of the slice; neither period nor slice ratio plays a part."""
+        others = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO)}
+        key = frozenset(others.items())
+        if key not in self._needs:
+            self._needs[key] = needs(self.profile(others))
+        return self._needs[key]
+
+    def need_us(self, changes: Changes) -> float:
+        """What all constraints together ask of the slice [us]."""
+        return max(need.us for need in self.needs(changes))
+
+    def period_us(self, changes: Changes) -> float:
+        """Communication period after some changes [us]."""
+        return float(changes.get(PERIOD, self._own.cycle.period_us))
+
+    def ratio(self, changes: Changes) -> float:
+        """Slice ratio after some changes [1]."""
+        return float(changes.get(RATIO, self._own.cycle.slice_ratio))
+
+    # --- what is within reach -------------------------------------------------------------------------------
+
+    def combinations(self, changes: Changes, levels: Sequence[Freedom]) -> Iterator[Changes]:
+        """Every combination of what changes the need of a cycle."""
+        if not levels:
+            yield changes
+            return
+        *cheaper, last = levels
+        yield from self.combinations(changes, cheaper)
+        if not last.gives_time:
+            for one in last.values(self, changes, cheaper):
+                if not self.kept & set(one):
+                    yield from self.combinations({**changes, **one}, cheaper)
+
+    def furthest(self, changes: Changes, levels: Sequence[Freedom]) -> Changes:
+        """The combination that needs least, with the largest slice ratio that is free."""
+        least = min(self.combinations(changes, levels), key=self.need_us)
+        ratio = self.most_ratio(changes, levels)
+        return {**({} if ratio == self.ratio(changes) else {RATIO: ratio}), **least}
+
+    def least_need_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
+        """The least that the slice must give with some freedoms [us]."""
+        return min(map(self.need_us, self.combinations(changes, levels)))
+
+    def most_ratio(self, changes: Changes, levels: Sequence[Freedom]) -> float:
+        """The largest slice ratio with some freedoms [1]."""
+        own = self.ratio(changes)
+        return max(own, MOST_RATIO) if any(one.cost == Cost.HOST_TIME for one in levels) else own
+
+    def most_slice_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
+        """The longest slice with some freedoms [us]."""
+        is_free = any(one.cost == Cost.PERIOD for one in levels)
+        return self.most_ratio(changes, levels) * (MAX_TIME_US if is_free else self.period_us(changes))
+
+    def is_bounded(self, levels: Sequence[Freedom]) -> bool:
+        """Whether some freedoms have an end: no period is free, and no limit of the bus is broken."""
+        return all(one.cost != Cost.PERIOD for one in levels) and self.least_need_us({}, levels) < inf
+
+    def reaches(self, changes: Changes, levels: Sequence[Freedom]) -> bool:
+        """Whether the bus fits with some freedoms, whatever its circle."""
+        return bool(fits_in(self.least_need_us(changes, levels), available_us=self.most_slice_us(changes, levels)))
+
+    def binding(self, levels: Sequence[Freedom], changes: Changes | None = None) -> Need:
+        """The constraint that no change of some freedoms holds.
+
+        Parameters
+        ----------
+        levels
+            What may be changed.
+        changes
+            What is changed already.
+        """
+        furthest = self.furthest(changes or {}, levels)
+        most_us = self.most_slice_us(furthest, levels)
+        worst = max(self.needs(furthest), key=lambda need: need.us)
+        if not fits_in(worst.us, available_us=most_us):
+            return worst._replace(why=worst.words(most_us))
+        refused = refused_period(self._own, self.period_us(furthest))
+        if refused and all(one.cost != Cost.PERIOD for one in levels):
+            return Need(inf, STEP, refused)
+        failures = self.circle_failures(furthest) if self._fits(furthest) else ()
+        return Need(inf, CIRCLE, failures[0] if failures else "no period that was tried passes the circle")
+
+    def _fits(self, changes: Changes) -> bool:
+        return bool(fits_in(self.need_us(changes), available_us=self.ratio(changes) * self.period_us(changes)))
