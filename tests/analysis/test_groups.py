@@ -17,6 +17,8 @@ from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.trace import value_of
 from busplan.analysis.network import bus_of, model_names, network_of
+from busplan.analysis.planning.machine import nodes_for_axes
+from busplan.analysis.planning.plan import plan
 from busplan.analysis.sweep.axis_values import listed
 from busplan.analysis.sweep.blocks import figure_names, sweep
 from busplan.analysis.sweep.grid import checked_grid
@@ -27,6 +29,7 @@ from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
 from busplan.profile.write import profile_text
+from busplan.rules.gate import check_document
 from busplan.sections.profile import Profile
 
 SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -334,3 +337,41 @@ def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., Profile]) ->
     data = GANTRY.model_dump(exclude_unset=True)
     with pytest.raises(BusplanError, match=r"bus\.nodes: each"):
         override(make(), {"group": data["group"]})
+
+
+# --- what to set ------------------------------------------------------------------------------------------
+
+
+@settings(SOME, max_examples=25)
+@given(
+    profile=grouped(),
+    limits=st.fixed_dictionaries(
+        {},
+        optional={
+            "limits.max_utilisation": st.sampled_from([0.3, 0.8]),
+            "limits.min_spare_nodes": st.integers(0, 3),
+            "limits.min_spare_axes": st.integers(0, 9),
+        },
+    ),
+)
+def test_what_a_plan_writes_for_groups_passes_the_gate(profile: Profile, limits: dict[str, object]) -> None:
+    found = plan(override(profile, limits))
+    if found.recommended is None:
+        assert found.binding is not None
+        return
+    text = profile_text(found.recommended.profile).encode()
+    checked = check_document(decode(text, name="new.toml"), with_circle=False, record=False).findings
+    assert [one.message for one in checked if one.severity == "error"] == []
+
+
+def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
+    with pytest.raises(BusplanError, match=r"axes 30: the nodes of gantry-24 differ; .*group\.drives\.nodes"):
+        nodes_for_axes(GANTRY, 30)
+    with pytest.raises(BusplanError, match="nodes: there is nothing of that name to free"):
+        plan(GANTRY, free=["nodes"])
+    assert plan(GANTRY).recommended is not None
+    found = plan(GANTRY, wanted={"group.drives.nodes": 9}, free=["payload", "period"])
+    assert found.recommended is not None
+    assert set(found.recommended.changes) == {"cycle.period_us"} | {
+        f"group.{key}_bytes_per_axis" for key in ("drives.read", "drives.write", "tool.read", "tool.write")
+    }
