@@ -390,7 +390,7 @@ def test_signed_bars_share_one_zero() -> None:
 
 # --- colours ----------------------------------------------------------------------------------------------
 
-STYLE = (files("busplan.forms") / "templates" / "style.css").read_text(encoding="utf-8")
+STYLE = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
 SCHEMES = [
     dict(re.findall(r"--([\w-]+): (#\w{6})", block)) for block in re.findall(r":root \{(.*?)\}", STYLE, re.DOTALL)
 ]
