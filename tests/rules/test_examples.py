@@ -23,7 +23,7 @@ from busplan.servo.checks import ParameterError, Refused
 EXAMPLES = Path(__file__).parent / "examples"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
 VALID = sorted(EXAMPLES.glob("*/valid*.toml"))
-CURED = ("BP101", "BP103", "BP104", "BP105", "BP109", "BP110", "BP114")
+CURED = ("BP101", "BP103", "BP104", "BP105", "BP109", "BP114")
 """Rules that say the cheapest cure."""
 EXPECT = re.compile(rb"# expect: ((?:\d+:\d+ ?)+)")
 
@@ -133,7 +133,7 @@ def test_codes_are_stable() -> None:
         ("BP108", ["516 bytes", "512 bytes", 'bus.speed = "S200" would do']),
         ("BP109", ["gap count 4", "3 hops", "smallest safe one is 8", "cheapest cure: bus.gap_count = 8"]),
         # 253.187 us less 177.992 us; 13 nodes are safe at gap count 63, and 14 at that of their hops.
-        ("BP110", ["gap count 63", "7 that 2 hops need", "75.2 us", "wins 1 node", "cure: bus.gap_count = 7"]),
+        ("BP110", ["gap count 63", "7 that 2 hops need", "75.2 us", "wins 1 node"]),
         ("BP111", ["13 bytes", "16 bytes travel", "say 16"]),
         ("BP112", ["assumption", "measure it"]),
         # 253.187 us and a bias of 8 * 0.827 us, U 4.306 us.

@@ -124,7 +124,6 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
             "bus.gap_count",
             f"gap count {one.gap_count} is above the {safe} that {one.hops} hops need; "
             f"{safe} saves {saved} us a cycle{won}",
-            cure=(f"bus.gap_count = {safe}",),
         )
 
 
