@@ -105,7 +105,7 @@ def test_a_notebook_shows_the_report_and_no_name_is_markup() -> None:
     shown = found._repr_html_()
     assert shown.startswith("<pre>&lt;b&gt;&amp;x at 4 ms: fits")
     assert shown.count("<") == 2
-    assert "most axes" in shown
+    assert "safe axes" in shown
 
 
 def test_a_notebook_draws_a_map() -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.options import FormatOption, OutputOption
+from busplan.cli.options import AllOption, FormatOption, OutputOption
 from busplan.errors import BusplanError
 
 
@@ -21,6 +21,7 @@ def rule_command(
         str | None,
         typer.Argument(help="Code of a rule, as BP101.  [default: all of them]", autocompletion=complete_code),
     ] = None,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -30,7 +31,7 @@ def rule_command(
 
     Example: busplan rule BP110
     """
-    with answer(format_, output) as give:
+    with answer(format_, output, is_whole=all_) as give:
         from busplan.answers.rules import rule_report, rules_report
         from busplan.rules.registry import all_rules
 

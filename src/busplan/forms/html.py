@@ -12,6 +12,7 @@ from busplan.buses.figure import unit_of
 from busplan.forms import blocks as made_of
 from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
 from busplan.forms.columns import cell_text, sentence_text
+from busplan.forms.details import shown_blocks
 from busplan.forms.inks import DARK, fills
 from busplan.forms.numbers import figure_text, unit_text
 from busplan.forms.signed_bar import signed_bar
@@ -60,7 +61,7 @@ def page(report: Report) -> str:
         "svg": Markup,
         "holds_sections": lambda section: any(isinstance(one, Chapter) for one in section.blocks),
     }
-    found = report.blocks()
+    found = shown_blocks(report)
     light, dark = fills(".chart")
     styles = dict.fromkeys(chart.drawing.stylesheet for chart in _charts(found))
     colours = Markup(f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n")  # noqa: S704 - our own constants
