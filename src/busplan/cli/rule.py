@@ -19,7 +19,9 @@ def complete_code(incomplete: str) -> list[str]:
 def rule_command(
     code: Annotated[
         str | None,
-        typer.Argument(help="Code of a rule, as BP101.  [default: all of them]", autocompletion=complete_code),
+        typer.Argument(
+            help="Code or name of a rule, as BP101 or syntax.  [default: all of them]", autocompletion=complete_code
+        ),
     ] = None,
     all_: AllOption = False,
     format_: FormatOption = None,
@@ -38,7 +40,12 @@ def rule_command(
         rules = all_rules()
         if code is None:
             give(rules_report(list(rules.values())))
-        elif code.upper() in rules:
-            give(rule_report(rules[code.upper()]))
-        else:
-            raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")
+            return
+        named = {**rules, **{rule.name.upper(): rule for rule in rules.values()}}
+        if code.upper() not in named:
+            from busplan.nearest import did_you_mean
+
+            known = (*rules, *(rule.name for rule in rules.values()))
+            hint = " ".join(filter(None, (did_you_mean(code, known), "`busplan rule` lists them")))
+            raise BusplanError(f"{code}: no such rule; {hint}")
+        give(rule_report(named[code.upper()]))
