@@ -94,7 +94,12 @@ def _width(columns: Sequence[int], extents: dict[int, Extent]) -> int:
 
 
 def _panels(table: Table, side: Sequence[int], extents: dict[int, Extent], width: int) -> list[tuple[int, ...]]:
-    """Divide columns into panels that fit; columns of one group stay together where they can."""
+    """Divide columns into panels that fit; columns of one group stay together where they can.
+
+    Words are rather broken than a table is divided.
+    """
+    if sum(extents[number].broken for number in side) + GAP * (len(side) - 1) <= width:
+        return [tuple(side)]
     heads = [number for number in side if number < table.heads]
     while len(heads) > 1 and any(_width([*heads, one], extents) > width for one in side[len(heads) :]):
         heads.pop()
@@ -135,7 +140,8 @@ def shared_widths(columns: Sequence[int], extents: dict[int, Extent], *, width: 
         more = min(extents[number].natural - extents[number].least, max(spare, 0) // (len(wanting) - place))
         found[number] += more
         spare -= more
-    for number in columns:
+    # What names a row is broken last.
+    for number in reversed(columns):
         less = min(found[number] - extents[number].broken, max(-spare, 0))
         found[number] -= less
         spare += less
