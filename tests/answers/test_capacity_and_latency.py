@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from collections.abc import Callable
 
 import pytest
@@ -140,12 +141,17 @@ def test_latency_warns_of_hops_and_gap_count(profile: Profile) -> None:
     assert "gap count 5 is unsafe for 17 hops (17 nodes); the smallest safe one is 46" in text
 
 
-def test_one_table_a_payload_and_one_block_a_period(profile: Profile) -> None:
+def test_one_table_a_payload_and_one_for_all_periods(profile: Profile) -> None:
     heads = render(latency_report(latency(profile, payloads_bytes=[4, 16, 32]), profile), "table")
     assert heads.count("\nfigure ") == 3
     result = capacity(profile, periods_us=[1000.0, 500.0])
     text = render(capacity_report(result, verdicts(result)), "table")
-    assert text.count("\navailable alpha T_s") == 2
+    assert text.count("\navailable alpha T_s") == 1
+    assert re.search(r" 1 ms +1 ms +500 us +500 us\n", text)
+    assert re.search(r" paper +standard +paper +standard\n", text)
+    # What holds for all periods is said once, at the end.
+    assert text.count("Not in it: ") == text.count("The execution time behind these figures is") == 1
+    assert text.index("at 500 us: ") < text.index("Not in it: ")
 
 
 @pytest.mark.parametrize("period_us", [1000.0, 600.0, 100.0])

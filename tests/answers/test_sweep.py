@@ -228,7 +228,8 @@ def test_the_rows_of_the_answer_are_a_table_in_every_form_for_people() -> None:
     lines = terminal.text(report).splitlines()
     assert lines[0].startswith("<b>p|q: 18 points; ")
     assert "2 of 36 rows, smallest margin_us first." in lines
-    assert lines[-1].split()[-3:] == ["time", "no", "-"]
+    assert lines[-2].split()[-4:] == ["time", "no", "!", "-"]
+    assert lines[-1] == "! fails."
     text = markdown.text(report)
     assert text.startswith("### Sweep of `<b>p|q`\n")
     assert [line.count(" | ") for line in text.splitlines() if line.startswith("| ")] == [6] * 4

@@ -37,7 +37,7 @@ def plan(**changes: object) -> Schedule:
     return schedule(override(load("paper-4ms").profile, {key.replace("__", "."): v for key, v in changes.items()}))
 
 
-def drawn(one: Schedule, width: int = 80) -> list[str]:
+def drawn(one: Schedule, width: int | None = None) -> list[str]:
     return terminal.text(timeline_report(one), width=width).splitlines()
 
 

@@ -44,12 +44,12 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "circle-test paper-1ms --feed 10000 --radius 20": lambda: busplan.circle_test(
         busplan.load_profile("paper-1ms", changes={"circle.feed_mm_per_min": 10000.0, "circle.radius_mm": 20.0})
     ),
-    "plan paper-1ms --axes 15 --no-circle": lambda: busplan.plan("paper-1ms", axes=15, with_circle=False),
+    "plan paper-1ms --axes 15 --no-circle": lambda: busplan.plan("paper-1ms", axes=15, circle=False),
     "plan paper-1ms --nodes 6 --period 500us --gap-count 63 --max-circles 2": lambda: busplan.plan(
         "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
     ),
     "plan paper-1ms --axes 28 --reserve 12.5% --free responses,gap_count --no-circle": lambda: busplan.plan(
-        "paper-1ms", axes=28, reserve=0.125, free=["gap_count", "responses"], with_circle=False
+        "paper-1ms", axes=28, reserve=0.125, free=["gap_count", "responses"], circle=False
     ),
     "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
@@ -58,7 +58,7 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
         "paper-1ms", x={"axes": range(4, 17, 4)}, y={"bus.gap_count": [7, 63, "optimal"]}
     ),
     "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
-    "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], with_circle=False),
+    "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], circle=False),
     "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing paper": lambda: busplan.sweep(
         "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_model="paper"
     ),

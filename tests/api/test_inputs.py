@@ -29,7 +29,7 @@ def test_a_shipped_name_is_the_shipped_profile_and_a_path_the_file(own: Path) ->
     for path in (own, own.absolute(), "./paper-4ms", str(own.absolute())):
         assert busplan.load_profile(path).bus.nodes == 5
         assert busplan.capacity(path).results[0].nodes == 5
-    (file,) = busplan.check(own, with_circle=False).files
+    (file,) = busplan.check(own, circle=False).files
     assert (file.path, file.status) == ("paper-4ms", "ok")
 
 
@@ -208,7 +208,7 @@ def test_a_broken_profile_is_an_error_with_its_places_and_a_finding_of_check(own
     own.write_text(TEXT.replace("nodes = 2", "nodes = 0"), encoding="utf-8")
     with pytest.raises(busplan.BusplanError, match=r"paper-4ms:[0-9]+:1: bus\.nodes = 0: must be 1 or more"):
         busplan.load_profile(own)
-    answer = busplan.check([own, "paper-1ms"], with_circle=False)
+    answer = busplan.check([own, "paper-1ms"], circle=False)
     (found,) = answer.findings
     assert (found.path, found.finding.code, found.finding.key) == ("paper-4ms", "BP005", "bus.nodes")
     assert (answer.passed, answer.summary.errors, repr(answer)) == (
@@ -220,6 +220,6 @@ def test_a_broken_profile_is_an_error_with_its_places_and_a_finding_of_check(own
 
 def test_a_warning_passes_and_a_file_that_is_not_there_does_not(own: Path) -> None:
     own.write_text(TEXT.replace("# busplan: ignore[BP110]", "#"), encoding="utf-8")
-    answer = busplan.check(own, with_circle=False)
+    answer = busplan.check(own, circle=False)
     assert (answer.passed, [one.finding.code for one in answer.findings]) == (True, ["BP110"])
     assert busplan.check("nowhere.toml").passed is False

@@ -66,13 +66,13 @@ OF_THE_COMMAND = {"format", "output", "set", "jobs", "help"}
 """Options that say where to write, how many processes, or change the profile, which load_profile(changes=) does."""
 ALONE = {
     "calibrate": {"apply", "nodes", "gap-count"},
-    "check": {"set", "annotate", "baseline", "update-baseline", "require-baseline", "prefix", "no-shipped", "circle"},
+    "check": {"set", "annotate", "baseline", "update-baseline", "require-baseline", "prefix", "no-shipped"},
     "circle-test": {"plot", "trace", "feed", "radius", "every", "nodes", "gap-count", "direction", "seed"},
     "diff": {"fail-on-regression", "tolerance"},  # both are answer.regressions(tolerance_percent=)
-    "plan": {"apply", "circle"},
+    "plan": {"apply", "force"},
     "sweep": {"columns", "sort", "top", "plot", "figure"},
 }
-"""Options without a parameter. The parameters of check and plan are with_circle."""
+"""Options without a parameter."""
 SHORT_FORMS = {"period", "nodes", "gap-count"}
 SUFFIXES = ("", "_us", "_bytes", "_model", "_percent", "_mm", "_mm_per_min")
 
@@ -85,7 +85,19 @@ def options(command: str) -> set[str]:
 
 @pytest.mark.parametrize(
     "name",
-    ["calibrate", "capacity", "circle_test", "diff", "explain", "latency", "map_", "report", "sweep", "timeline"],
+    [
+        "calibrate",
+        "capacity",
+        "circle_test",
+        "diff",
+        "explain",
+        "latency",
+        "map_",
+        "plan",
+        "report",
+        "sweep",
+        "timeline",
+    ],
 )
 def test_a_parameter_is_called_as_its_option(name: str) -> None:
     command = name.rstrip("_").replace("_", "-")

@@ -187,8 +187,8 @@ def cell(value: Any) -> str:
 
 
 def test_usage(refused: Refused) -> None:
-    assert "Missing argument 'B'" in refused("diff", "paper-1ms")
-    assert "Invalid value for '--format'" in refused("diff", "paper-1ms", "paper-4ms", "--format", "text")
+    assert refused("diff", "paper-1ms").startswith("B: missing; ")
+    assert "--format: 'text' is not one of 'table'" in refused("diff", "paper-1ms", "paper-4ms", "--format", "text")
 
 
 def test_without_a_circle_numpy_is_not_loaded(run: Run) -> None:

@@ -121,6 +121,15 @@ def test_the_list_of_commands_has_their_sentences_whole() -> None:
         assert f"{name} {paragraphs(name)[0]}" in said
 
 
+def test_commands_stand_in_groups_and_init_comes_first() -> None:
+    lines = shown("", columns=80)
+    titles = [lines.index(f"{title}:") for title in ("Design", "Analyse", "Gate", "Learn", "Options")]
+    assert titles == sorted(titles)
+    assert lines[titles[0] + 1].startswith("  init ")
+    assert not any(line.startswith("Commands") for line in lines)
+    assert sorted(COMMANDS) == sorted(set(COMMANDS))
+
+
 @EVERY_COMMAND
 def test_it_speaks_of_no_types_of_python(name: str) -> None:
     text = "\n".join(shown(name, columns=100))

@@ -404,7 +404,7 @@ def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
         profile = busplan.load_profile(ring_file)
         found, _ = largest_nodes(profile, model="plain")
         assert found == min(most, 37)
-        assert busplan.plan(profile, with_circle=False) is not None
+        assert busplan.plan(profile, circle=False) is not None
 
 
 def test_a_sweep_has_room_for_more_limits_than_bits_of_a_byte(run: Run, ring_file: Path) -> None:
@@ -446,7 +446,7 @@ def test_a_timing_model_of_one_kind_alone_is_refused_between_two(run: Run, ring:
 
 
 def test_a_plan_turns_its_setting_and_advice_names_it(run: Run, ring: Path) -> None:
-    answer = busplan.plan(ring, nodes=10, with_circle=False)
+    answer = busplan.plan(ring, nodes=10, circle=False)
     assert answer.free == ("rate", "slice_ratio", "period")
     assert answer.recommended_changes == {"bus.nodes": 10, "bus.rate_mbit_s": 2.0}
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 800"), encoding="utf-8")

@@ -148,11 +148,12 @@ def test_a_state_is_marked_where_it_stands() -> None:
         (TableColumn("model", kind="words"), TableColumn("fits")),
         (TableRow(("paper", FAILED)), TableRow(("standard", "yes"))),
     )
-    *_, failed, passed = block_lines([table])
-    assert failed.text == "paper       no"
-    assert [failed.text[mark.start : mark.end] for mark in failed.marks] == ["no"]
-    assert failed.marks[0] == Mark(12, 14, "fails")
-    assert passed.marks == ()
+    *_, failed, passed, (told, *_rest) = block_lines([table])
+    assert failed.text == "paper       no !"
+    assert [failed.text[mark.start : mark.end] for mark in failed.marks] == ["no !"]
+    assert failed.marks[0] == Mark(12, 16, "fails")
+    assert (passed.text, passed.marks) == ("standard   yes", ())
+    assert told == "! fails."
 
 
 def test_a_sentence_in_a_cell_keeps_its_units_and_its_state() -> None:

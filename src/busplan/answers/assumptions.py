@@ -26,17 +26,20 @@ from busplan.forms.blocks import (
 from busplan.sections.profile import Profile
 from busplan.sourced import EQUATIONS
 
-_MEANING: Final = TableColumn("meaning", kind="words")
+_MEANING: Final = TableColumn("meaning", kind="words", rank=4, leaves="below", wraps=True)
 INPUT_COLUMNS: Final = (
-    TableColumn("name", kind="words"),
+    TableColumn("name", kind="words", wraps=True),
     TableColumn("value"),
-    TableColumn("unit", kind="words"),
-    TableColumn("grade", kind="words"),
-    TableColumn("source", kind="words"),
+    TableColumn("unit", kind="words", rank=1, leaves="below", wraps=True),
+    TableColumn("grade", kind="words", rank=2, leaves="below"),
+    TableColumn("source", kind="words", rank=3, leaves="below", wraps=True),
 )
 """Columns of an input: what it is, and how well it is known."""
-_FIGURES: Final = tuple(
-    TableColumn(heading, kind="words") for heading in ("command", "figure", "eq", "unit", "what it is")
+_FIGURES: Final = (
+    *(TableColumn(heading, kind="words") for heading in ("command", "figure")),
+    TableColumn("eq", kind="words", rank=2),
+    TableColumn("unit", kind="words", rank=1),
+    TableColumn("what it is", kind="words", wraps=True),
 )
 
 

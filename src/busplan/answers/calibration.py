@@ -40,10 +40,10 @@ _COLUMNS: Final = {
     "payload_bytes": TableColumn("payload", "bytes"),
     "measurements": TableColumn("n"),
     "left_out": TableColumn("left out"),
-    "latency_us": TableColumn("T_lant", "us"),
-    "packets_us": TableColumn("packets", "us"),
+    "latency_us": TableColumn("T_lant", "us", rank=3),
+    "packets_us": TableColumn("packets", "us", rank=2),
     "execution_us": TableColumn("T_exec", "us"),
-    "deviation_us": TableColumn("std dev", "us"),
+    "deviation_us": TableColumn("std dev", "us", rank=1),
     "fitted_us": TableColumn("fitted", "us"),
     "residual_us": TableColumn("residual", "us"),
 }

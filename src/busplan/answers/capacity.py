@@ -5,6 +5,8 @@ from functools import partial
 from itertools import accumulate
 from typing import Final
 
+from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import COUNTS, Capacity, CapacityFigures
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, leading_model, network_of
@@ -22,15 +24,17 @@ from busplan.forms.blocks import (
     Record,
     Report,
     Sentence,
+    State,
     Table,
     TableColumn,
     TableRow,
     attribute_value,
     count_value,
     sentence,
+    state_of,
 )
 from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns
+from busplan.forms.numbers import nouns, period
 from busplan.sections.profile import Profile
 
 
@@ -45,13 +49,24 @@ def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
 
 
 def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
-    """Verdict and figures of each period, the timing models side by side."""
+    """Verdict of each period, and the figures of all, the timing models side by side."""
+    said = []
     for number, (figures, verdict, start) in enumerate(zip(result.periods, verdicts, _starts(result), strict=False)):
         places = places_of(figures, start=start, change=number)
-        yield from verdict_sentences(verdict, result.profile, places=places)
-        yield capacity_table(result.profile, figures, start=start)
-        if result.profile.group:
-            yield groups_table(figures, start=start)
+        said.append(list(verdict_sentences(verdict, result.profile, places=places)))
+    yield from said[0] if len(said) == 1 else _of_all(said)
+    yield capacity_table(result)
+    if result.profile.group:
+        yield groups_table(result)
+
+
+def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
+    """The sentences of each period, and at the end once those that are the same for all."""
+    first, *others = ([sentence_text(one) for one in sentences] for sentences in said)
+    common = {text for text in first if all(text in other for other in others)}
+    for sentences in said:
+        yield from (one for one in sentences if sentence_text(one) not in common)
+    yield from (one for one in said[0] if sentence_text(one) in common)
 
 
 def _starts(result: Capacity) -> Iterator[int]:
@@ -59,64 +74,84 @@ def _starts(result: Capacity) -> Iterator[int]:
     return accumulate(map(len, result.periods), initial=0)
 
 
-def capacity_table(profile: Profile, figures: Sequence[CapacityFigures], *, start: int = 0) -> Table:
-    """Figures of one period, the timing models side by side.
+def capacity_table(result: Capacity) -> Table:
+    """Figures of all periods, the timing models side by side; what does not decide is detail.
 
     Parameters
     ----------
-    profile
-        The network.
-    figures
-        One set for each timing model.
-    start
-        Index of the first one in the document's results.
+    result
+        The capacity.
     """
-    first, bus = figures[0], bus_of(profile)
+    profile, first, bus = result.profile, result.results[0], bus_of(result.profile)
     setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network_of(profile))),) if words)
     caption = sentence(
         "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + setup,
-        count_value(first.nodes, "nodes", at=f"/results/{start}/nodes"),
-        count_value(first.axes, "axes", at=f"/results/{start}/axes"),
+        count_value(first.nodes, "nodes", at="/results/0/nodes"),
+        count_value(first.axes, "axes", at="/results/0/axes"),
     )
-    leading = leading_model(profile)
-    owners = [
-        Owner(TableColumn(one.timing_model), one, f"/results/{start + number}") for number, one in enumerate(figures)
-    ]
-    owners.sort(key=lambda one: one.column.heading != leading)
-    rows = [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)]
-    return figure_table(rows, owners, caption=caption)
+    owners = list(_owners(result))
+    shown = {*_DECIDES, *(term.key for one in result.results for term in one.terms if term.us)}
+    return figure_table(
+        [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)],
+        owners,
+        caption=caption,
+        is_detail=lambda figure: figure.key not in shown,
+        state=_state,
+    )
 
 
-def groups_table(figures: Sequence[CapacityFigures], *, start: int = 0) -> Table:
-    """How many nodes of each group fit one period, the other groups as they are.
+def _owners(result: Capacity) -> Iterator[Owner]:
+    """A column for each period and timing model, the profile's own model first."""
+    leading, deciding = leading_model(result.profile), bus_of(result.profile).deciding_model
+    for figures, start in zip(result.periods, _starts(result), strict=False):
+        several = len(result.periods) > 1
+        group = period(figures[0].period_us) if several else ""
+        for number, one in sorted(enumerate(figures), key=lambda numbered: numbered[1].timing_model != leading):
+            rank = 1 if several and len(figures) > 1 and one.timing_model != deciding else 0
+            yield Owner(TableColumn(one.timing_model, group=group, rank=rank), one, f"/results/{start + number}")
+
+
+def _state(key: Figure, one: CapacityFigures) -> State:
+    """State of a figure that, by itself, decides whether the cycle fits."""
+    match key:
+        case figure.VERDICT:
+            return "neutral" if one.verdict is None else state_of(one.verdict == FITS)
+        case figure.MARGIN_CORRECTED:
+            is_short = one.safe_required_us is not None and one.safe_required_us > one.available_us
+            return "fails" if is_short else "neutral"
+        case figure.MARGIN:
+            return "fails" if TIME in one.exceeded else "neutral"
+    return "neutral"
+
+
+def groups_table(result: Capacity) -> Table:
+    """How many nodes of each group fit each period, the other groups as they are.
 
     Parameters
     ----------
-    figures
-        One set for each timing model.
-    start
-        Index of the first one in the document's results.
+    result
+        The capacity.
     """
     columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
     shown: list[tuple[int, tuple[Figure, ...]]] = []
-    for number, one in enumerate(figures):
+    for number, one in enumerate(result.results):
         keys = _GROUP_CLOSED if one.verdict is None else _GROUP_SAFE
         shown.append((number, keys))
+        models = f"{period(one.period_us)}, {one.timing_model}" if len(result.periods) > 1 else one.timing_model
         columns += (
-            TableColumn(key.label, kind="words" if key.sort == "word" else "figures", group=one.timing_model)
-            for key in keys
+            TableColumn(key.label, kind="words" if key.sort == "word" else "figures", group=models) for key in keys
         )
     rows = []
-    for place, group in enumerate(figures[0].groups):
-        at = f"/results/{start}/groups/{place}"
+    for place, group in enumerate(result.results[0].groups):
+        at = f"/results/0/groups/{place}"
         cells: list[Cell] = [
             Code(group.name),
             count_value(group.nodes, "nodes", at=f"{at}/nodes"),
             count_value(group.axes, "axes", at=f"{at}/axes"),
         ]
         for number, keys in shown:
-            at = f"/results/{start + number}/groups/{place}"
-            cells += (attribute_value(key, figures[number].groups[place], at=at) for key in keys)
+            at = f"/results/{number}/groups/{place}"
+            cells += (attribute_value(key, result.results[number].groups[place], at=at) for key in keys)
         rows.append(TableRow(tuple(cells)))
     return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
 
@@ -127,24 +162,34 @@ _GROUP_CLOSED: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
 """Under another timing model."""
 
 
+_DECIDES: Final = frozenset(
+    one.key
+    for one in (
+        *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
+        *(figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY),
+        *(figure.AVAILABLE, figure.REQUIRED, figure.MARGIN),
+    )
+)
+"""Figures that are no detail; beside them the terms that take time."""
+
+
 def _rows(bus: Bus) -> list[tuple[Figure, int]]:
     """The verdict's figures, the cycle and its terms, the slice, what the kind of bus adds, and what would fit.
 
     Terms are of level 1.
     """
-    sure = (
-        *(figure.VERDICT, figure.SAFE_AXES, figure.SAFE_NODES, figure.SAFE_LIMITED_BY),
-        *(figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS, figure.SAFE_MIN_PERIOD),
+    above = (
+        *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
+        *(figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY, figure.SAFE_MIN_PERIOD),
+        *(figure.AVAILABLE, figure.REQUIRED),
     )
-    above = (figure.AVAILABLE, figure.REQUIRED)
     below = (
         *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
         *bus.table_figures,
-        *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES),
-        *(figure.LIMITED_BY, figure.FITS),
+        *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
     )
     return [
-        *((one, 0) for one in (*sure, *above)),
+        *((one, 0) for one in above),
         *((one, 1) for one in bus.term_figures),
         *((one, 0) for one in below),
     ]

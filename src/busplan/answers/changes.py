@@ -11,7 +11,10 @@ from busplan.forms.numbers import MISSING, figure_text
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
 
-_COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("key", "A", "B"))
+_COLUMNS: Final = (
+    TableColumn("key", kind="words", wraps=True),
+    *(TableColumn(heading, kind="words", wraps=True) for heading in ("A", "B")),
+)
 _ALL_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
 _MOST_ITEMS: Final = 8

@@ -45,11 +45,11 @@ def circle_sentences(
     subject = (Code(profile.name), " at ", period, " and ", feed)
     verdict = verdict_words(result)
     if result.failures:
-        yield Sentence((*subject, f": {verdict.text}, ", *failure_words(result, at=at).parts, "."), verdict.state)
+        yield Sentence((*subject, ": ", verdict, ", ", *failure_words(result, at=at).parts, "."), verdict.state)
         yield from _attack(result, at=at, with_contributions=with_contributions)
         return
     said = "the circle holds every tolerance" if result.passed else f"{verdict.text}: no contour tolerance is asked for"
-    yield Sentence((*subject, f": {said}."), verdict.state)
+    yield Sentence((*subject, ": ", Words(said, verdict.state), "."), verdict.state)
     yield sentence(
         "The loop is stable, with a phase margin of {}{} or more and a gain margin of {}{} or more.",
         *(

@@ -36,8 +36,8 @@ Arguments = tuple[str, str]
 
 _SIDES: Final = (
     TableColumn("", kind="words"),
-    TableColumn("given as", kind="words"),
-    TableColumn("name", kind="words"),
+    TableColumn("given as", kind="words", wraps=True),
+    TableColumn("name", kind="words", wraps=True),
     TableColumn(PERIOD.label, PERIOD.unit),
     TableColumn(TIMING_MODEL.label, kind="words"),
 )
@@ -48,7 +48,7 @@ _FIGURES: Final = (
     TableColumn("A"),
     TableColumn("B"),
     TableColumn("B - A"),
-    TableColumn("relative", "%"),
+    TableColumn("relative", "%", rank=1),
     TableColumn("B is", kind="words"),
 )
 _MOST_KEYS: Final = 20
@@ -120,15 +120,12 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     shown = [
         (at, one) for at, one in enumerate(found.figures) if one.judgement != "neutral" or None not in (one.a, one.b)
     ]
-    rows = tuple(_row(one, f"/figures/{at}") for at, one in shown if one.judgement != "same")
-    if rows:
-        yield Table(_FIGURES, rows)
+    if any(one.judgement != "same" for _, one in shown):
+        yield Table(_FIGURES, tuple(_row(one, f"/figures/{at}") for at, one in shown), heads=3)
     same = len(named([one for _, one in shown if one.judgement == "same"], found))
     if same:
         are = "is" if same == 1 else "are"
-        yield sentence(
-            f"{{}} {nouns(same, 'figure')} {are} the same: JSON and CSV list all figures.", count_value(same)
-        )
+        yield sentence(f"{{}} {nouns(same, 'figure')} {are} the same.", count_value(same))
 
 
 def _sides(found: Difference, arguments: Arguments) -> Table:
@@ -180,7 +177,8 @@ def _row(one: ComparedFigure, at: str) -> TableRow:
         one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
     )
     judged = Words(one.judgement, STATES[one.judgement])
-    return TableRow((figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged))
+    cells = (figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged)
+    return TableRow(cells, is_detail=one.judgement == "same")
 
 
 def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -> JsonDocument:

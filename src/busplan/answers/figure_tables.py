@@ -1,10 +1,13 @@
 """Tables of registered figures: one row for each figure, one column for each owner."""
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final, NamedTuple
 
 from busplan.buses.figure import Figure
-from busplan.forms.blocks import Sentence, Table, TableColumn, TableRow, attribute_value
+from busplan.forms.blocks import Sentence, ShownValue, State, Table, TableColumn, TableRow, attribute_value
+
+_FIRST_TO_LEAVE: Final = 9
+"""Rank of the equations: a narrow terminal has the figures rather."""
 
 
 class Owner(NamedTuple):
@@ -18,7 +21,13 @@ class Owner(NamedTuple):
 
 
 def figure_table(
-    rows: Iterable[tuple[Figure, int]], owners: Sequence[Owner], *, caption: Sentence, unit: bool = True
+    rows: Iterable[tuple[Figure, int]],
+    owners: Sequence[Owner],
+    *,
+    caption: Sentence,
+    unit: bool = True,
+    is_detail: Callable[[Figure], bool] = lambda _figure: False,
+    state: Callable[[Figure, Any], State] = lambda _figure, _figures: "neutral",
 ) -> Table:
     """Table of figures, the owners side by side.
 
@@ -32,12 +41,22 @@ def figure_table(
         Caption of the table.
     unit
         If False, the column of units is left out: the caption says the unit.
+    is_detail
+        Whether the row of a figure is shown only in a whole answer.
+    state
+        State of a figure of an owner's object, beside that of a truth.
     """
-    head = (TableColumn("figure", kind="words"), TableColumn("eq", kind="words"), TableColumn("unit", kind="words"))
-    columns = (*head[: 3 if unit else 2], *(owner.column for owner in owners))
-    return Table(columns, tuple(_row(figure, level, owners, unit=unit) for figure, level in rows), caption)
+    head = [TableColumn("figure", kind="words"), TableColumn("eq", kind="words", rank=_FIRST_TO_LEAVE)]
+    head += [TableColumn("unit", kind="words")] if unit else []
+    shown = []
+    for figure, level in rows:
+        words = (figure.label, figure.reference, figure.column or figure.unit)[: len(head)]
+        values = (_value(figure, owner, state) for owner in owners)
+        shown.append(TableRow((*words, *values), level, is_detail=is_detail(figure)))
+    # Each panel of a narrow terminal says the unit again.
+    return Table((*head, *(owner.column for owner in owners)), tuple(shown), caption, heads=len(head))
 
 
-def _row(figure: Figure, level: int, owners: Sequence[Owner], *, unit: bool) -> TableRow:
-    words = (figure.label, figure.reference, figure.column or figure.unit)[: 3 if unit else 2]
-    return TableRow((*words, *(attribute_value(figure, owner.figures, at=owner.at) for owner in owners)), level)
+def _value(figure: Figure, owner: Owner, state: Callable[[Figure, Any], State]) -> ShownValue:
+    found, own = attribute_value(figure, owner.figures, at=owner.at), state(figure, owner.figures)
+    return found if own == "neutral" else found._replace(state=own)

@@ -95,7 +95,11 @@ def _counts(*numbers: int) -> tuple[ShownValue, ...]:
 
 def regions_table(found: TradeOff) -> Table:
     """How many cells each region has, and what limits it; the legend of the picture."""
-    columns = (TableColumn("state", kind="words"), TableColumn("limited by", kind="words"), TableColumn("settings"))
+    columns = (
+        TableColumn("state", kind="words"),
+        TableColumn("limited by", kind="words", wraps=True),
+        TableColumn("settings"),
+    )
     rows = (_region_row(found, number, one) for number, one in enumerate(found.regions))
     return Table(columns, tuple(rows), Sentence(("What limits each region",)))
 

@@ -82,14 +82,14 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
     for at, one in comparisons:
         rows.setdefault(one.quantity, {})[one.method] = at, one
     columns = (
-        *(TableColumn("figure", kind="words"), TableColumn("unit", kind="words"), TableColumn("published")),
+        *(TableColumn("figure", kind="words", wraps=True), TableColumn("unit", kind="words"), TableColumn("published")),
         *(
             column
             for method in methods
-            for column in (TableColumn(method), TableColumn("residual"), TableColumn("", "%"))
+            for column in (TableColumn(method), TableColumn("residual"), TableColumn("", "%", rank=1))
         ),
     )
-    return Table(columns, tuple(_row(by_method, methods) for by_method in rows.values()))
+    return Table(columns, tuple(_row(by_method, methods) for by_method in rows.values()), heads=3)
 
 
 def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> TableRow:

@@ -24,6 +24,7 @@ from busplan.forms.blocks import (
     Report,
     Sentence,
     ShownValue,
+    Words,
     figure_value,
     sentence,
 )
@@ -93,12 +94,13 @@ def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
     option, subject = plan.recommended, _goal(plan)
     if option is None or plan.binding is not None:
         why = ShownValue("" if plan.binding is None else plan.binding.why, "why", at="/binding/why")
-        return Sentence((*subject, f": NO PLAN. No change of {_freed(plan)} is enough: ", why, "."), "fails")
+        none = Words("NO PLAN", "fails")
+        return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
     judged = plan.goal.tolerance.judges_contour
     circle = (" and passes the circle" if judged else ", and its circle is not judged") if with_circle else ""
     number = plan.options.index(option)
     margin, doubt = option_margin(option, at=f"/options/{number}")
-    result = ("fits with a margin of ", margin, " +/- ", doubt, f"{circle}.")
+    result = (Words("fits", "passes"), " with a margin of ", margin, " +/- ", doubt, f"{circle}.")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = (

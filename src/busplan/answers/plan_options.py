@@ -30,11 +30,15 @@ def options_table(plan: Plan) -> Table:
     columns = (
         TableColumn("option", kind="words"),
         TableColumn("", kind="words"),
-        *(TableColumn(heading, kind="words") for heading in ("set", "largest term", "held by", "circle")),
+        TableColumn("set", kind="words", wraps=True),
+        TableColumn("largest term", kind="words", rank=2),
+        *(TableColumn(heading, kind="words") for heading in ("held by", "circle")),
         *(TableColumn(heading, "us") for heading in ("margin", "+/-")),
-        *(TableColumn(heading, group="safe") for heading in ("nodes", "axes")),
+        *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes")),
     )
-    return Table(columns, tuple(_row(option, at=f"/options/{number}") for number, option in enumerate(plan.options)))
+    return Table(
+        columns, tuple(_row(option, at=f"/options/{number}") for number, option in enumerate(plan.options)), heads=2
+    )
 
 
 def _row(option: Option, *, at: str) -> TableRow:

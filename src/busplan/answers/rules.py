@@ -20,7 +20,10 @@ from busplan.forms.blocks import (
 )
 from busplan.rules.registry import NEVER_SUPPRESSED
 
-_COLUMNS: Final = tuple(TableColumn(heading, kind="words") for heading in ("code", "rule", "severity", "what is wrong"))
+_COLUMNS: Final = (
+    *(TableColumn(heading, kind="words") for heading in ("code", "rule", "severity")),
+    TableColumn("what is wrong", kind="words", wraps=True),
+)
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:

@@ -103,10 +103,10 @@ def sensitivity_table(found: Sensitivity, *, at: str) -> Table:
     )
     columns = (
         TableColumn("what changes", kind="words"),
-        TableColumn("from -> to", kind="words"),
+        TableColumn("from -> to", kind="words", rank=1),
         TableColumn("change", "us", group="margin"),
         TableColumn("then", "us", group="margin"),
-        TableColumn("verdict then", kind="words"),
+        TableColumn("verdict then", kind="words", wraps=True),
     )
     rows = (
         TableRow(tuple(_cells(one, found, at=f"{at}/sensitivity/{number}"))) for number, one in enumerate(found.effects)

@@ -73,10 +73,9 @@ def headline(plan: Schedule) -> Sentence:
     )
     if figures.verdict is None:
         return _placed(Sentence((*parts, ", which decides nothing."), state_of(figures.fits and figures.safe)), plan)
-    verdict = figure_value(VERDICT, figures.verdict)
-    return _placed(
-        Sentence((*parts, "; verdict: ", verdict, "."), state_of(figures.verdict == FITS and figures.safe)), plan
-    )
+    state = state_of(figures.verdict == FITS and figures.safe)
+    verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
+    return _placed(Sentence((*parts, "; verdict: ", verdict, "."), state), plan)
 
 
 def timeline_chart(plan: Schedule) -> Chart:
@@ -130,7 +129,7 @@ def totals_table(plan: Schedule) -> Table:
     part = whole if plan.is_whole else "the window"
     return Table(
         (
-            *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words")),
+            *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words", rank=1)),
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
         tuple(_total_row(plan, number, one) for number, one in enumerate(totals(plan))),

@@ -32,6 +32,7 @@ from busplan.forms.blocks import (
     Record,
     Sentence,
     ShownValue,
+    Words,
     count_value,
     figure_value,
     joined,
@@ -142,7 +143,8 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     limits = _broken_limits(figures, profile)
     safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
     why = "".join(f", {words}" for words in limits)
-    said = sentence(f"{{}}{safe}{why}.", _figure(VERDICT, figures, at=at))
+    state = state_of(figures.verdict == FITS and figures.safe)
+    said = sentence(f"{{}}{{}}{why}.", _figure(VERDICT, figures, at=at)._replace(state=state), Words(safe, state))
     if limits:
         return said  # whatever the time is
     found = [said, _margin(figures, at=at)]

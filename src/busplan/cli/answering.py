@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
 _KEY_AND_VALUE: Final = re.compile(r"\b[a-z][a-z_.]* = \S")
+_NARROWEST: Final = 40
+"""Least width to lay out for; a narrower terminal breaks the lines itself."""
 NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
 
 
@@ -29,6 +31,7 @@ def answer(
     *,
     inputs: Iterable[Path] = (),
     changes: KeyChanges = NO_CHANGES,
+    is_whole: bool = False,
     default: Form = "table",
     refused: Mapping[Form, str] = NOTHING_REFUSED,
 ) -> "Iterator[Callable[[Report], None]]":
@@ -44,6 +47,8 @@ def answer(
         Files that the command reads.
     changes
         KeyChanges of the profile; the answer names those by --set.
+    is_whole
+        Value of --all.
     default
         Form on standard output without --format.
     refused
@@ -59,12 +64,16 @@ def answer(
         raise BusplanError(f"--format {chosen}: {refused[chosen]}")
     if output is None:
         with naming(changes):
-            yield lambda report: give(report_with(changes, report), chosen)
+            yield lambda report: give(_asked(report, changes, is_whole=is_whole), chosen)
         return
     require_apart({"--output": output}, inputs=inputs)
     with new_file(output, overwrite=True) as file, naming(changes):
-        yield lambda report: _write(file.write, report_with(changes, report), chosen)
+        yield lambda report: _write(file.write, _asked(report, changes, is_whole=is_whole), chosen)
     say(f"wrote {output}")
+
+
+def _asked(report: "Report", changes: KeyChanges, *, is_whole: bool) -> "Report":
+    return report_with(changes, report)._replace(is_whole=is_whole or report.is_whole)
 
 
 def report_with(changes: KeyChanges, report: "Report") -> "Report":
@@ -102,17 +111,15 @@ def give(report: "Report", form: Form) -> None:
     if form == "table":
         from busplan.forms import terminal
 
-        emit_text(terminal.text(report, width=columns(), styled=is_styled()))
+        emit_text(terminal.text(report, width=terminal_width(), styled=is_styled()))
     else:
         emit_document(render(report, form))
 
 
-def columns() -> int:
-    """Width of the terminal; without one, a fixed width, so that output is reproducible."""
-    from busplan.forms.terminal import WIDTH
-
+def terminal_width() -> int | None:
+    """Width of the terminal, by COLUMNS if that is set; None if standard output is none, so that it is reproducible."""
     if not sys.stdout.isatty():
-        return WIDTH
+        return None
     from shutil import get_terminal_size
 
-    return get_terminal_size((WIDTH, 24)).columns
+    return max(get_terminal_size().columns, _NARROWEST)

@@ -13,6 +13,7 @@ from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import GAP_COUNT, NODES, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
+    AllOption,
     FormatOption,
     OutputOption,
     ProfileArgument,
@@ -84,6 +85,7 @@ def calibrate_command(
             "which replaces comments on the origin of the old values; the rest stays.",
         ),
     ] = False,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -106,7 +108,7 @@ def calibrate_command(
     if apply:
         require_own_file(profile)
     files = chain(profile_files(profile), _measurements_file(measurements))
-    with answer(format_, output, inputs=files, changes=changes) as give:
+    with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
         from busplan.analysis.calibration.calibrate import calibrate
         from busplan.answers import calibration as said
         from busplan.forms.numbers import plural

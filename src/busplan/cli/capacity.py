@@ -8,6 +8,7 @@ from busplan.cli.answering import answer
 from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
+    AllOption,
     FormatOption,
     OutputOption,
     ProfileArgument,
@@ -32,6 +33,7 @@ def capacity_command(
             "rows.",
         ),
     ] = False,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -43,7 +45,7 @@ def capacity_command(
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
-    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.analysis.capacity.figures import capacity
         from busplan.analysis.capacity.verdict import verdicts
 

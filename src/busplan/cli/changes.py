@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 import typer
 
 from busplan.cli.options import time_us
+from busplan.errors import BusplanError
 from busplan.profile.changes import SET, KeyChange, KeyChanges, parse_set, require_separate
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ PeriodsOption = Annotated[
     list[str] | None,
     typer.Option(
         "--period",
-        metavar="TIME",
-        help="Communication period with its unit, as 4ms, 250us or 0.001s. May be given several times.  "
+        metavar="TIME[,TIME...]",
+        help="Communication period with its unit, as 4ms, 250us or 0.001s, or several between commas.  "
         "[default: the profile's cycle.period_us]",
         show_default=False,
     ),
@@ -195,8 +196,18 @@ def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | Non
     if not texts:
         return None
     found = []
-    for text in texts:
-        period_us, note = _period(text)
+    for text, (period_us, note) in (one for several in texts for one in _periods(several)):
         KeyChanges((KeyChange(_PERIOD, period_us, "--period", text, note),)).applied(profile)
         found.append(period_us)
     return found
+
+
+def _periods(text: str) -> list[tuple[str, tuple[float, str]]]:
+    """Each period between commas, as typed and as a value."""
+    parts = text.split(",")
+    try:
+        return [(part, _period(part)) for part in parts]
+    except BusplanError:
+        if len(parts) == 1:
+            raise
+        raise BusplanError(f"--period {text}: expected times with their unit between commas, as 500us,1ms") from None

@@ -17,7 +17,7 @@ from busplan.cli.changes import (
     takes_changes,
 )
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import FormatOption, OutputOption, ProfileArgument, plot_format
+from busplan.cli.options import AllOption, FormatOption, OutputOption, ProfileArgument, plot_format
 from busplan.cli.output import NewFile, PlanFailsError, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
@@ -87,6 +87,7 @@ def circle_test_command(
             "[default: no figure]",
         ),
     ] = None,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -106,7 +107,7 @@ def circle_test_command(
         raise BusplanError(f"--every {every}: must be 1 or more")
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
-    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.analysis.circle.roundness import circle_test
         from busplan.answers.circle import circle_report
 

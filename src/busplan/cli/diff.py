@@ -10,6 +10,7 @@ from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
+    AllOption,
     FormatOption,
     OutputOption,
     TimingOption,
@@ -61,6 +62,7 @@ def diff_command(
             help="With --fail-on-regression, how much worse a number may be than A's [%].  [default: 0]",
         ),
     ] = None,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -77,7 +79,7 @@ def diff_command(
     Example: busplan diff paper-1ms paper-optimal-gap --fail-on-regression
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
-    with answer(format_, output, inputs=profile_files(a, b), changes=changes) as give:
+    with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
         from busplan.analysis.comparison.circle_tests import circle_tests
         from busplan.analysis.comparison.difference import difference
         from busplan.answers.diff import diff_report

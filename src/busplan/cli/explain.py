@@ -9,6 +9,7 @@ from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, p
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
+    AllOption,
     FormatOption,
     OutputOption,
     ProfileArgument,
@@ -68,6 +69,7 @@ def explain_command(
             help="Which transaction, for a figure of latency, as read or write.  [default: both]",
         ),
     ] = None,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -82,7 +84,7 @@ def explain_command(
     """
     if figure is None:
         _refuse_without_figure({"--period": period, "--timing": timing, "--transaction": transaction})
-    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         plan = load_changed(profile, changes)
         if figure is None:
             give(_list(plan))

@@ -1,6 +1,6 @@
 """Layout of --help: plain argument names, whole sentences for commands, and the exit codes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -46,12 +46,12 @@ class PlainGroup(TyperGroup):
 
     def make_context(self, *arguments: Any, **settings: Any) -> Any:
         """Parse the options before the command."""
-        with _usage_as_text():
+        with _usage_in_our_words():
             return super().make_context(*arguments, **settings)
 
     def invoke(self, ctx: Any) -> Any:
         """Parse the command line of a command and run it."""
-        with _usage_as_text():
+        with _usage_in_our_words():
             return super().invoke(ctx)
 
     def get_params(self, ctx: Any) -> list[Any]:
@@ -66,10 +66,15 @@ class PlainGroup(TyperGroup):
         return _on_one_line(super().shell_complete(ctx, incomplete))
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write each command with its whole first sentence, which typer would shorten."""
-        commands: list[Any] = [self.get_command(ctx, name) for name in self.list_commands(ctx)]
-        with formatter.section("Commands"):
-            formatter.write_dl([(one.name, one.help.partition("\n\n")[0]) for one in commands if not one.hidden])
+        """Write each group of commands, each command with its whole first sentence, which typer would shorten."""
+        for title, names in self.groups().items():
+            commands: list[Any] = [self.get_command(ctx, name) for name in names]
+            with formatter.section(title):
+                formatter.write_dl([(one.name, one.help.partition("\n\n")[0]) for one in commands])
+
+    def groups(self) -> Mapping[str, Sequence[str]]:
+        """Names of the commands under the title of each group."""
+        return {"Commands": list(self.commands)}
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write commands and options."""
@@ -78,15 +83,17 @@ class PlainGroup(TyperGroup):
 
 
 @contextmanager
-def _usage_as_text() -> Iterator[None]:
-    """Escape marks of writing direction in usage errors; typer escapes only control characters."""
+def _usage_in_our_words() -> Iterator[None]:
+    """Raise errors of the option parser as the program's own."""
     try:
         yield
     except TyperException as error:
-        from busplan.printable import printable_lines
+        from busplan.cli.usage import usage_error
 
-        error.message = printable_lines(error.message)
-        raise
+        ours = usage_error(error)
+        if ours is None:
+            raise
+        raise ours from None
 
 
 def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: Any) -> None:

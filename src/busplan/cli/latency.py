@@ -8,6 +8,7 @@ from busplan.cli.answering import answer
 from busplan.cli.changes import GAP_COUNT, NODES, load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
+    AllOption,
     FormatOption,
     OutputOption,
     ProfileArgument,
@@ -33,6 +34,7 @@ def latency_command(
     ] = None,
     changes: KeyChanges = NO_CHANGES,
     timing: TimingOption = "both",
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -43,7 +45,7 @@ def latency_command(
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
-    with answer(format_, output, inputs=profile_files(profile), changes=changes) as give:
+    with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.analysis.latency import latency
         from busplan.answers.latency import latency_report
 

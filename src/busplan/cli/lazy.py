@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from importlib import import_module
+from types import MappingProxyType
 from typing import Any, Final
 
 import typer
@@ -10,27 +11,16 @@ from typer.main import get_command
 from busplan.cli.help import FAILURES, PlainCommand, PlainGroup
 
 SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
-COMMANDS: Final = (
-    "latency",
-    "capacity",
-    "circle-test",
-    "explain",
-    "report",
-    "calibrate",
-    "plan",
-    "timeline",
-    "map",
-    "sweep",
-    "check",
-    "diff",
-    "rule",
-    "schema",
-    "manual",
-    "paper",
-    "profiles",
-    "init",
+GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
+    {
+        "Design": ("init", "plan", "calibrate", "map", "sweep"),
+        "Analyse": ("capacity", "latency", "circle-test", "timeline", "explain", "report"),
+        "Gate": ("check", "diff", "rule", "schema"),
+        "Learn": ("manual", "profiles", "paper"),
+    }
 )
 """In the order of the help. `circle-test` is in module `circle`: `circle_test` would look like a test module."""
+COMMANDS: Final = tuple(name for names in GROUPS.values() for name in names)
 
 
 class LazyCommands(Mapping[str, Any]):
@@ -72,3 +62,15 @@ class LazyGroup(PlainGroup):
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 - typer's signature
         """Names of all commands, without loading them."""
         return list(COMMANDS)
+
+    def groups(self) -> Mapping[str, tuple[str, ...]]:
+        """Names of the commands under the title of each group."""
+        return GROUPS
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command of a command line."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
+            from busplan.cli.usage import unknown_command
+
+            raise unknown_command(args[0], list(COMMANDS))
+        return super().resolve_command(ctx, args)

@@ -38,7 +38,10 @@ def manual_command(
 
     known = topics()
     if topic is not None and topic not in known:
-        raise BusplanError(f"{topic or repr(topic)}: no such topic; there are {', '.join(known)}")
+        from busplan.nearest import did_you_mean
+
+        hints = "; ".join(filter(None, (f"there are {', '.join(known)}", did_you_mean(topic, known))))
+        raise BusplanError(f"{topic or repr(topic)}: no such topic; {hints}")
     require_apart({"--output": output})
     write_document(_contents(known) if topic is None else page(topic), output)
 

@@ -10,7 +10,7 @@ import typer
 from busplan.cli.answering import answer, naming
 from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import ProfileArgument, output_option
+from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.output import write_document
 from busplan.cli.pictures import picture_form
 from busplan.cli.vary import VALUES_HELP, parse_axis
@@ -62,6 +62,7 @@ def map_command(
             show_default=False,
         ),
     ] = None,
+    all_: AllOption = False,
     format_: Annotated[
         MapForm | None,
         typer.Option(
@@ -94,7 +95,7 @@ def map_command(
                 found = _found(load_changed(profile, changes), x, y, jobs=jobs, with_circle=circle)
                 write_document(_picture(found, chosen, changes), output)
         case _:
-            with answer(chosen, output, inputs=profile_files(profile), changes=changes) as give:
+            with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
                 from busplan.answers.map import map_report
 
                 give(map_report(_found(load_changed(profile, changes), x, y, jobs=jobs, with_circle=circle)))

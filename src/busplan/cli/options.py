@@ -169,6 +169,9 @@ def format_option(default: str) -> Any:
     return typer.Option("--format", help=help_, show_default=False)
 
 
+AllOption = Annotated[
+    bool, typer.Option("--all", help="Show everything: every row, and every column on a narrow terminal, too.")
+]
 FormatOption = Annotated[Form | None, format_option("table")]
 OutputOption = Annotated[Path | None, output_option(f"Write the answer to FILE{', '.join(ENDINGS)}")]
 

@@ -1,11 +1,11 @@
 """`busplan paper`."""
 
 from busplan.cli.answering import answer
-from busplan.cli.options import FormatOption, OutputOption
+from busplan.cli.options import AllOption, FormatOption, OutputOption
 from busplan.cli.progress import progress_bar
 
 
-def paper_command(format_: FormatOption = None, output: OutputOption = None) -> None:
+def paper_command(all_: AllOption = False, format_: FormatOption = None, output: OutputOption = None) -> None:
     """Show every published figure that the equations reach, beside the computed one and the residual.
 
     Table I and Table II, the comparison with CAN, the constant of equation (15), the gaps of equation (10), Figs. 9 and
@@ -15,7 +15,7 @@ def paper_command(format_: FormatOption = None, output: OutputOption = None) -> 
 
     Example: busplan paper --format csv
     """
-    with answer(format_, output) as give:
+    with answer(format_, output, is_whole=all_) as give:
         from busplan.analysis.circle.roundness import circle_test
         from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
         from busplan.answers.paper import paper_report

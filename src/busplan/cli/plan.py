@@ -11,7 +11,7 @@ from busplan.cli.answering import answer, report_with
 from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import GAP_COUNT, NODES, RESERVE, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import STANDARD_OUTPUT, FormatOption, ProfileArgument
+from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument
 from busplan.cli.output import NewFile, PlanFailsError, emit_document, new_file, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
@@ -111,6 +111,7 @@ def plan_command(
     force: Annotated[
         bool, typer.Option("--force", help="Let -o NEW.toml overwrite a file that is already there.")
     ] = False,
+    all_: AllOption = False,
     format_: FormatOption = None,
 ) -> None:
     """Tell what to set for a number of nodes or axes: gap count, slice ratio and period, several where one is too few.
@@ -137,7 +138,7 @@ def plan_command(
     _check_options(changes, axes=axes, apply=apply, new=new, force=force, format_=format_)
     piped = new == STANDARD_OUTPUT
     require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
-    with answer(format_, report_file, inputs=profile_files(profile), changes=changes) as give:
+    with answer(format_, report_file, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.analysis.circle.check import CircleCheck
         from busplan.analysis.planning.freedoms import freed
         from busplan.analysis.planning.plan import plan

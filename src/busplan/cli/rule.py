@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.options import FormatOption, OutputOption
+from busplan.cli.options import AllOption, FormatOption, OutputOption
 from busplan.errors import BusplanError
 
 
@@ -19,8 +19,11 @@ def complete_code(incomplete: str) -> list[str]:
 def rule_command(
     code: Annotated[
         str | None,
-        typer.Argument(help="Code of a rule, as BP101.  [default: all of them]", autocompletion=complete_code),
+        typer.Argument(
+            help="Code or name of a rule, as BP101 or syntax.  [default: all of them]", autocompletion=complete_code
+        ),
     ] = None,
+    all_: AllOption = False,
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
@@ -30,14 +33,19 @@ def rule_command(
 
     Example: busplan rule BP110
     """
-    with answer(format_, output) as give:
+    with answer(format_, output, is_whole=all_) as give:
         from busplan.answers.rules import rule_report, rules_report
         from busplan.rules.registry import all_rules
 
         rules = all_rules()
         if code is None:
             give(rules_report(list(rules.values())))
-        elif code.upper() in rules:
-            give(rule_report(rules[code.upper()]))
-        else:
-            raise BusplanError(f"{code}: no such rule; there are {', '.join(rules)}")
+            return
+        named = {**rules, **{rule.name.upper(): rule for rule in rules.values()}}
+        if code.upper() not in named:
+            from busplan.nearest import did_you_mean
+
+            known = (*rules, *(rule.name for rule in rules.values()))
+            hint = " ".join(filter(None, (did_you_mean(code, known), "`busplan rule` lists them")))
+            raise BusplanError(f"{code}: no such rule; {hint}")
+        give(rule_report(named[code.upper()]))

@@ -9,7 +9,15 @@ import typer
 
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import ALL_MODELS, ProfileArgument, TimingOption, form_of_file, output_option, plot_format
+from busplan.cli.options import (
+    ALL_MODELS,
+    AllOption,
+    ProfileArgument,
+    TimingOption,
+    form_of_file,
+    output_option,
+    plot_format,
+)
 from busplan.cli.output import partial_path
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.cli.vary import VALUES_HELP, parse_axes
@@ -94,6 +102,7 @@ def sweep_command(
             show_default=False,
         ),
     ] = None,
+    all_: AllOption = False,
     circle: Annotated[
         bool,
         typer.Option(
@@ -156,6 +165,7 @@ def sweep_command(
             form=form,
             output=output,
             top=top or _DEFAULT_TOP,
+            is_whole=all_,
             sort_by=sort_by or None,
             ascending=order == "asc",
             plot=plot,

@@ -30,6 +30,8 @@ class SweepJob(NamedTuple):
     form: SweepForm
     output: Path | None
     top: int
+    is_whole: bool
+    """If True, a narrow terminal leaves out no column of the top rows."""
     sort_by: str | None
     ascending: bool
     plot: Path | None

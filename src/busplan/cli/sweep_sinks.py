@@ -58,7 +58,7 @@ class _TopSink:
 
         report = report_with(self._job.changes, sweep_report(self._rows, self._tally, document=_not_kept))
         if self._file is None:
-            give(report, self._form)
+            give(report._replace(is_whole=self._job.is_whole), self._form)
         else:
             _write(self._file, render(report, self._form))
 

@@ -12,6 +12,7 @@ from busplan.cli.answering import answer, naming
 from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
+    AllOption,
     ProfileArgument,
     output_option,
     time_us,
@@ -81,6 +82,7 @@ def timeline_command(
             show_default=False,
         ),
     ] = None,
+    all_: AllOption = False,
     format_: Annotated[
         TimelineForm | None,
         typer.Option(
@@ -121,7 +123,7 @@ def timeline_command(
             with naming(changes):
                 write_document(_picture(shown(), chosen, changes), output)
         case _:
-            with answer(chosen, output, inputs=profile_files(profile), changes=changes) as give:
+            with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
                 from busplan.answers.timeline import timeline_report
 
                 give(timeline_report(shown()))

@@ -95,7 +95,7 @@ class Command(NamedTuple):
     """Key that `ShownValue.command` refers to."""
 
 
-Part = str | ShownValue | Code
+Part = str | ShownValue | Words | Code
 """A piece of a sentence."""
 
 
@@ -117,6 +117,17 @@ class TableColumn(NamedTuple):
     kind: Literal["words", "figures", "drawing"] = "figures"
     group: str = ""
     """Heading above the neighbouring columns of the same group."""
+    rank: int = 0
+    """0 if the column stays in its row. On a terminal that is too narrow, the largest rank leaves first."""
+    leaves: Literal["out", "below"] = "out"
+    """Where the column goes then: out of the table, or to a line below its row."""
+    wraps: bool = False
+    """If True, a narrow terminal wraps the words of the column at spaces."""
+
+    @property
+    def name(self) -> str:
+        """Name of the column in a sentence."""
+        return " ".join(filter(None, (self.group, self.heading or self.unit)))
 
 
 class TableRow(NamedTuple):
@@ -127,6 +138,8 @@ class TableRow(NamedTuple):
     """1 if the row is a part of the row above it, which has level 0."""
     highlighted: bool = False
     """If True, the row is bold: it is the one to look at first."""
+    is_detail: bool = False
+    """If True, the row is shown only in a whole answer."""
 
 
 class Table(NamedTuple):
@@ -137,6 +150,8 @@ class Table(NamedTuple):
     caption: Sentence | None = None
     stacks: bool = False
     """If True, a narrow screen shows each row as a list of its cells: nobody compares them down a column."""
+    heads: int = 1
+    """How many of the first columns name a row; they are repeated where a narrow terminal continues the table below."""
 
 
 class Facts(NamedTuple):
@@ -239,6 +254,8 @@ class Report(NamedTuple):
     """Rows for CSV; None if the answer is more than one table."""
     is_page: bool = False
     """If True, every form shows the title; other answers may be part of a page."""
+    is_whole: bool = False
+    """If True, rows of detail are shown, and a narrow terminal leaves out no column."""
 
 
 def sentence(template: str, *parts: Part, state: State = "neutral") -> Sentence:

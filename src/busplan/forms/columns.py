@@ -1,10 +1,7 @@
-"""Tables in character columns; figures are never cut or wrapped."""
+"""Cells and sentences as plain text."""
 
-from collections.abc import Iterator, Sequence
-from itertools import zip_longest
-
-from busplan.forms.blocks import Bar, Cell, Sentence, ShownValue, Swatch, Table, TableColumn, TableRow, Words
-from busplan.forms.lines import Line, Mark, Tone
+from busplan.forms.blocks import Bar, Cell, Part, Sentence, ShownValue, Swatch, Words
+from busplan.forms.lines import Line, Mark
 from busplan.forms.numbers import figure_text, with_unit
 from busplan.printable import printable
 
@@ -28,66 +25,19 @@ def cell_text(cell: Cell) -> str:
 
 def sentence_text(sentence: Sentence) -> str:
     """Write a sentence as plain text."""
-    return "".join(with_unit(part) if isinstance(part, ShownValue) else cell_text(part) for part in sentence.parts)
+    return "".join(map(part_text, sentence.parts))
 
 
-def table_lines(table: Table) -> list[Line]:
-    """Lay out a table: words left, figures right, a rule below the headings.
-
-    Parameters
-    ----------
-    table
-        The table. Columns of drawings are left out: the figure is in another column.
-    """
-    shown = [number for number, column in enumerate(table.columns) if column.kind != "drawing"]
-    columns = [table.columns[number] for number in shown]
-    rows = [[_one_line(row.cells[number]) for number in shown] for row in table.rows]
-    for row, own in zip(table.rows, rows, strict=True):
-        own[0] = "  " * row.level + own[0]
-    heads = _heads(columns)
-    widths = [max(map(len, column)) for column in zip(*heads, *rows, strict=True)]
-    left = [column.kind == "words" for column in columns]
-    return [
-        *(Line(_laid(head, widths, left), "heading") for head in heads),
-        Line("-" * (sum(widths) + 2 * (len(widths) - 1)), "drawn"),
-        *(
-            Line(_laid(cells, widths, left), "drawn", tuple(_marks(row, shown, cells, widths, left)))
-            for row, cells in zip(table.rows, rows, strict=True)
-        ),
-    ]
+def part_text(part: Part) -> str:
+    """Write a piece of a sentence as plain text, a figure with its unit."""
+    return with_unit(part) if isinstance(part, ShownValue) else cell_text(part)
 
 
-def _one_line(cell: Cell) -> str:
-    return printable(" ".join(cell_text(cell).split()))
-
-
-def _heads(columns: Sequence[TableColumn]) -> list[tuple[str, ...]]:
-    """Heading lines from the top: group, heading and unit, aligned at the bottom."""
-    stacks = [[*filter(None, (column.unit, column.heading, column.group))] for column in columns]
-    return [tuple(line) for line in zip_longest(*stacks, fillvalue="")][::-1]
-
-
-def _laid(cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]) -> str:
-    return "  ".join(
-        cell.ljust(width) if words else cell.rjust(width)
-        for cell, width, words in zip(cells, widths, left, strict=True)
-    ).rstrip()
-
-
-def _marks(
-    row: TableRow, shown: Sequence[int], cells: Sequence[str], widths: Sequence[int], left: Sequence[bool]
-) -> Iterator[Mark]:
-    """Marks of the cells that have a state; a highlighted row is one more mark."""
-    start = 0
-    for number, cell, width, words in zip(shown, cells, widths, left, strict=True):
-        tone = _tone(row.cells[number])
-        if tone != "neutral":
-            begin = start if words else start + width - len(cell)
-            yield Mark(begin, begin + len(cell), tone)
-        start += width + 2
-    if row.highlighted:
-        yield Mark(0, start, "heading")
-
-
-def _tone(cell: Cell) -> Tone:
-    return cell.state if isinstance(cell, ShownValue | Words | Sentence) else "neutral"
+def sentence_line(sentence: Sentence) -> Line:
+    """Write a sentence as one line: its words of a state are marked, or all of it where no word has one."""
+    text, marks = "", list[Mark]()
+    for part in sentence.parts:
+        start, text = len(text), text + printable(part_text(part))
+        if isinstance(part, ShownValue | Words) and part.state != "neutral":
+            marks.append(Mark(start, len(text), part.state))
+    return Line(text, "neutral" if marks else sentence.state, tuple(marks))

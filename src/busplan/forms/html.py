@@ -13,6 +13,7 @@ from busplan.buses.figure import unit_of
 from busplan.forms import blocks as made_of
 from busplan.forms.blocks import Bar, Block, Chapter, Chart, Command, Report, Sentence, Table
 from busplan.forms.columns import cell_text, sentence_text
+from busplan.forms.details import shown_blocks
 from busplan.forms.inks import DARK, fills
 from busplan.forms.numbers import figure_text, unit_text
 from busplan.forms.signed_bar import signed_bar
@@ -35,7 +36,7 @@ def page(report: Report) -> str:
     str
         The whole document. The same answer always gives the same document.
     """
-    found = report.blocks()
+    found = shown_blocks(report)
     return _template("page.html.j2").render(
         title=report.title,
         blocks=found,
@@ -52,7 +53,7 @@ def fragment(report: Report) -> str:
     report
         The answer.
     """
-    found = report.blocks()
+    found = shown_blocks(report)
     page = files("busplan.forms") / "templates"
     chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
     # The rules are nested in one of the piece; what the page's root has, it has itself.

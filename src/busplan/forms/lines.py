@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 from busplan.printable import printable
 
 Tone = Literal["passes", "fails", "warns", "title", "heading", "neutral", "drawn"]
-"""Style of a line. "heading" and "drawn" lines (tables and drawings) are never wrapped."""
+"""Style of a line."""
 _STYLES: Final[dict[Tone, str]] = {
     "passes": "bold green",
     "fails": "bold red",
@@ -20,7 +20,6 @@ _STYLES: Final[dict[Tone, str]] = {
     "neutral": "",
     "drawn": "",
 }
-_NARROWEST: Final = 40
 
 
 class Mark(NamedTuple):
@@ -32,7 +31,7 @@ class Mark(NamedTuple):
 
 
 class Line(NamedTuple):
-    """One line; a sentence may be wrapped into several."""
+    """One line."""
 
     text: str
     tone: Tone = "neutral"
@@ -48,17 +47,15 @@ def plain_text(lines: Iterable[Line]) -> str:
 
 
 def styled_text(lines: Iterable[Line]) -> str:
-    """Write lines for a terminal, in its colours and width; NO_COLOR is honoured."""
+    """Write lines for a terminal, in its colours; NO_COLOR is honoured."""
     from rich.console import Console
     from rich.text import Text
 
     buffer = io.StringIO()
     console = Console(file=buffer, force_terminal=True, highlight=False, markup=False, emoji=False)
-    # On a narrower terminal, and in tables, the terminal itself breaks lines, so that no figure is cut.
-    console.width = max(console.width, _NARROWEST)
     for line in lines:
         text = Text(printable(line.text), style=_STYLES[line.tone])
         for mark in line.marks:
             text.stylize(_STYLES[mark.tone], mark.start, mark.end)
-        console.print(text, soft_wrap=line.tone in ("drawn", "heading"))
+        console.print(text, soft_wrap=True)
     return buffer.getvalue()

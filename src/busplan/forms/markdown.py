@@ -24,7 +24,8 @@ from busplan.forms.blocks import (
     Table,
     Words,
 )
-from busplan.forms.columns import cell_text
+from busplan.forms.columns import cell_text, part_text
+from busplan.forms.details import shown_blocks
 from busplan.forms.lines import plain_text
 from busplan.forms.markdown_words import code, escaped, table
 from busplan.forms.numbers import with_unit
@@ -43,7 +44,7 @@ def text(report: Report) -> str:
     report
         The answer.
     """
-    blocks = report.blocks()
+    blocks = shown_blocks(report)
     level = 1 if report.is_page else _COMMENT_LEVEL
     lines = (f"{'#' * level} {_sentence(report.title)}", *_blocks(blocks, level=level + 1))
     return "\n".join(lines) + "\n"
@@ -116,7 +117,7 @@ def _sentence(sentence: Sentence) -> str:
         if is_code:
             pieces += map(_part, run)
         else:
-            words = "".join(with_unit(part) if isinstance(part, ShownValue) else cell_text(part) for part in run)
+            words = "".join(map(part_text, run))
             before, after = (" " if words[at : at + 1].isspace() else "" for at in (0, len(words) - 1))
             pieces.append(f"{before}{escaped(words)}{after}")
     return "".join(pieces).strip()
@@ -124,11 +125,9 @@ def _sentence(sentence: Sentence) -> str:
 
 def _part(part: Part) -> str:
     match part:
-        case ShownValue():
-            return escaped(with_unit(part))
         case Code():
             return code(part.text)
-    return escaped(part)
+    return escaped(part_text(part))
 
 
 def _table(one: Table) -> list[str]:

@@ -11,7 +11,6 @@ from busplan.forms.blocks import (
     Chart,
     Command,
     Facts,
-    Part,
     Question,
     Report,
     Sentence,
@@ -19,15 +18,17 @@ from busplan.forms.blocks import (
     Snippet,
     Table,
 )
-from busplan.forms.columns import cell_text, sentence_text, table_lines
+from busplan.forms.columns import part_text, sentence_line
 from busplan.forms.lines import BLANK, Line, plain_text, styled_text
 from busplan.forms.numbers import with_unit
+from busplan.forms.text_tables import table_lines
+from busplan.forms.wrapping import wrapped
 
-WIDTH: Final = 80
+_WIDTH: Final = 80
 """Width of a drawing if there is no terminal, in columns."""
 
 
-def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
+def text(report: Report, *, width: int | None = None, styled: bool = False) -> str:
     """Write an answer as lines of text.
 
     Parameters
@@ -35,16 +36,16 @@ def text(report: Report, *, width: int = WIDTH, styled: bool = False) -> str:
     report
         The answer.
     width
-        Width of drawings, in columns.
+        Width of the terminal, in columns; None without one: then no line is wrapped and no table narrowed.
     styled
         If True, write the colours of a terminal.
     """
     blocks = [Chapter(report.title, tuple(report.blocks()))] if report.is_page else report.blocks()
-    lines = block_lines(blocks, width=width)
+    lines = block_lines(blocks, width=width, is_whole=report.is_whole)
     return styled_text(lines) if styled else plain_text(lines)
 
 
-def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line]:
+def block_lines(blocks: Iterable[Block], *, width: int | None = None, is_whole: bool = False) -> Iterator[Line]:
     """Write blocks as lines, with blank lines around everything but sentences.
 
     Parameters
@@ -52,11 +53,13 @@ def block_lines(blocks: Iterable[Block], *, width: int = WIDTH) -> Iterator[Line
     blocks
         The blocks.
     width
-        Width of drawings, in columns.
+        Width of the terminal, in columns; None without one.
+    is_whole
+        If True, tables leave nothing out.
     """
     before: Block | None = None
     for block in blocks:
-        lines = _lines(block, width)
+        lines = _lines(block, width, is_whole=is_whole)
         if not lines:
             continue
         if before is not None and not _belong(before, block):
@@ -70,40 +73,45 @@ def _belong(one: Block, other: Block) -> bool:
     return any(isinstance(one, kind) and isinstance(other, kind) for kind in (Sentence | Facts, Command))
 
 
-def _lines(block: Block, width: int) -> Sequence[Line]:
+def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]:
     match block:
         case Sentence():
-            return [Line(sentence_text(block), block.state)]
+            return wrapped(sentence_line(block), width)
         case Facts():
-            facts = ", ".join(f"{name} {_part(value)}" for name, value in block.items)
-            return [Line(f"{facts}.")] if facts else []
+            facts = ", ".join(f"{name} {part_text(value)}" for name, value in block.items)
+            return wrapped(Line(f"{facts}."), width) if facts else []
         case Table():
-            return [*_caption(block.caption), *table_lines(block)]
+            return [*_caption(block.caption, width), *table_lines(block, width=width, is_whole=is_whole)]
         case Chart():
-            drawn = block.drawing.characters(width)
-            return [*_caption(block.caption), *drawn] if drawn else []
+            drawn = block.drawing.characters(width or _WIDTH)
+            return [*_caption(block.caption, width), *(_inside(line, width) for line in drawn)] if drawn else []
         case Command():
             return [Line(f"$ {block.line}", "drawn")]
         case Snippet():
             return [Line(line, "drawn") for line in block.lines]
         case Calculation():
-            return [line for number, step in enumerate(block.steps, start=1) for line in _step(number, step)]
+            return [line for number, step in enumerate(block.steps, start=1) for line in _step(number, step, width)]
         case Question():
             head = Line(f"{block.question} {block.answer.text}", block.answer.state)
-            return [head, *block_lines((*block.sentences, block.facts), width=width)]
+            inside: tuple[Block, ...] = (*block.sentences, block.facts)
+            return [*wrapped(head, width), *block_lines(inside, width=width, is_whole=is_whole)]
         case Chapter():
-            return [Line(sentence_text(block.title), "title"), *block_lines(block.blocks, width=width)]
+            title = wrapped(sentence_line(block.title)._replace(tone="title"), width)
+            return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole)]
 
 
-def _caption(caption: Sentence | None) -> list[Line]:
-    return [Line(sentence_text(caption), "title")] if caption else []
+def _inside(line: Line, width: int | None) -> Line:
+    """The line of a drawing with its last label moved to the left, if it reaches beyond the width."""
+    beyond = 0 if width is None else len(line.text) - width
+    before, gap, label = line.text.rpartition(" " * (beyond + 1)) if beyond > 0 else ("", "", "")
+    return line._replace(text=f"{before} {label}") if gap else line
 
 
-def _part(part: Part) -> str:
-    return with_unit(part) if isinstance(part, ShownValue) else cell_text(part)
+def _caption(caption: Sentence | None, width: int | None) -> list[Line]:
+    return wrapped(sentence_line(caption)._replace(tone="title"), width) if caption else []
 
 
-def _step(number: int, step: CalculationStep) -> Iterator[Line]:
+def _step(number: int, step: CalculationStep, width: int | None) -> Iterator[Line]:
     """A line in symbols, one in numbers and one with the result; empty ones are left out."""
     head = f"{number:>3}  {step.reference:<13}  {step.symbol} "
     result = with_unit(step.result) if isinstance(step.result, ShownValue) else step.result.text
@@ -111,4 +119,5 @@ def _step(number: int, step: CalculationStep) -> Iterator[Line]:
     if number > 1:
         yield BLANK
     for at, line in enumerate(distinct):
-        yield Line(f"{head if at == 0 else ' ' * len(head)}= {line}", "drawn")
+        before = f"{head if at == 0 else ' ' * len(head)}= "
+        yield from wrapped(Line(f"{before}{line}", "drawn"), width, hang=len(before))

@@ -45,10 +45,21 @@ def locate(argument: str) -> tuple[Path, str]:
         return shipped, shipped.name
     path = _path(argument)
     if not argument or not os.path.lexists(path):
-        shown = argument or repr(argument)
-        names = ", ".join(shipped_names())
-        raise BusplanError(f"{shown}: no such file, and no shipped profile of that name; shipped are {names}")
+        raise BusplanError(_unknown(argument, path))
     return path, argument
+
+
+def _unknown(argument: str, path: Path) -> str:
+    """Say that there is no such profile, and which one may be meant: a file without its ending, or a near name."""
+    from busplan.nearest import did_you_mean
+
+    shown = argument or repr(argument)
+    with_ending = path.with_name(f"{path.name}.toml") if path.name else path
+    if argument and os.path.lexists(with_ending):
+        return f"{shown}: no such file; did you mean {argument}.toml?"
+    near = did_you_mean(argument, shipped_names())
+    names = ", ".join(shipped_names())
+    return f"{shown}: no such file, and no shipped profile of that name; shipped are {names}{near and f'; {near}'}"
 
 
 def _path(argument: str) -> Path:

@@ -6,6 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
 from busplan.errors import BusplanError
+from busplan.nearest import did_you_mean
 from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
 from busplan.profile.write import value_text
@@ -177,7 +178,9 @@ def starter_text(source: str, *, name: str) -> str:
         No such shipped profile, or an invalid name.
     """
     if source not in shipped_names():
-        raise BusplanError(f"--from {source}: no shipped profile; shipped are {', '.join(shipped_names())}")
+        near = did_you_mean(source, shipped_names())
+        names = f"{', '.join(shipped_names())}{near and f'; {near}'}"
+        raise BusplanError(f"--from {source}: no shipped profile; shipped are {names}")
     path, _ = locate(source)
     document = decode(read_bytes(path, name=source), name=source)
     place = document.places["name",]

@@ -88,8 +88,8 @@ def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
     return Chapter(
         Sentence(("The timing models, side by side" if several else "The timing model",)),
         (
-            capacity.gives(capacity_table(answer.profile, answer.capacity.results)),
-            *(map(capacity.gives, [groups_table(answer.capacity.results)] if answer.profile.group else [])),
+            capacity.gives(capacity_table(answer.capacity)),
+            *(map(capacity.gives, [groups_table(answer.capacity)] if answer.profile.group else [])),
             *map(latency.gives, latency_tables(answer.latency, answer.profile)),
             capacity.line,
             latency.line,

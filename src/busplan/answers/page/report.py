@@ -105,6 +105,7 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
         lambda: tuple(_blocks(subjects)),
         lambda: _document(subjects),
         is_page=True,
+        is_whole=True,
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isnan
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.buses.bus import Bus
-from busplan.buses.figure import Figure, by_key
+from busplan.buses.figure import TIMING_MODEL, Figure, by_key
 from busplan.forms.blocks import (
     Code,
     JsonDocument,
@@ -32,18 +33,20 @@ from busplan.forms.blocks import (
 from busplan.forms.numbers import nouns
 from busplan.sections.profile import Profile
 
-_DEFAULT_COLUMNS: Final = (
-    "required_us",
-    "available_us",
-    "margin_us",
-    "margin_corrected_us",
-    "uncertainty_us",
-    "max_axes",
-    "safe_axes",
-    "safe_limited_by",
-    "verdict",
+_RANKS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "required_us": 3,
+        "available_us": 6,
+        "margin_us": 1,
+        "margin_corrected_us": 0,
+        "uncertainty_us": 2,
+        "max_axes": 4,
+        "safe_axes": 0,
+        "safe_limited_by": 5,
+        "verdict": 0,
+    }
 )
-"""Default figures of a table."""
+"""Default figures of a table, each with its `TableColumn.rank`."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
 """Default figures of circle tests."""
 
@@ -51,8 +54,8 @@ CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase
 def default_columns(profile: Profile) -> tuple[str, ...]:
     """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole."""
     if not profile.group:
-        return _DEFAULT_COLUMNS
-    whole = (key for key in _DEFAULT_COLUMNS if key not in COUNTS)
+        return tuple(_RANKS)
+    whole = (key for key in _RANKS if key not in COUNTS)
     return (*whole, *(f"group.{one.name}.safe_nodes" for one in profile.group))
 
 
@@ -262,18 +265,21 @@ def _shown(top: TopRows, tally: Tally) -> Sentence:
 def top_table(top: TopRows, bus: Bus) -> Table:
     """The top rows; headings are the names that --columns and --sort take."""
     figures = by_key((*CIRCLE_FIGURES, *bus.capacity_figures))
+    # Columns that were asked for by name stay.
+    ranks = _RANKS if all(name in top.columns for name in _RANKS if name not in COUNTS) else {}
     return Table(
-        tuple(_column(name, figures.get(name)) for name in top.columns),
+        tuple(_column(name, figures.get(name), rank=ranks.get(name, 0)) for name in top.columns),
         tuple(TableRow(tuple(_cells(row, figures))) for row in top.kept),
+        heads=top.columns.index(TIMING_MODEL.key) + 1,
     )
 
 
-def _column(name: str, figure: Figure | None) -> TableColumn:
+def _column(name: str, figure: Figure | None, *, rank: int) -> TableColumn:
     if figure is None:
         return TableColumn(name)
     # The name ends in any other unit.
     unit = "%" if figure.column == "%" else ""
-    return TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures")
+    return TableColumn(name, unit, kind="words" if figure.sort in ("word", "words") else "figures", rank=rank)
 
 
 def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:

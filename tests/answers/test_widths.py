@@ -1,0 +1,154 @@
+"""Every answer at every width of a terminal: no line is too long, and no figure is cut, changed or lost unsaid."""
+
+import re
+from collections.abc import Callable, Iterator
+from functools import cache
+
+import pytest
+
+from busplan.analysis.capacity.figures import capacity
+from busplan.analysis.capacity.sensitivity import sensitivities
+from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.circle.roundness import circle_test
+from busplan.analysis.comparison.difference import difference
+from busplan.analysis.derivation.explain import assumptions, explain
+from busplan.analysis.latency import latency
+from busplan.analysis.network import model_names
+from busplan.analysis.planning.plan import plan
+from busplan.analysis.sweep.blocks import sweep
+from busplan.analysis.sweep.grid import Listed, checked_grid
+from busplan.analysis.timeline.schedule import schedule
+from busplan.answers.assumptions import assumptions_report
+from busplan.answers.capacity import capacity_report
+from busplan.answers.circle import circle_report
+from busplan.answers.diff import diff_report
+from busplan.answers.explain import explain_report
+from busplan.answers.latency import latency_report
+from busplan.answers.plan import plan_report
+from busplan.answers.sensitivity import sensitivity_report
+from busplan.answers.sweep.top import Tally, TopRows, default_columns, sweep_report
+from busplan.answers.timeline import timeline_report
+from busplan.forms.blocks import Block, Chart, Report, Sentence, Table, TableColumn, TableRow
+from busplan.forms.terminal import block_lines, text
+from busplan.profile.shipped import load, shipped_names
+from busplan.sections.profile import Profile
+
+FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
+STEP = 15
+"""Each answer is written at every 15th width; all answers together have every width from 60 to 200."""
+
+
+def swept(profile: Profile) -> Report:
+    grid = checked_grid(
+        profile,
+        {"cycle.period_us": Listed((500, 1000, 4000)), "bus.cable_length_m": Listed((1, 4.5))},
+        with_circle=False,
+    )
+    models = model_names(profile)
+    columns = (*grid.axes, "timing_model", *default_columns(profile))
+    rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(profile, grid, models)
+    for block in sweep(profile, grid, timing_models=models):
+        rows.add(block)
+        tally.add(block)
+    return sweep_report(rows, tally, document=dict)
+
+
+def several(profile: Profile) -> Report:
+    found = capacity(profile, periods_us=[200.0, 500.0, 1000.0, 4000.0])
+    return capacity_report(found, verdicts(found))
+
+
+def moved(profile: Profile) -> Report:
+    found = capacity(profile)
+    return sensitivity_report(found, verdicts(found), sensitivities(found))
+
+
+ANSWERS: dict[str, Callable[[Profile], Report]] = {
+    "capacity": several,
+    "capacity --sensitivity": moved,
+    "latency": lambda profile: latency_report(latency(profile), profile),
+    "plan": lambda profile: plan_report(plan(profile), with_circle=False),
+    "explain": lambda profile: assumptions_report(profile, assumptions(profile)),
+    "explain margin_us": lambda profile: explain_report(explain(profile, "margin_us")),
+    "circle-test": lambda profile: circle_report(circle_test(profile), with_contributions=True),
+    "diff": lambda profile: diff_report(difference(load("paper-dma").profile, profile), arguments=("a.toml", "b.toml")),
+    "timeline": lambda profile: timeline_report(schedule(profile)),
+    "sweep": swept,
+}
+
+
+@cache
+def answer(name: str, profile: str) -> Report:
+    report = ANSWERS[name](load(profile).profile)
+    blocks = tuple(report.blocks())
+    return report._replace(blocks=lambda: blocks)
+
+
+def figures(lines: Iterator[str] | list[str]) -> set[str]:
+    return {figure for line in lines for figure in FIGURE.findall(line)}
+
+
+def words_of(report: Report) -> list[Block]:
+    """Its blocks without drawings: they have the width's own scale."""
+    return [block for block in report.blocks() if not isinstance(block, Chart)]
+
+
+@pytest.mark.parametrize("profile", shipped_names())
+@pytest.mark.parametrize("name", ANSWERS)
+def test_an_answer_fits_and_has_no_figure_that_is_cut_or_changed(name: str, profile: str) -> None:
+    report = answer(name, profile)
+    whole = figures([line.text for line in block_lines(words_of(report), is_whole=True)])
+    first = (shipped_names().index(profile) + len(shipped_names()) * list(ANSWERS).index(name)) % STEP
+    for width in (80, *range(60 + first, 201, STEP)):
+        shown = text(report, width=width).splitlines()
+        assert [line for line in shown if len(line) > width] == []
+        blocks = words_of(report)
+        left_out = figures([line.text for line in block_lines(blocks, width=width)]) - whole
+        # How many rows are left out is said, and is no figure of the answer.
+        assert {one for one in left_out if f"Not shown: {one} row" not in " ".join(shown)} == set()
+        assert figures([line.text for line in block_lines(blocks, width=width, is_whole=True)]) == whole
+
+
+TABLE = Table(
+    (
+        TableColumn("name", kind="words", wraps=True),
+        TableColumn("note", kind="words", rank=3, leaves="below", wraps=True),
+        TableColumn("eq", kind="words", rank=9),
+        *(TableColumn(f"figure {number}", "us", group=f"group {number // 2}") for number in range(6)),
+        TableColumn("last", "us", rank=1),
+    ),
+    tuple(
+        TableRow(
+            (
+                *(f"the row of number {row}", "words that say much of it", "(1)"),
+                *(f"{row}{number}{'123456.789'[: row + 4]}" for number in range(7)),
+            )
+        )
+        for row in range(1, 6)
+    ),
+    Sentence(("A caption of some words",)),
+)
+
+
+@pytest.mark.parametrize("is_whole", [False, True])
+@pytest.mark.parametrize("width", range(40, 201))
+def test_a_table_is_whole_at_every_width(width: int, is_whole: bool) -> None:
+    lines = [line.text for line in block_lines([TABLE], width=width, is_whole=is_whole)]
+    assert max(map(len, lines)) <= width
+    told = " ".join(lines)
+    for row in TABLE.rows:
+        assert all(word in told.split() for word in str(row.cells[1]).split())
+        for column, cell in zip(TABLE.columns[3:], row.cells[3:], strict=True):
+            is_left_out = f" {column.name}" in told.partition("Not shown:")[2].partition("--all")[0]
+            assert is_left_out != any(str(cell) in line.split() for line in lines)
+    assert not is_whole or "Not shown" not in told
+
+
+def test_the_largest_rank_leaves_first() -> None:
+    left_out = [
+        " ".join(line.text for line in block_lines([TABLE], width=width)).partition("Not shown: ")[2]
+        for width in (200, 120, 90, 60)
+    ]
+    assert left_out[0] == ""
+    assert left_out[1].startswith("column eq.")
+    assert left_out[-1].startswith("columns eq, last.")
