@@ -12,42 +12,57 @@ Examples
 
 from importlib import import_module
 from typing import TYPE_CHECKING
+from warnings import warn
 
 __version__ = "0.1.0"
 
 __all__ = [
     "BusplanError",
+    "CalibrateAnswer",
     "CapacityAnswer",
     "CheckAnswer",
     "CircleTestAnswer",
+    "DiffAnswer",
+    "ExplainAnswer",
     "LatencyAnswer",
+    "MapAnswer",
     "PlanAnswer",
     "Profile",
+    "ReportAnswer",
     "SweepAnswer",
     "TimelineAnswer",
-    "TradeOffAnswer",
     "__version__",
+    "calibrate",
     "capacity",
     "check",
     "circle_test",
+    "diff",
+    "explain",
     "latency",
     "load_profile",
+    "map_",
     "plan",
+    "report",
     "sweep",
     "timeline",
-    "trade_off",
 ]
 
 if TYPE_CHECKING:
+    from busplan.api.calibrate import CalibrateAnswer, calibrate
     from busplan.api.capacity import CapacityAnswer, capacity
     from busplan.api.check import CheckAnswer, check
     from busplan.api.circle import CircleTestAnswer, circle_test
+    from busplan.api.diff import DiffAnswer, diff
+    from busplan.api.explain import ExplainAnswer, explain
     from busplan.api.inputs import load_profile
     from busplan.api.latency import LatencyAnswer, latency
+    from busplan.api.map import MapAnswer, map_
+    from busplan.api.map import TradeOffAnswer as TradeOffAnswer
+    from busplan.api.map import trade_off as trade_off
     from busplan.api.plan import PlanAnswer, plan
+    from busplan.api.report import ReportAnswer, report
     from busplan.api.sweep import SweepAnswer, sweep
     from busplan.api.timeline import TimelineAnswer, timeline
-    from busplan.api.trade_off import TradeOffAnswer, trade_off
     from busplan.errors import BusplanError
     from busplan.sections.profile import Profile
 else:
@@ -57,25 +72,42 @@ else:
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",
         "load_profile": "busplan.api.inputs",
+        "CalibrateAnswer": "busplan.api.calibrate",
+        "calibrate": "busplan.api.calibrate",
         "CapacityAnswer": "busplan.api.capacity",
         "capacity": "busplan.api.capacity",
         "CheckAnswer": "busplan.api.check",
         "check": "busplan.api.check",
         "CircleTestAnswer": "busplan.api.circle",
         "circle_test": "busplan.api.circle",
+        "DiffAnswer": "busplan.api.diff",
+        "diff": "busplan.api.diff",
+        "ExplainAnswer": "busplan.api.explain",
+        "explain": "busplan.api.explain",
         "LatencyAnswer": "busplan.api.latency",
         "latency": "busplan.api.latency",
+        "MapAnswer": "busplan.api.map",
+        "map_": "busplan.api.map",
         "PlanAnswer": "busplan.api.plan",
         "plan": "busplan.api.plan",
+        "ReportAnswer": "busplan.api.report",
+        "report": "busplan.api.report",
         "SweepAnswer": "busplan.api.sweep",
         "sweep": "busplan.api.sweep",
         "TimelineAnswer": "busplan.api.timeline",
         "timeline": "busplan.api.timeline",
-        "TradeOffAnswer": "busplan.api.trade_off",
-        "trade_off": "busplan.api.trade_off",
     }
+    _RENAMED = {"trade_off": "map_", "TradeOffAnswer": "MapAnswer"}
+    """New name by old name, for one release."""
 
     def __getattr__(name: str) -> object:
+        if name in _RENAMED:
+            warn(
+                f"busplan.{name} is now called busplan.{_RENAMED[name]}; the old name goes with the next release",
+                DeprecationWarning,
+                stacklevel=2,
+            )
+            name = _RENAMED[name]
         if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         globals()[name] = value = getattr(import_module(_HOMES[name]), name)

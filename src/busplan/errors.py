@@ -41,6 +41,8 @@ class PlacedProblem(NamedTuple):
     message: str
     key: str = ""
     """Dotted key; empty if the problem has none."""
+    marked: tuple[int, int] | None = None
+    """First column of what is wrong, and the one behind its last; None if it has no end."""
 
 
 class PlacedError(BusplanError):

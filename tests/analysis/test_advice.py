@@ -15,8 +15,8 @@ from busplan.analysis.circle.check import CircleCheck
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import Change, cure
-from busplan.analysis.planning.grid import MOST_RATIO
 from busplan.analysis.planning.plan import plan
+from busplan.analysis.planning.short_numbers import MOST_RATIO
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
 from busplan.profile.document import Document

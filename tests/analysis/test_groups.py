@@ -17,11 +17,12 @@ from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.trace import value_of
 from busplan.analysis.network import bus_of, model_names, network_of
-from busplan.analysis.planning.machine import nodes_for_axes
+from busplan.analysis.planning.machine import nodes_for_axes, rooms
 from busplan.analysis.planning.plan import plan
 from busplan.analysis.sweep.axis_values import listed
 from busplan.analysis.sweep.blocks import figure_names, sweep
 from busplan.analysis.sweep.grid import checked_grid
+from busplan.buses.ieee1394.constants import PHY_DELAY_HALF_WIDTH_US
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -375,3 +376,40 @@ def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
     assert set(found.recommended.changes) == {"cycle.period_us"} | {
         f"group.{key}_bytes_per_axis" for key in ("drives.read", "drives.write", "tool.read", "tool.write")
     }
+
+
+def test_a_plan_keeps_room_in_each_group() -> None:
+    asked = override(GANTRY, {"limits.min_spare_nodes": 2, "limits.min_spare_axes": 7})
+    found = {(room.key.removeprefix("limits."), room.words): room.network.nodes for room in rooms(asked)}
+    assert found == {
+        ("min_spare_nodes", "6 nodes of drives"): 8,
+        ("min_spare_axes", "6 nodes of drives"): 8,  # 7 axes are on two nodes of five
+        ("min_spare_nodes", "3 nodes of tool"): 8,
+        ("min_spare_axes", "3 nodes of tool"): 8,
+        ("min_spare_nodes", "3 nodes of io"): 8,  # and none has axes
+    }
+
+
+# --- each node's own way ----------------------------------------------------------------------------------
+
+
+def test_each_node_is_drawn_at_its_own_hops(make: Callable[..., Profile]) -> None:
+    profile = make(bus__nodes=4, bus__charge_hops="own")
+    hop_us = 0.023 + 14 / 98.304
+    first_us: dict[int, float] = {}
+    for event in cycle_of(profile, model="standard").events():
+        if event.kind == "arbitration" and event.transaction == "read" and event.node is not None:
+            first_us.setdefault(event.node, event.us)
+    assert list(first_us) == [1, 2, 3, 4]
+    steps_us = [first_us[node + 1] - first_us[node] for node in (1, 2, 3)]
+    assert steps_us == pytest.approx([hop_us] * 3, rel=1e-9)
+
+
+def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(make: Callable[..., Profile]) -> None:
+    """Three nodes: 1 + 2 + 3 hops instead of 3 * 3, for the six parts of a read's and of a write's packets."""
+    own, farthest = (
+        next(doubt for doubt in cycle_of(one, model="standard").doubts() if doubt.key == "bus.phy_delay_us")
+        for one in (make(bus__nodes=3, bus__charge_hops="own"), make(bus__nodes=3))
+    )
+    each_us = float(PHY_DELAY_HALF_WIDTH_US) / 3**0.5
+    assert farthest.us - own.us == pytest.approx(12 * (9 - 6) * each_us, rel=1e-9)

@@ -17,9 +17,9 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import cure
 from busplan.analysis.planning.constraints import needs
 from busplan.analysis.planning.freedoms import freed
-from busplan.analysis.planning.grid import Grid
 from busplan.analysis.planning.plan import plan
 from busplan.analysis.planning.search import Search
+from busplan.analysis.planning.short_numbers import ShortNumbers
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
 from busplan.errors import BusplanError
@@ -174,7 +174,7 @@ def test_no_cheaper_point_of_a_grid_passes(data: st.DataObject, make: Make) -> N
             "limits.max_utilisation": data.draw(st.sampled_from([None, 0.6])),
         },
     )
-    grid, found = Grid(1.0, 3), least(profile, names)
+    grid, found = ShortNumbers(1.0, 3), least(profile, names)
     longest_us = (found or {}).get("cycle.period_us", own_us)
     # Up to the one that was found, and beyond: it is the first that passes.
     last = grid.place(longest_us) + 2
@@ -391,7 +391,7 @@ def test_what_cannot_be_freed_is_said(make: Make, free: list[str], wanted: dict[
 
 @given(step=st.sampled_from([0.1, 1.0, 12.5, 100.0, 333.3]), digits=st.integers(1, 4), number=st.floats(0.0, 1e9))
 def test_a_grid_has_the_smallest_number_that_is_no_less(step: float, digits: int, number: float) -> None:
-    grid = Grid(step, digits)
+    grid = ShortNumbers(step, digits)
     place = grid.place(number)
     assert grid.number(place) >= number * (1 - 1e-11)
     assert place == 1 or grid.number(place - 1) < number

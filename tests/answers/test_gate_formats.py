@@ -21,12 +21,15 @@ from pydantic_sarif.model import StaticAnalysisResultsFormatSarifVersion210JsonS
 
 from busplan.answers.check import check_report
 from busplan.answers.gate import FORMATS, GateFormat, gate_format
+from busplan.answers.gate.full import Full
+from busplan.answers.gate.plain import Concise
+from busplan.buses.rule import RuleProblem
 from busplan.forms import csv_rows, html, markdown, terminal
 from busplan.forms.blocks import Report, Sentence
-from busplan.profile.document import Document
+from busplan.profile.document import Document, Spot
 from busplan.profile.schema import profile_schema
 from busplan.profile.shipped import load, shipped_names
-from busplan.rules.finding import Finding
+from busplan.rules.finding import Finding, finding_of
 from busplan.rules.gate import FileResult, check_document
 from busplan.rules.registry import all_rules
 from busplan.rules.report import CheckReport
@@ -63,9 +66,15 @@ def render(found: CheckReport, *, file_format: str) -> str:
     return gate_format(file_format).write(found)
 
 
+def finding_at(spot: Spot, *, words: str = "message", code: str = "BP002", **mending: Any) -> Finding:
+    rule = all_rules()[code]
+    return finding_of(rule, RuleProblem("key", words, **mending), spot, words=words)
+
+
 def hostile() -> Iterator[FileResult]:
     for number, name in enumerate(HOSTILE):
-        finding = Finding("BP002", "unknown-key", "error" if number % 2 else "warning", name, name, 1, 1)
+        code, cure = ("BP002" if number % 2 else "BP110"), (f"{name} = 1",)
+        finding = finding_at(Spot(1, 1, 1, 2), words=name, code=code, help=name, cure=cure)
         yield FileResult(name, name, (finding, finding), {}, (name, name))
     yield FileResult("gone\n.toml", None, (), {}, failure="gone\n.toml: no\x1bsuch, file: 100 %")
 
@@ -85,9 +94,11 @@ def mixed() -> CheckReport:
 
 def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
     made = [gate_format(name) for name in FORMATS]
-    assert len({type(one) for one in made}) == len(made) == 7
     assert all(isinstance(one, GateFormat) for one in made)
-    assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["text", "full"]
+    # The old name of concise is the one name too many.
+    assert type(gate_format("text")) is type(gate_format("concise"))
+    assert len({type(one) for one in made}) == len(made) - 1 == 8
+    assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["concise", "full", "text"]
     # Each in a process of its own, which has loaded what none of them goes without.
     code = (
         "import os, sys; from busplan.answers.gate import FORMATS, gate_format\n"
@@ -113,7 +124,7 @@ def test_the_answer_says_findings_failures_and_what_they_add_up_to(
 ) -> None:
     answer = check_report(mixed)
     assert terminal.text(answer).splitlines() == [
-        *render(mixed, file_format="text").splitlines(),
+        *render(mixed, file_format="concise").splitlines(),
         "gone.toml: no such file",
         "checked 3 profiles: 2 errors, 1 warning; 1 could not be checked",
     ]
@@ -135,7 +146,7 @@ def test_the_answer_takes_every_name_in_every_form() -> None:
     assert len(terminal.text(answer).splitlines()) == 2 * len(HOSTILE) + 2
     rows = list(csv.DictReader(io.StringIO(csv_rows.text(answer), newline="")))
     assert len(rows) == 2 * len(HOSTILE)
-    assert {row["code"] for row in rows} == {"BP002"}
+    assert {row["code"] for row in rows} == {"BP002", "BP110"}
     assert "<b>&" not in html.page(answer)
     assert "::error::a.toml:1:1:" in markdown.text(answer)
 
@@ -155,10 +166,22 @@ def test_json_holds_the_contract(mixed: CheckReport) -> None:
         ("gone.toml", None, "error"),
     ]
     for one in document["files"]:
-        assert set(one) - {"failure"} == {"path", "profile", "status", "findings"}
+        own = {"path", "profile", "status", "verdict", "margin_corrected_us", "uncertainty_us", "findings"}
+        assert set(one) - {"failure"} == own
+        assert (one["verdict"] is None) == (one["profile"] is None) == (one["uncertainty_us"] is None)
+    assert [one["verdict"] for one in document["files"][:2]] == ["fits", "does not fit"]
     (first, second) = document["files"][1]["findings"]
-    assert list(first) == ["code", "rule", "severity", "message", "key", "line", "column"]
+    assert list(first) == [
+        *("code", "rule", "severity", "message", "key", "line", "column", "marked_column", "marked_end_column"),
+        *("problem", "help", "cure"),
+    ]
     assert (first["code"], first["key"], first["line"], first["column"]) == ("BP110", "bus.gap_count", 7, 1)
+    assert (first["marked_column"], first["marked_end_column"]) == (13, 15)  # gap_count = 63
+    assert (first["help"], first["cure"]) == (None, None)
+    assert first["message"] == first["problem"]
+    assert second["cure"].endswith("\nbus.gap_count = 7")
+    joined = second["cure"].replace("\n", ", ")
+    assert second["message"] == f"{second['problem']}; cheapest cure: {joined}"
     assert (second["rule"], second["severity"]) == ("slice-overrun", "error")
     assert document["files"][3]["failure"] == "gone.toml: no such file"
 
@@ -179,40 +202,67 @@ def test_no_name_breaks_a_format(format_: str) -> None:
         assert not re.search(r"[\x7f-\x9f\u2028]", written)
     if format_ == "junit":
         ET.fromstring(written)
-    if format_ in ("text", "github"):
+    if format_ in ("concise", "text", "github"):
         assert len(written.splitlines()) == 2 * len(HOSTILE)
 
 
 @pytest.mark.parametrize("format_", FORMATS)
 def test_nothing_at_all_is_still_a_document(format_: str) -> None:
     text = render(report(), file_format=format_)
-    assert (text == "") == (format_ in ("text", "full", "github"))
+    assert (text == "") == (format_ in ("concise", "text", "full", "github"))
 
 
-# full
+# concise and full
 
 
-def full_of(source: str, column: int) -> list[str]:
-    finding = Finding("BP002", "unknown-key", "error", "message", "key", 12, column)
+def full_of(source: str, column: int, end: int | None = None, **mending: Any) -> list[str]:
+    finding = finding_at(Spot(12, column, column, end or column + 1), **mending)
     return render(report(FileResult("a.toml", None, (finding,), {}, (source,))), file_format="full").split("\n")
 
 
-def test_full_shows_the_line_with_a_caret() -> None:
-    assert full_of("nodes = 2", 9) == [
-        "a.toml:12:9: BP002 message",
+def test_full_underlines_the_value_and_says_the_cure_on_a_line_of_its_own() -> None:
+    cure = ("bus.gap_count = 7", "cycle.slice_ratio = 0.7417")
+    assert full_of("nodes = 24", 9, 11, help="mend it", cure=cure) == [
+        "a.toml:12:9: BP002 error: message",
         "   |",
-        "12 | nodes = 2",
-        "   |         ^ unknown-key (error)",
+        "12 | nodes = 24",
+        "   |         ^^ unknown-key",
+        "help: mend it",
+        "cheapest cure:",
+        "    bus.gap_count = 7",
+        "    cycle.slice_ratio = 0.7417",
         "",
         "",
     ]
 
 
 @pytest.mark.parametrize(
+    ("text", "marked"),
+    [
+        (WARNS, "63"),  # the value, not the key
+        (CLEAN.replace("axes = 4", "axes = 0"), "0"),
+        (CLEAN.replace("axes = 4", 'axes = "a  b"'), '"a  b"'),
+        (CLEAN.replace("axes = 4", "axis = 4"), "axis"),  # what is no key has no value that counts
+        (CLEAN.replace("axes = 4\n", ""), "node"),  # the table that lacks it
+        (CLEAN.replace('gap_count = "optimal"\n', ""), "bus"),
+        (CLEAN.replace("axes = 4", "axes = [\n4,\n5]"), "["),  # the first line of several
+        (CLEAN.replace("nodes = 2", "nodes = 2  # busplan: ignore[BP110]  "), "# busplan: ignore[BP110]"),
+        (CLEAN.replace("nodes = 2", "nodes = "), ""),  # the end of a line
+    ],
+)
+def test_what_is_marked_is_what_is_wrong(text: str, marked: str) -> None:
+    result = checked(text)
+    for finding, source in zip(result.findings, result.source, strict=True):
+        if source[finding.marked_column - 1 : finding.marked_end_column - 1] == marked:
+            return
+    raise AssertionError(result.findings)
+
+
+@pytest.mark.parametrize(
     ("source", "column", "shown", "indent"),
     [
-        ("\t\tnodes = 2", 3, "\t\tnodes = 2", "\t\t"),
-        ("a\tb = 2", 3, "a\tb = 2", " \t"),
+        ("\t\tnodes = 2", 3, "        nodes = 2", "        "),
+        ("a\tb = 2", 3, "a    b = 2", "     "),
         ("日本 = 2", 3, "日本 = 2", "    "),
         ("e\u0301 = 2", 3, "e\u0301 = 2", " "),
         ("ü = 2", 3, "ü = 2", "  "),
@@ -223,20 +273,106 @@ def test_full_shows_the_line_with_a_caret() -> None:
 )
 def test_the_caret_stands_below_its_column(source: str, column: int, shown: str, indent: str) -> None:
     _, _, line, caret, *_ = full_of(source, column)
-    assert line == f"12 | {shown}"
-    assert caret == f"   | {indent}^ unknown-key (error)"
+    assert line == f"12 | {shown}".rstrip()
+    assert caret == f"   | {indent}^ unknown-key"
 
 
 @pytest.mark.parametrize("column", [1, 50, 5_000, 99_990, 100_001])
 def test_a_very_long_line_is_shown_around_its_column(column: int) -> None:
     source = "".join(chr(ord("a") + number % 26) for number in range(100_000))
     _, _, line, caret, *_ = full_of(source, column)
-    assert len(line) < 180
+    assert len(line) <= 100
     at = caret.index("^")
     assert line[at : at + 3] == source[column - 1 : column + 2][: len(line) - at]
     assert line.removeprefix("12 | ").strip(".") in source
-    assert line.startswith("12 | ...") == (column > 100)
+    assert line.startswith("12 | ...") == (column > 40)
     assert line.endswith("...") == (column < 99_000)
+
+
+def test_a_very_long_value_is_marked_as_far_as_it_is_shown() -> None:
+    source = f"x = [{'1, ' * 500}]"
+    _, _, line, caret, *_ = full_of(source, 5, len(source) + 1)
+    assert len(line) <= 100 >= len(caret)
+    assert caret.count("^") > 50
+    assert line[caret.index("^")] == "["
+
+
+LONG = "the cycle needs 348.5 us of 250.0 us, corrected margin -98.5 +/- 6.3 us, " * 3
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 300])
+def test_full_keeps_to_the_width_and_breaks_no_figure(width: int) -> None:
+    finding = finding_at(Spot(12, 1, 1, 2), words=LONG, help=LONG)
+    found = report(FileResult("a.toml", None, (finding,), {}, ("nodes = 2  # " + "x" * 200,)))
+    shown = without_colours(Full().on_terminal(found, width=width)).splitlines()
+    assert max(map(len, shown)) <= min(width, 100)
+    assert shown[0].startswith("a.toml:12:1: BP002 error: the")
+    assert not any(
+        re.search(r"[0-9]$", line) or re.match(r" +(us|\+/-)", line) for line in shown[:-5] if "|" not in line
+    )
+    if width == 100:
+        assert shown == render(found, file_format="full").splitlines()
+
+
+def without_colours(text: str) -> str:
+    return re.sub(r"\x1b\[[0-9;]*m", "", text)
+
+
+def test_a_terminal_has_severities_in_colour_and_in_words(mixed: CheckReport, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("NO_COLOR", "COLORTERM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    for made in (Concise(), Full()):
+        coloured = made.on_terminal(mixed, width=100)
+        assert without_colours(coloured) == made.write(mixed)
+        assert "\x1b[33mBP110 warning\x1b[0m" in coloured
+        assert "\x1b[1;31mBP101 error\x1b[0m" in coloured
+        assert "\x1b[1mp/fails.toml:7:1: \x1b[0m" in coloured
+    assert "\x1b[33m^^ gap-count-wasteful\x1b[0m" in Full().on_terminal(mixed, width=100)
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert not re.search(
+        r"\x1b\[(?:1;)?3", Full().on_terminal(mixed, width=100) + Concise().on_terminal(mixed, width=80)
+    )
+
+
+def test_concise_is_a_line_a_finding_whatever_the_width(mixed: CheckReport) -> None:
+    lines = without_colours(Concise().on_terminal(mixed, width=40)).splitlines()
+    assert len(lines) == len(mixed.located)
+    for line in lines:
+        assert re.match(r"[^:]+:\d+:\d+: BP\d+ (?:error|warning): ", line)
+
+
+# Markdown
+
+
+def test_markdown_has_a_verdict_for_each_profile(mixed: CheckReport) -> None:
+    lines = render(mixed, file_format="markdown").splitlines()
+    assert lines[:8] == [
+        "### Check of profiles",
+        "",
+        "checked 3 profiles\\: 2 errors, 1 warning; 1 could not be checked",
+        "",
+        "| profile | result | verdict | corrected margin, us |",
+        "| :--- | :--- | :--- | ---: |",
+        "| `p/clean.toml` | passes | fits | 1806.3 +/- 11.4 |",
+        "| `p/fails.toml` | **1 error, 1 warning** | does not fit | -109.8 +/- 4.3 |",
+    ]
+    assert lines[8:10] == [
+        "| `p/broken.toml` | **1 error** | - | - |",
+        "| `gone.toml` | **could not be checked**: gone.toml\\: no such file | - | - |",
+    ]
+    assert lines[11] == "| place | rule | severity | what is wrong | how to mend it |"
+    assert lines[13].startswith("| `p/fails.toml:7:1` | BP110 gap-count-wasteful | warning | bus.gap\\_count\\: ")
+    assert lines[13].endswith(" |  |")
+    assert lines[14].endswith(" | `cycle.slice_ratio = 0.69`<br>`bus.gap_count = 7` |")
+
+
+def test_markdown_of_hostile_names_is_a_table_still() -> None:
+    lines = render(report(*hostile()), file_format="markdown").splitlines()
+    for line in lines:
+        if line.startswith("|"):
+            assert len(re.findall(r"(?<!\\)\|", line)) in (5, 6)
+    assert not any("<b>" in line.replace("`a<b>", "") and "`" not in line for line in lines)
 
 
 # GitHub
@@ -270,7 +406,7 @@ def test_github_commands_say_file_line_and_message(mixed: CheckReport) -> None:
 
 @pytest.mark.parametrize("name", ["100% of, it: a\r\nb.toml", "::error::a.toml", "%0A.toml", "a,line=9.toml"])
 def test_github_reads_hostile_names_as_they_are(name: str) -> None:
-    finding = Finding("BP002", "unknown-key", "error", f"{name}: unknown", name, 3, 4)
+    finding = finding_at(Spot(3, 4, 4, 5), words=f"{name}: unknown")
     text = render(report(FileResult(name, None, (finding,), {}, ("",))), file_format="github")
     assert text.count("\n") == 1
     level, properties, message = github_command(text.removesuffix("\n"))
@@ -383,7 +519,17 @@ def test_sarif_results_point_to_their_rules(mixed: CheckReport) -> None:
         }
     ]
     region = run["results"][0]["locations"][0]["physicalLocation"]["region"]
-    assert region == {"startLine": 7, "startColumn": 1}
+    assert region == {"startLine": 7, "startColumn": 1, "endColumn": 15}
+    assert [result.get("properties") for result in run["results"]] == [
+        None,
+        {"cure": "cycle.slice_ratio = 0.69\nbus.gap_count = 7"},
+        None,
+    ]
+    page = rules[run["results"][0]["ruleIndex"]]["help"]
+    assert page["text"].startswith("BP110 gap-count-wasteful (warning): ")
+    assert page["markdown"].startswith("### `BP110` gap-count-wasteful\n")
+    assert "ignore[BP110] reason" in page["text"]
+    assert "ignore[BP110] reason" in page["markdown"]
     assert run["columnKind"] == "unicodeCodePoints"
 
 

@@ -390,7 +390,7 @@ def test_signed_bars_share_one_zero() -> None:
 
 # --- colours ----------------------------------------------------------------------------------------------
 
-STYLE = (files("busplan.forms") / "templates" / "style.css").read_text(encoding="utf-8")
+STYLE = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
 SCHEMES = [
     dict(re.findall(r"--([\w-]+): (#\w{6})", block)) for block in re.findall(r":root \{(.*?)\}", STYLE, re.DOTALL)
 ]
@@ -421,3 +421,19 @@ def test_letters_can_be_read_on_their_bars() -> None:
     for term in (*TERMS, LEFT):
         for letter, colour in zip(letters[term.ink], INKS[term.ink], strict=True):
             assert contrast(letter, colour) >= 4.5, term
+
+
+def test_what_is_assumed_is_said_before_any_figure_that_rests_on_it() -> None:
+    page = render(made(load("gantry-24").profile), "html")
+    words, figure = page.index("are assumed: nobody has measured"), page.index("Does the cycle fit its period?")
+    assert words < figure
+    assert "<bdi>group.drives.execution.base_us</bdi>" in page[:figure]
+    measured = override(load("paper-two-node").profile, {"node.execution.grade": "measured"})
+    assert "assumed: nobody has measured" not in render(made(measured), "html")
+
+
+def test_a_warning_looks_like_one_in_a_card_of_what_passes() -> None:
+    page = render(made(load("gantry-24").profile), "html")
+    card = page.partition('<div class="judged passes">')[2].partition("</div>\n</div>")[0]
+    assert '<p class="warns">After a bus reset' in card
+    assert re.search(r"\.lines p\.warns[^{]*\{[^}]*border-left", page)

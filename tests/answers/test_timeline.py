@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.timeline.schedule import Schedule, schedule, totals, zoom
 from busplan.answers.timeline import (
     headline,
@@ -100,7 +101,8 @@ def test_a_drawing_is_to_scale() -> None:
     strip = row(lines, "cycle")
     for mark, kinds in {"R": "read", "W": "write", "~": "idle"}.items():
         part_us = sum(part.event.duration_us for part in stretches(one.events) if part.kind == kinds)
-        assert strip.count(mark) == pytest.approx(part_us / one.end_us * len(strip), abs=1.01)
+        assert strip.count(mark) == pytest.approx(part_us / 4000 * len(strip), abs=1.01)
+    assert strip.count("-") == pytest.approx(len(strip) / 2, abs=1.01)
     for number in range(1, 9):
         own = [event for event in one.events if event.node == number]
         lane = row(lines, f"node {number}")
@@ -123,8 +125,9 @@ def test_an_overrun_is_said_and_seen() -> None:
     assert lines[0] == f"paper-4ms at 300 us: {said}"
     assert headline(one).state == "fails"
     over = row(lines, "over")
-    assert over.lstrip() == "!" * over.count("!")
-    assert over.count("!") / len(over) == pytest.approx(57.117 / 207.117, abs=0.03)
+    assert over.strip() == "!" * over.count("!")
+    for name, beyond_us in {"over": 57.117, "paper": 57.117, "standard": 113.320}.items():
+        assert row(lines, name).count("!") / len(over) == pytest.approx(beyond_us / 300, abs=0.03)
     assert "idle" not in "\n".join(lines)
     assert "crit" in timeline_mermaid(one)
     assert "beyond the slice, 57.117 us: 150.000 to 207.117 us" in timeline_svg(one)
@@ -134,6 +137,36 @@ def test_an_overrun_is_said_and_seen() -> None:
     whole = "\n".join(drawn(plan()))
     assert "beyond" not in whole + timeline_svg(plan())
     assert "crit" not in timeline_mermaid(plan())
+
+
+@pytest.mark.parametrize("period_us", [4000.0, 550.0, 500.0, 300.0, 250.0, 100.0])
+def test_the_period_is_whole_with_its_slice_and_both_margins(period_us: float) -> None:
+    one = plan(cycle__period_us=period_us)
+    found = {each.timing_model: each for each in capacity(one.profile).results}
+    assert [each["margin_us"] for each in timeline_document(one)["margins"]] == [
+        each.margin_us for each in found.values()
+    ]
+    lines, drawn_svg = drawn(one), timeline_svg(one)
+    end_us = max(period_us, *(each.required_us for each in found.values()))
+    assert lines[4].startswith(f"The period of {period_us:.3f} us")
+    rects = {
+        rect.findtext(f"{SVG}title") or "": (rect.get("x") or "", rect.get("width") or "")
+        for rect in ET.fromstring(drawn_svg).iter(f"{SVG}rect")
+    }
+    for model, each in found.items():
+        margin = f"margin {each.margin_us:.3f} us" if each.margin_us >= 0 else f"{-each.margin_us:.3f} us short"
+        words = f"{model}: {each.required_us:.3f} us needed, {margin}"
+        assert words in drawn_svg
+        assert f"{each.margin_us:.3f} us by the {model} model" in lines[1]
+        bars = row(lines, model)
+        share = min(each.required_us, each.available_us) / end_us
+        assert bars.count("#") / len(bars) == pytest.approx(share, abs=0.03)
+        assert bars.count(".") / len(bars) == pytest.approx(max(0, each.margin_us) / end_us, abs=0.03)
+        (width,) = (width for title, (_, width) in rects.items() if title.startswith(f"needed by the {model} model"))
+        assert float(width.rstrip("%")) == pytest.approx(100 * share, rel=1e-3)
+    behind = [x for title, (x, _) in rects.items() if title.startswith("rest of the period,")]
+    assert len(behind) == (period_us > one.end_us)
+    assert [float(x.rstrip("%")) for x in behind] == pytest.approx([100 * one.end_us / end_us] * len(behind), rel=1e-3)
 
 
 def test_an_unsafe_gap_count_is_warned_of() -> None:
@@ -146,7 +179,7 @@ def test_a_single_transaction_is_drawn_event_by_event() -> None:
     lines = drawn(zoom(plan(), transaction=("write", 2)))
     assert any(line.startswith("The write of node 2, 155.438 to 207.117 us") for line in lines)
     assert re.search(r"^node execution +36\.733 \| +=+ +\|$", "\n".join(lines), re.MULTILINE)
-    assert row(lines, "window").strip() == "^^^"
+    assert row(lines, "window").strip() == "^^"
     short = drawn(zoom(plan(), from_us=10.0, to_us=10.001))
     assert row(short, "window").strip() == "^"
 
@@ -231,7 +264,8 @@ def test_figures_of_the_answer_stand_in_its_document(
     short = not one.figures.fits
     head = ["period_us", "required_us", "available_us"] if short else ["period_us", "margin_us", "available_us"]
     caption = ["nodes", "from_us"] if one.is_whole and not short else ["nodes", "from_us", "to_us"]
-    assert values_in_their_places(timeline_report(one)) == len(head + caption) + 3 * len(totals(one))
+    # The margin under each timing model, too.
+    assert values_in_their_places(timeline_report(one)) == len(head + caption) + 2 + 3 * len(totals(one))
     placed = [value.key for value in values_in(headline(one)) if value.at]
     assert sorted(placed) == sorted(head)
     assert [value.key for value in values_in(timeline_chart(one)) if value.at] == caption

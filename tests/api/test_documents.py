@@ -21,49 +21,70 @@ EVERY: dict[str, Callable[[str], Answer]] = {
     "plan": busplan.plan,
     "timeline": busplan.timeline,
     "check": busplan.check,
-    "map": busplan.trade_off,
+    "map": busplan.map_,
+    "explain": busplan.explain,
+    "report --no-circle": lambda profile: busplan.report(profile, circle=False),
     "sweep --vary bus.nodes=1:4 --vary bus.gap_count=63,optimal": lambda profile: busplan.sweep(
         profile, vary={"bus.nodes": range(1, 5), "bus.gap_count": [63, "optimal"]}
     ),
 }
 OPTIONS: dict[str, Callable[[], Answer]] = {
     "latency paper-4ms --payload 4,16 --timing standard": lambda: busplan.latency(
-        "paper-4ms", payloads_bytes=[4, 16], timing_models=["standard"]
+        "paper-4ms", payload_bytes=[4, 16], timing_model=["standard"]
     ),
     "latency paper-4ms --nodes 5 --gap-count optimal": lambda: busplan.latency(
         busplan.load_profile("paper-4ms", changes={"bus.nodes": 5, "bus.gap_count": "optimal"})
     ),
     "capacity paper-1ms --period 600us --period 0.25ms --timing paper": lambda: busplan.capacity(
-        "paper-1ms", periods_us=[600, 250], timing_models=["paper"]
+        "paper-1ms", period_us=[600, 250], timing_model="paper"
     ),
     "circle-test paper-4ms --period 4ms --period 100us --contributions": lambda: busplan.circle_test(
-        "paper-4ms", periods_us=[4000, 100], with_contributions=True
+        "paper-4ms", period_us=[4000, 100], contributions=True
     ),
     "circle-test paper-1ms --feed 10000 --radius 20": lambda: busplan.circle_test(
         busplan.load_profile("paper-1ms", changes={"circle.feed_mm_per_min": 10000.0, "circle.radius_mm": 20.0})
     ),
-    "plan paper-1ms --axes 15 --no-circle": lambda: busplan.plan("paper-1ms", axes=15, with_circle=False),
+    "plan paper-1ms --axes 15 --no-circle": lambda: busplan.plan("paper-1ms", axes=15, circle=False),
     "plan paper-1ms --nodes 6 --period 500us --gap-count 63 --max-circles 2": lambda: busplan.plan(
         "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
     ),
     "plan paper-1ms --axes 28 --reserve 12.5% --free responses,gap_count --no-circle": lambda: busplan.plan(
-        "paper-1ms", axes=28, reserve=0.125, free=["gap_count", "responses"], with_circle=False
+        "paper-1ms", axes=28, reserve=0.125, free=["gap_count", "responses"], circle=False
     ),
     "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
         "paper-1ms", timing_model="standard", from_us=50, to_us=100
     ),
-    "map paper-1ms --x axes=4:16:4 --y bus.gap_count=7,63,optimal": lambda: busplan.trade_off(
+    "map paper-1ms --x axes=4:16:4 --y bus.gap_count=7,63,optimal": lambda: busplan.map_(
         "paper-1ms", x={"axes": range(4, 17, 4)}, y={"bus.gap_count": [7, 63, "optimal"]}
     ),
     "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
-    "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], with_circle=False),
+    "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], circle=False),
     "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing paper": lambda: busplan.sweep(
-        "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_models=["paper"]
+        "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_model="paper"
     ),
     "sweep paper-4ms --vary circle.radius_mm=10,20 --vary cycle.period_us=200,4000 --circle --jobs 1": lambda: (
-        busplan.sweep(
-            "paper-4ms", vary={"circle.radius_mm": [10, 20], "cycle.period_us": [200.0, 4000.0]}, with_circle=True
+        busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10, 20], "cycle.period_us": [200.0, 4000.0]}, circle=True)
+    ),
+    "diff paper-1ms paper-optimal-gap": lambda: busplan.diff("paper-1ms", "paper-optimal-gap"),
+    "diff paper-4ms paper-dma --timing standard --no-circle": lambda: busplan.diff(
+        "paper-4ms", "paper-dma", timing_model="standard", circle=False
+    ),
+    "explain paper-4ms required_us --period 1ms --period 500us --timing both": lambda: busplan.explain(
+        "paper-4ms", "required_us", period_us=[1000, 500], timing_model=["paper", "standard"]
+    ),
+    "explain paper-4ms latency.latency_us --transaction read --timing standard": lambda: busplan.explain(
+        "paper-4ms", "latency.latency_us", transaction="read", timing_model="standard"
+    ),
+    "calibrate paper-two-node table-1.csv --form linear --robust --keep-outliers --timing paper": lambda: (
+        busplan.calibrate(
+            "paper-two-node", "table-1.csv", form="linear", robust=True, keep_outliers=True, timing_model="paper"
         )
+    ),
+    "report paper-4ms paper-1ms --no-circle --title Two": lambda: busplan.report(
+        ["paper-4ms", "paper-1ms"], circle=False, title="Two"
+    ),
+    "report paper-4ms --set bus.nodes=3 --no-circle": lambda: busplan.report(
+        busplan.load_profile("paper-4ms", changes={"bus.nodes": 3}), circle=False
     ),
 }
 

@@ -10,8 +10,8 @@ import pytest
 import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "scipy", "tomllib", "tomli_w", "json"}
-FUNCTIONS = ("load_profile", "latency", "capacity", "circle_test", "sweep", "plan", "timeline", "check", "trade_off")
-WITH_NUMPY = ("circle_test", "sweep", "trade_off")
+FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
+WITH_NUMPY = ("circle_test", "sweep", "map_", "report")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
 
 
@@ -48,8 +48,11 @@ def test_what_simulates_nothing_loads_no_numpy() -> None:
         "latency('paper-4ms')",
         "capacity('paper-4ms', sensitivity=True)",
         "timeline('paper-4ms')",
-        "plan('paper-4ms', with_circle=False)",
-        "check('paper-4ms', with_circle=False)",
+        "plan('paper-4ms', circle=False)",
+        "check('paper-4ms', circle=False)",
+        "diff('paper-4ms', 'paper-dma', circle=False)",
+        "explain('paper-4ms', 'required_us')",
+        "calibrate('paper-two-node', 'table-1.csv')",
     ]
     program = "".join(f"\nstr(busplan.{call}.to_dict())" for call in calls)
     assert not loaded(f"import busplan{program}") & {"numpy", "typer", "rich", "matplotlib"}

@@ -29,7 +29,7 @@ def test_a_shipped_name_is_the_shipped_profile_and_a_path_the_file(own: Path) ->
     for path in (own, own.absolute(), "./paper-4ms", str(own.absolute())):
         assert busplan.load_profile(path).bus.nodes == 5
         assert busplan.capacity(path).results[0].nodes == 5
-    (file,) = busplan.check(own, with_circle=False).files
+    (file,) = busplan.check(own, circle=False).files
     assert (file.path, file.status) == ("paper-4ms", "ok")
 
 
@@ -49,11 +49,13 @@ def test_changes_are_checked_and_numbers_of_numpy_are_numbers() -> None:
 
 
 def test_arrays_ranges_and_lists_are_the_same_values() -> None:
-    wanted = busplan.capacity("paper-4ms", periods_us=[500.0, 750.0, 1000.0])
+    wanted = busplan.capacity("paper-4ms", period_us=[500.0, 750.0, 1000.0])
     for periods in (range(500, 1001, 250), np.arange(500, 1001, 250), np.linspace(500, 1000, 3), (500, 750, 1000)):
-        assert busplan.capacity("paper-4ms", periods_us=periods).to_json() == wanted.to_json()
-    sizes = busplan.latency("paper-4ms", payloads_bytes=np.array([4, 16]))
-    assert sizes == busplan.latency("paper-4ms", payloads_bytes=[4, 16])
+        assert busplan.capacity("paper-4ms", period_us=periods).to_json() == wanted.to_json()
+    for one in (500, 500.0, np.float64(500), np.array(500.0)):
+        assert busplan.capacity("paper-4ms", period_us=one).results == wanted.results[:2]
+    sizes = busplan.latency("paper-4ms", payload_bytes=np.array([4, 16]))
+    assert sizes == busplan.latency("paper-4ms", payload_bytes=[4, 16])
 
 
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
@@ -74,41 +76,40 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.load_profile("paper-4ms", changes={"bus.nodes": 0}),
         "bus.nodes 0: must be 1 or more",
     ),
-    "one period": (lambda: busplan.capacity("paper-4ms", periods_us=500), "periods_us 500: expected several values"),  # type: ignore[arg-type]
     "a period in words": (
-        lambda: busplan.circle_test("paper-4ms", periods_us="4ms"),  # type: ignore[arg-type]
-        "periods_us '4ms': expected several values, as a list",
+        lambda: busplan.circle_test("paper-4ms", period_us="4ms"),  # type: ignore[arg-type]
+        "period 4ms: expected a number",
     ),
-    "no period": (lambda: busplan.capacity("paper-4ms", periods_us=[]), "periods_us: no values; give at least one"),
-    "a period that is none": (lambda: busplan.capacity("paper-4ms", periods_us=[0]), "period 0: must be 0.001 or more"),
-    "a period without end": (lambda: busplan.capacity("paper-4ms", periods_us=[np.inf]), "period inf: must be finite"),
-    "no model": (lambda: busplan.capacity("paper-4ms", timing_models=[]), "timing_models: no values"),
-    "one model as a word": (
-        lambda: busplan.capacity("paper-4ms", timing_models="paper"),
-        "timing_models 'paper': expected several values, as a list",
+    "no period": (lambda: busplan.capacity("paper-4ms", period_us=[]), "period_us: no values; give at least one"),
+    "a period that is none": (lambda: busplan.capacity("paper-4ms", period_us=[0]), "period 0: must be 0.001 or more"),
+    "a period without end": (lambda: busplan.capacity("paper-4ms", period_us=[np.inf]), "period inf: must be finite"),
+    "no model": (lambda: busplan.capacity("paper-4ms", timing_model=[]), "timing_model: no values"),
+    "another model as a word": (
+        lambda: busplan.capacity("paper-4ms", timing_model="both"),
+        "timing_model 'both': expected 'paper' or 'standard', or a list of them, each once",
     ),
     "another model": (
-        lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, timing_models=["both"]),
-        "timing_models ['both']: expected 'paper' or 'standard', each once, in a list",
+        lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, timing_model=["both"]),
+        "timing_model ['both']: expected 'paper' or 'standard', or a list of them, each once",
     ),
     "a model twice": (
-        lambda: busplan.latency("paper-4ms", timing_models=["paper", "paper"]),
-        "timing_models ['paper', 'paper']: expected 'paper' or 'standard', each once, in a list",
+        lambda: busplan.latency("paper-4ms", timing_model=["paper", "paper"]),
+        "timing_model ['paper', 'paper']: expected 'paper' or 'standard', or a list of them, each once",
     ),
     "another model of a timeline": (
         lambda: busplan.timeline("paper-4ms", timing_model="both"),
-        "timing_models ['both']: expected 'paper' or 'standard', each once, in a list",
+        "timing_model ['both']: expected 'paper' or 'standard', or a list of them, each once",
     ),
     "no payload": (
-        lambda: busplan.latency("paper-4ms", payloads_bytes=[0]),
-        "payloads_bytes 0: expected a whole number from 1 to 1,000,000",
+        lambda: busplan.latency("paper-4ms", payload_bytes=[0]),
+        "payload_bytes 0: expected a whole number from 1 to 1,000,000",
     ),
     "half a payload": (
-        lambda: busplan.latency("paper-4ms", payloads_bytes=[4.5]),  # type: ignore[list-item]
-        "payloads_bytes 4.5: expected a whole number from 1 to 1,000,000",
+        lambda: busplan.latency("paper-4ms", payload_bytes=[4.5]),  # type: ignore[list-item]
+        "payload_bytes 4.5: expected a whole number from 1 to 1,000,000",
     ),
     "a payload beyond the table": (
-        lambda: busplan.latency("paper-4ms", payloads_bytes=[100_000]),
+        lambda: busplan.latency("paper-4ms", payload_bytes=[100_000]),
         "payload 100000 bytes: outside the execution table",
     ),
     "nodes and axes": (lambda: busplan.plan("paper-4ms", nodes=2, axes=8), "nodes 2 and axes 8: give one of them"),
@@ -152,9 +153,42 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.plan("paper-4ms", period_us=Decimal(500)),  # type: ignore[arg-type]
         "period_us Decimal('500'): expected a finite number",
     ),
-    "periods in no dimension": (
-        lambda: busplan.capacity("paper-4ms", periods_us=np.array(5.0)),
-        "periods_us array(5.): expected several values",
+    "no such figure": (lambda: busplan.explain("paper-4ms", "margin"), "margin"),
+    "a figure that is none": (lambda: busplan.explain("paper-4ms", 5), "figure 5: expected a key of the JSON"),  # type: ignore[arg-type]
+    "a period of no figure": (
+        lambda: busplan.explain("paper-4ms", period_us=500),
+        "period_us 500: goes with a figure, as busplan.explain(profile,",
+    ),
+    "a transaction of no latency": (
+        lambda: busplan.explain("paper-4ms", "margin_us", transaction="read"),
+        "margin_us: not a figure of latency, so it has no transaction",
+    ),
+    "another transaction": (
+        lambda: busplan.explain("paper-4ms", "latency_us", transaction="both"),
+        "transaction 'both': expected 'read' or 'write'",
+    ),
+    "a revision that is none": (
+        lambda: busplan.diff("HEAD~1:nowhere.toml", "paper-4ms"),
+        "HEAD~1:nowhere.toml: no file of that name",
+    ),
+    "standard input to diff": (lambda: busplan.diff("paper-4ms", "-"), "-: standard input is read by the command line"),
+    "a tolerance below nothing": (
+        lambda: busplan.diff("paper-4ms", "paper-1ms", circle=False).regressions(tolerance_percent=-1),
+        "tolerance_percent -1: must be 0 or more",
+    ),
+    "no profiles": (lambda: busplan.report([]), "profiles: no values; give at least one"),
+    "a title of two lines": (lambda: busplan.report("paper-4ms", title="a\nb"), "title 'a\\nb': expected words"),
+    "another ending": (
+        lambda: busplan.latency("paper-4ms").save("x.pdf"),
+        "x.pdf: expected a name ending in .txt, .md, .html, .csv, .json",
+    ),
+    "a picture that there is not": (
+        lambda: busplan.latency("paper-4ms").save("x.svg"),
+        "x.svg: expected a name ending in .txt, .md, .html, .csv, .json; this answer has no picture",
+    ),
+    "a folder that there is not": (
+        lambda: busplan.latency("paper-4ms").save("nowhere/x.md"),
+        "nowhere/x.md: cannot be written: No such file or directory",
     ),
 }
 
@@ -174,7 +208,7 @@ def test_a_broken_profile_is_an_error_with_its_places_and_a_finding_of_check(own
     own.write_text(TEXT.replace("nodes = 2", "nodes = 0"), encoding="utf-8")
     with pytest.raises(busplan.BusplanError, match=r"paper-4ms:[0-9]+:1: bus\.nodes = 0: must be 1 or more"):
         busplan.load_profile(own)
-    answer = busplan.check([own, "paper-1ms"], with_circle=False)
+    answer = busplan.check([own, "paper-1ms"], circle=False)
     (found,) = answer.findings
     assert (found.path, found.finding.code, found.finding.key) == ("paper-4ms", "BP005", "bus.nodes")
     assert (answer.passed, answer.summary.errors, repr(answer)) == (
@@ -186,6 +220,6 @@ def test_a_broken_profile_is_an_error_with_its_places_and_a_finding_of_check(own
 
 def test_a_warning_passes_and_a_file_that_is_not_there_does_not(own: Path) -> None:
     own.write_text(TEXT.replace("# busplan: ignore[BP110]", "#"), encoding="utf-8")
-    answer = busplan.check(own, with_circle=False)
+    answer = busplan.check(own, circle=False)
     assert (answer.passed, [one.finding.code for one in answer.findings]) == (True, ["BP110"])
     assert busplan.check("nowhere.toml").passed is False

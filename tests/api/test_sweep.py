@@ -20,7 +20,7 @@ GRID: Mapping[str, Any] = {
 
 @pytest.mark.parametrize("models", [["paper", "standard"], ["standard"], ["standard", "paper"]])
 def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
-    answer = busplan.sweep("paper-4ms", vary=GRID, timing_models=models)
+    answer = busplan.sweep("paper-4ms", vary=GRID, timing_model=models)
     document = answer.to_dict()
     assert (document["points"], document["complete"], document["timing_models"]) == (16, True, models)
     assert len(answer) == len(document["rows"]) == 16 * len(models)
@@ -58,14 +58,14 @@ def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
         assert not np.isnan(answer[name][standard]).any()
     assert answer["verdict"].tolist() == ["", "fits", "", "does not fit"]
     assert answer["safe_limited_by"].tolist() == ["", "time", "", "time"]
-    alone = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]}, timing_models=["standard"])
+    alone = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]}, timing_model=["standard"])
     assert alone["safe_nodes"].dtype.kind == "i"  # where none is missing, counts are whole
 
 
 def test_a_point_is_what_capacity_says_of_it() -> None:
     periods = range(250, 4001, 250)
-    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_models=["standard"])
-    found = busplan.capacity("paper-4ms", periods_us=periods, timing_models=["standard"]).results
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_model=["standard"])
+    found = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
     for name in ("max_axes", "margin_us", "limited_by", "fits", "safe_axes", "safe_required_us", "verdict"):
         assert answer[name].tolist() == [getattr(one, name) for one in found]
 
@@ -79,12 +79,12 @@ def test_values_in_any_form_are_those_of_the_text(values: Any) -> None:
 
 
 def test_whole_numbers_as_floats_count_nodes() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": np.linspace(1, 3, 3)}, timing_models=["paper"])
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": np.linspace(1, 3, 3)}, timing_model=["paper"])
     assert answer["bus.nodes"].tolist() == [1, 2, 3]
 
 
 def test_many_blocks_are_one_table() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": range(100, 40_100)}, timing_models=["paper"])
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": range(100, 40_100)}, timing_model=["paper"])
     assert len(answer.blocks) > 1
     assert answer["cycle.period_us"].tolist() == list(range(100, 40_100))
     assert [row["period_us"] for row in answer.to_dict()["rows"]] == answer["period_us"].tolist()
@@ -100,7 +100,7 @@ def test_an_array_is_the_callers_own() -> None:
 
 def test_circle_tests_add_their_columns() -> None:
     vary = {"cycle.period_us": [100.0, 4000.0], "circle.radius_mm": [10.0]}
-    answer = busplan.sweep("paper-4ms", vary=vary, with_circle=True)
+    answer = busplan.sweep("paper-4ms", vary=vary, circle=True)
     assert answer.columns[-1] == "passed"
     (result,) = busplan.circle_test(busplan.load_profile("paper-4ms", changes={"circle.radius_mm": 10.0})).results
     assert np.isnan(answer["max_contour_error_mm"][:2]).all()
@@ -112,18 +112,18 @@ def test_circle_tests_add_their_columns() -> None:
 
 def test_circles_without_a_contour_tolerance_are_not_judged() -> None:
     vary = {"circle.radius_mm": [10.0], "servo.position_gain_per_s": [50.0, 30_000.0]}
-    both = str(busplan.sweep("paper-two-node", vary=vary, with_circle=True))
+    both = str(busplan.sweep("paper-two-node", vary=vary, circle=True))
     assert "The circle is not judged at 1: no contour tolerance is asked for." in both
     assert "The circle holds every tolerance at 0 " in both
-    one = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, with_circle=True))
+    one = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True))
     assert "not judged" in one
     assert "holds every tolerance" not in one
-    judged = str(busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0]}, with_circle=True))
+    judged = str(busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0]}, circle=True))
     assert "not judged" not in judged
 
 
 def test_a_figure_that_no_circle_has_is_a_column_of_nan() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0, 20.0]}, with_circle=True)
+    answer = busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0, 20.0]}, circle=True)
     assert np.isnan(answer["circular_deviation_mm"]).all()
     assert answer.to_dict()["rows"][0]["circular_deviation_mm"] is None
 
@@ -166,10 +166,10 @@ def test_the_text_is_the_table_of_the_command() -> None:
         (
             {"servo.drive_lag_us": [1]},
             {},
-            "vary servo.drive_lag_us: no figure of capacity depends on it; add with_circ",
+            "vary servo.drive_lag_us: no figure of capacity depends on it; add circle=True",
         ),
-        ({"cycle.period_us": range(1, 1002)}, {"with_circle": True}, "that are run without force=True"),
-        ({"cycle.period_us": [1050]}, {"with_circle": True}, "at cycle.period_us = 1050: step_us = 100.0"),
+        ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without force=True"),
+        ({"cycle.period_us": [1050]}, {"circle": True}, "at cycle.period_us = 1050: step_us = 100.0"),
     ],
 )
 def test_what_makes_no_sweep_is_refused(vary: Any, options: Any, message: str) -> None:
@@ -184,8 +184,8 @@ def test_a_truth_that_is_missing_is_none_beside_the_others() -> None:
     }
     profile = busplan.load_profile("paper-two-node", changes=own)
     # At 100 us the cycle does not fit, which fails; at 2 ms nothing is asked of the circle.
-    found = busplan.sweep(profile, vary={"cycle.period_us": [100, 2000]}, timing_models=["standard"], with_circle=True)
+    found = busplan.sweep(profile, vary={"cycle.period_us": [100, 2000]}, timing_model=["standard"], circle=True)
     assert list(found["passed"]) == [False, None]
     judged = busplan.load_profile("paper-two-node", changes={**own, "tolerance.max_contour_error_mm": 1.0})
-    found = busplan.sweep(judged, vary={"cycle.period_us": [100, 2000]}, timing_models=["standard"], with_circle=True)
+    found = busplan.sweep(judged, vary={"cycle.period_us": [100, 2000]}, timing_model=["standard"], circle=True)
     assert found["passed"].tolist() == [False, True]

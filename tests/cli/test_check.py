@@ -23,7 +23,7 @@ CLEAN = (ROOT / "tests/rules/examples/BP001/valid.toml").read_text(encoding="utf
 WARNS = CLEAN.replace('"optimal"', "63")
 FAILS = CLEAN.replace("period_us = 4000", "period_us = 300")
 BROKEN = CLEAN.replace("nodes = 2", "nodes = ")
-FORMATS = ("text", "full", "json", "github", "gitlab", "junit", "sarif")
+FORMATS = ("concise", "full", "text", "json", "github", "gitlab", "junit", "sarif", "markdown")
 PROGRAM = [sys.executable, "-m", "busplan"]
 
 Run = subprocess.CompletedProcess[str]
@@ -107,7 +107,7 @@ def test_a_process_says_what_the_command_line_says(busplan: Busplan, folder: Pat
 def test_findings_go_to_stdout_and_the_summary_to_stderr(busplan: Busplan, folder: Path) -> None:
     run = busplan("check", "p", cwd=folder)
     assert [line.partition(" ")[0] for line in run.stdout.splitlines()] == ["p/fails.toml:11:1:", "p/warns.toml:7:1:"]
-    assert run.stdout.splitlines()[0].startswith("p/fails.toml:11:1: BP101 cycle.period_us: the cycle needs ")
+    assert run.stdout.splitlines()[0].startswith("p/fails.toml:11:1: BP101 error: cycle.period_us: the cycle needs ")
     assert run.stderr == "checked 3 profiles: 1 error, 1 warning\n"
 
 
@@ -270,8 +270,7 @@ def test_a_format_is_added_by_a_class_and_a_line_of_the_register(folder: Path) -
         )  # fmt: skip
 
     words = " ".join(call("--help").stdout.split())
-    assert "|junit|sarif|shout>" in words
-    assert "github, gitlab, junit, sarif and shout are for the build service" in words
+    assert "github, gitlab, junit, sarif, markdown and shout are for the build service" in words
     run = call("p/fails.toml", "--format", "shout", "-q")
     assert (run.returncode, run.stdout, run.stderr) == (1, "BP101!\n", "shouted\n")
     assert "'shout'" in call("p", "--format", "xml").stderr
@@ -363,9 +362,10 @@ def test_a_baseline_is_recorded_and_held(busplan: Busplan, folder: Path) -> None
     for path in ("p/clean.toml", "./p/clean.toml", folder / "p" / "clean.toml"):
         run = busplan("check", path, "--baseline", "b.json", cwd=folder)
         assert run.returncode == 1
-        assert run.stdout.startswith("p/clean.toml:8:1: BP301 bus.nodes: max_axes under the paper timing fell to ")
         # 14 nodes are shown to fit: 56 axes, of three each 42.
-        assert "BP301 bus.nodes: safe_axes under the standard timing fell to 42 from the 56" in run.stdout
+        said = "p/clean.toml:18:1: BP301 error: node.axes: 3, was 4: safe axes fell from 56 to 42, "
+        assert run.stdout.startswith(said)
+        assert len(run.stdout.splitlines()) == 1
     assert busplan("check", "p/clean.toml", "--baseline", "b.json", "--update-baseline", cwd=folder).returncode == 0
     assert busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder).returncode == 0
 
@@ -448,6 +448,28 @@ def test_the_warning_of_dropped_records_is_not_silenced(busplan: Busplan, folder
     older_baseline(folder)
     run = busplan("check", "p", "--baseline", "b.json", "--update-baseline", "--quiet", cwd=folder)
     assert run.stderr == "warning: b.json: dropped p/gone.toml, recorded by other timing models; check them, too\n"
+
+
+def test_a_missing_baseline_says_how_to_record_one(busplan: Busplan, folder: Path) -> None:
+    run = busplan("check", "p", "--baseline", "gone.json", cwd=folder)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr == "gone.json: no such file; record it with --update-baseline\n"
+
+
+def test_a_baseline_without_keys_is_compared_and_is_one_with_keys_after_an_update(
+    busplan: Busplan, folder: Path
+) -> None:
+    busplan("check", "p", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    document = json.loads((folder / "b.json").read_text(encoding="utf-8"))
+    assert list(document.pop("keys")) == list(document["profiles"])
+    (folder / "b.json").write_text(json.dumps(document), encoding="utf-8")
+    slower = CLEAN.replace("period_us = 4000", "period_us = 3000")
+    (folder / "p" / "clean.toml").write_text(slower, encoding="utf-8")
+    run = busplan("check", "p/clean.toml", "--baseline", "b.json", cwd=folder)
+    assert run.stdout.startswith("p/clean.toml:2:1: BP301 error: name: safe axes fell from 56 to ")
+    assert len(run.stdout.splitlines()) == 1
+    busplan("check", "p/clean.toml", "--baseline", "b.json", "--update-baseline", cwd=folder)
+    assert list(json.loads((folder / "b.json").read_text(encoding="utf-8"))["keys"]) == ["p/clean.toml"]
 
 
 def test_what_is_no_baseline_is_never_overwritten(busplan: Busplan, folder: Path) -> None:
@@ -647,21 +669,22 @@ def program_folder(folder: Path) -> Path:
     return folder
 
 
-def test_the_pre_commit_hook_checks_profiles_and_nothing_else(folder: Path) -> None:
+def test_the_pre_commit_hook_checks_profiles_wherever_they_are_and_nothing_else(folder: Path) -> None:
     (hook,) = parsed(".pre-commit-hooks.yaml")
     assert {"id", "name", "entry", "language"} <= set(hook)
-    assert (hook["language"], hook["types"]) == ("python", ["toml"])
+    # Warnings fail nothing, and pre-commit shows what passes only where it is verbose.
+    assert (hook["language"], hook["types"], hook["verbose"]) == ("python", ["toml"], True)
+    assert not {"files", "exclude"} & set(hook)
     repository = folder / "repository"
-    shutil.copytree(folder / "p", repository / "machine" / "profiles")
-    shutil.copytree(ROOT / "profiles", repository / "profiles")
+    shutil.copytree(folder / "p", repository / "machine" / "line-2")
     for name in ("pyproject.toml", "other/profiles.toml"):
         (repository / name).parent.mkdir(exist_ok=True)
         (repository / name).write_text("[project]\n", encoding="utf-8")
-    # As pre-commit does: files by their pattern and type, many of them in one call from the top of the repository.
+    option = "--stdin-filename=x/fails.toml"
+    (repository / option).parent.mkdir(parents=True)
+    shutil.copy(repository / "machine" / "line-2" / "fails.toml", repository / option)
+    # As pre-commit does: files by their type, many of them in one call from the top of the repository.
     everything = sorted(path.relative_to(repository).as_posix() for path in repository.rglob("*.toml"))
-    files = [name for name in everything if re.search(hook["files"], name)]
-    assert not {"pyproject.toml", "other/profiles.toml"} & set(files)
-    assert {"profiles/paper-1ms.toml", "machine/profiles/fails.toml"} <= set(files)
     path = f"{program_folder(folder / 'bin')}{os.pathsep}{os.environ['PATH']}"
 
     def run(*names: str) -> Run:
@@ -675,17 +698,69 @@ def test_the_pre_commit_hook_checks_profiles_and_nothing_else(folder: Path) -> N
             timeout=60,
         )
 
-    shipped = [name for name in files if name.startswith("profiles/")]
-    assert run(*shipped).returncode == 0
-    # One of them stands for all in what follows: each has a circle.
-    failed = run(shipped[0], "machine/profiles/fails.toml")
+    failed = run(*everything)
     assert failed.returncode == 1
-    assert failed.stdout.startswith("machine/profiles/fails.toml:11:1: BP101 ")
-    option = "--stdin-filename=x/profiles/fails.toml"
-    (repository / option).parent.mkdir(parents=True)
-    shutil.copy(repository / "machine" / "profiles" / "fails.toml", repository / option)
-    assert re.search(hook["files"], option)
-    assert run(shipped[0], option).returncode == 1
+    assert [line.partition(" error:")[0] for line in failed.stdout.splitlines() if " error:" in line] == [
+        f"{option}:11:1: BP101",
+        "machine/line-2/fails.toml:11:1: BP101",
+    ]
+    assert "machine/line-2/warns.toml:7:1: BP110 warning: " in failed.stdout
+    assert failed.stderr == ("checked 4 profiles: 2 errors, 1 warning; skipped 3 files without a schema_version\n")
+    passed = run("pyproject.toml", "machine/line-2/warns.toml")
+    assert (passed.returncode, passed.stdout.count("BP110 warning")) == (0, 1)
+    nothing = run("pyproject.toml")
+    assert (nothing.returncode, nothing.stdout) == (0, "")
+    assert nothing.stderr == "checked 0 profiles: 0 errors, 0 warnings; skipped 1 file without a schema_version\n"
+
+
+def test_others_are_skipped_on_request_alone(busplan: Busplan, folder: Path) -> None:
+    given = ["p/other.toml", "p/clean.toml"]
+    assert busplan("check", *given, cwd=folder).returncode == 1
+    run = busplan("check", *given, "--skip-others", "-v", cwd=folder)
+    assert run.returncode == 0
+    assert run.stderr.splitlines() == [
+        "p/other.toml: skipped, claims no schema_version",
+        "p/clean.toml: ok",
+        "checked 1 profile: 0 errors, 0 warnings; skipped 1 file without a schema_version",
+    ]
+    # A broken profile is one still, and what is not there is no other file.
+    (folder / "p" / "broken.toml").write_text(BROKEN, encoding="utf-8")
+    assert busplan("check", "p/broken.toml", "--skip-others", cwd=folder).returncode == 1
+    assert busplan("check", "gone.toml", "--skip-others", cwd=folder).returncode == 2
+    # Each is counted once.
+    run = busplan("check", "p", "p/other.toml", "--skip-others", "--no-circle", cwd=folder)
+    assert run.stderr.endswith("; skipped 1 file without a schema_version\n")
+
+
+# What a terminal shows
+
+
+def test_a_terminal_has_the_full_form_and_a_pipe_one_line_a_finding(
+    busplan: Busplan, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    plain = busplan("check", "p/fails.toml", cwd=folder)
+    assert plain.stdout == busplan("check", "p/fails.toml", "--format", "concise", cwd=folder).stdout
+    monkeypatch.setattr("busplan.cli.check.is_terminal", lambda: True)
+    monkeypatch.setattr("busplan.cli.check.is_styled", lambda: True)
+    shown = busplan("check", "p/fails.toml", cwd=folder)
+    assert shown.returncode == 1
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", shown.stdout).splitlines()
+    assert lines[0].startswith("p/fails.toml:11:1: BP101 error: cycle.period_us: the cycle ")
+    assert max(map(len, lines)) <= 80
+    assert "11 | period_us = 300" in lines
+    assert "   |             ^^^ slice-overrun" in lines
+    assert "    cycle.slice_ratio = 0.69" in lines
+    assert "\x1b[" in shown.stdout
+    # What is asked for is what is written; a file is read by a program.
+    concise = busplan("check", "p/fails.toml", "--format", "concise", cwd=folder)
+    assert re.sub(r"\x1b\[[0-9;]*m", "", concise.stdout) == plain.stdout
+    busplan("check", "p/fails.toml", "-o", "out.txt", cwd=folder)
+    assert (folder / "out.txt").read_text(encoding="utf-8") == plain.stdout
+
+
+INSTALL, CHECK = 1, 2
+"""Steps of the action that are ours; the first sets up Python."""
 
 
 def action_step(number: int, folder: Path, *, path: str, temporary: Path | None = None, **inputs: str) -> Run:
@@ -696,6 +771,7 @@ def action_step(number: int, folder: Path, *, path: str, temporary: Path | None 
     assert step["shell"] == "bash"
 
     def put_in(text: str) -> str:
+        text = text.replace("${{ steps.python.outputs.python-path }}", "python3")
         return re.sub(r"\$\{\{ inputs\.(\w+) \}\}", lambda match: given[match[1]], text)
 
     assert "${{" not in step["run"], "inputs must come by the environment: in the script they could be commands"
@@ -708,6 +784,8 @@ def action_step(number: int, folder: Path, *, path: str, temporary: Path | None 
             PATH=path,
             RUNNER_TEMP=str(temporary or folder / "runner temp"),
             GITHUB_ACTION_PATH=str(ROOT),
+            GITHUB_OUTPUT=str(folder.parent / "output"),
+            GITHUB_STEP_SUMMARY=str(folder.parent / "summary"),
             **{name: put_in(value) for name, value in step.get("env", {}).items()},
         ),
         check=False,
@@ -728,17 +806,51 @@ def test_the_action_is_one() -> None:
 
 def test_the_action_checks_and_annotates(folder: Path) -> None:
     program_folder(folder / "runner temp" / "busplan" / "bin")
-    run = action_step(1, folder, path=os.environ["PATH"])
+    run = action_step(CHECK, folder, path=os.environ["PATH"])
     assert run.returncode == 1
     assert run.stdout.startswith("::error file=p/fails.toml,line=11,col=1,title=BP101 slice-overrun::")
     assert "p/warns.toml:7:1: BP110" in run.stderr
-    run = action_step(1, folder, path=os.environ["PATH"], paths="p/clean.toml p/warns.toml", args="--fail-on warning")
+    run = action_step(
+        CHECK, folder, path=os.environ["PATH"], paths="p/clean.toml p/warns.toml", args="--fail-on warning"
+    )
     assert (run.returncode, run.stdout[:28]) == (1, "::warning file=p/warns.toml,")
-    assert action_step(1, folder, path=os.environ["PATH"], paths="p/clean.toml").returncode == 0
-    assert action_step(1, folder, path=os.environ["PATH"], paths="gone.toml").returncode == 2
-    hostile = action_step(1, folder, path=os.environ["PATH"], paths="p/clean.toml; touch owned $(touch owned)")
+    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="p/clean.toml").returncode == 0
+    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="gone.toml").returncode == 2
+    hostile = action_step(CHECK, folder, path=os.environ["PATH"], paths="p/clean.toml; touch owned $(touch owned)")
     assert hostile.returncode == 2
     assert not (folder / "owned").exists()
+
+
+def test_the_action_writes_a_summary_and_says_what_came_of_it(folder: Path) -> None:
+    program_folder(folder / "work" / "runner temp" / "busplan" / "bin")
+    work = folder / "work"
+    (folder / "p").rename(work / "p")
+
+    def outputs(**inputs: Any) -> list[str]:
+        for name in ("output", "summary"):
+            (folder / name).unlink(missing_ok=True)
+        action_step(CHECK, work, path=os.environ["PATH"], **inputs)
+        return (folder / "output").read_text(encoding="utf-8").splitlines()
+
+    assert outputs() == ["exit-code=1", "result=fails"]
+    summary = (folder / "summary").read_text(encoding="utf-8")
+    assert summary.startswith("### Check of profiles\n")
+    assert "| `p/clean.toml` | passes | fits |" in summary
+    assert "| `p/fails.toml` | **1 error** | does not fit |" in summary
+    assert outputs(paths="p/clean.toml") == ["exit-code=0", "result=passes"]
+    assert outputs(paths="gone.toml") == ["exit-code=2", "result=could not check"]
+    # A file of the pull request is no report of ours, nor is what it points to written.
+    (work / "target").write_text("kept", encoding="utf-8")
+    (work / "b.sarif").symlink_to("target")
+    assert outputs(sarif="b.sarif") == ["sarif=b.sarif", "exit-code=1", "result=fails"]
+    assert json.loads((work / "b.sarif").read_text(encoding="utf-8"))["version"] == "2.1.0"
+    assert (work / "target").read_text(encoding="utf-8") == "kept"
+    assert outputs(sarif="b.sarif", args="--no-such-option") == ["exit-code=2", "result=could not check"]
+    assert not (work / "b.sarif").exists()
+    # A report of the workflow's own is not written over.
+    assert outputs(paths="p/warns.toml", args="--format json -o own.json") == ["exit-code=0", "result=passes"]
+    assert "| `p/warns.toml` | 1 warning | fits |" in (folder / "summary").read_text(encoding="utf-8")
+    assert json.loads((work / "own.json").read_text(encoding="utf-8"))["command"] == "check"
 
 
 HOSTILE_FILES = ("--exit-zero", "--help", "-o", "--baseline=b", "-", "-qv")
@@ -753,7 +865,7 @@ def test_no_file_of_a_pull_request_is_an_option_of_the_action(folder: Path, path
     (folder / "p").rename(work / "p")
     for name in HOSTILE_FILES:
         shutil.copy(work / "p" / "fails.toml", work / name)
-    run = action_step(1, work, path=os.environ["PATH"], temporary=folder / "runner temp", paths=paths)
+    run = action_step(CHECK, work, path=os.environ["PATH"], temporary=folder / "runner temp", paths=paths)
     assert run.returncode == (2 if "nothing-here" in paths else 1), run.stderr
     for name in HOSTILE_FILES:
         assert f"file={name},line=11," in run.stdout
@@ -763,14 +875,25 @@ def test_no_file_of_a_pull_request_is_an_option_of_the_action(folder: Path, path
 def test_a_folder_called_like_a_shipped_profile_is_that_folder(folder: Path) -> None:
     program_folder(folder / "runner temp" / "busplan" / "bin")
     (folder / "p").rename(folder / "paper-1ms")
-    run = action_step(1, folder, path=os.environ["PATH"], paths="paper-1ms")
+    run = action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms")
     assert run.returncode == 1
     assert "file=paper-1ms/fails.toml,line=11," in run.stdout
-    run = action_step(1, folder, path=os.environ["PATH"], paths=str(folder / "paper-1ms" / "clean.toml"))
+    run = action_step(CHECK, folder, path=os.environ["PATH"], paths=str(folder / "paper-1ms" / "clean.toml"))
     assert run.returncode == 0
     # Options are the workflow's own, and no wildcards.
-    assert action_step(1, folder, path=os.environ["PATH"], paths="paper-1ms", args="--exit-zero").returncode == 0
-    assert action_step(1, folder, path=os.environ["PATH"], paths="paper-1ms", args="--baseline *").returncode == 2
+    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms", args="--exit-zero").returncode == 0
+    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms", args="--baseline *").returncode == 2
+
+
+def test_the_action_runs_with_a_python_of_its_own() -> None:
+    action = parsed("action.yml")
+    first = action["runs"]["steps"][0]
+    assert first["uses"] == "actions/setup-python@v5"
+    assert first["with"] == {"python-version": "${{ inputs.python-version }}", "update-environment": False}
+    assert action["inputs"]["python-version"]["default"] == "3.13"
+    steps = {step.get("id") for step in action["runs"]["steps"]}
+    for one in action["outputs"].values():
+        assert re.fullmatch(r"\$\{\{ steps\.(\w+)\.outputs\.[\w-]+ \}\}", one["value"])[1] in steps  # type: ignore[index]
 
 
 def test_the_action_installs_into_a_folder_of_its_own(folder: Path) -> None:
@@ -783,7 +906,7 @@ def test_the_action_installs_into_a_folder_of_its_own(folder: Path) -> None:
         encoding="utf-8",
     )
     (stub / "python3").chmod(0o755)
-    run = action_step(0, folder, path=f"{stub}{os.pathsep}{os.environ['PATH']}")
+    run = action_step(INSTALL, folder, path=f"{stub}{os.pathsep}{os.environ['PATH']}")
     assert run.returncode == 0, run.stderr
     temporary = folder / "runner temp" / "busplan"
     assert (folder / "log").read_text(encoding="utf-8").splitlines() == [

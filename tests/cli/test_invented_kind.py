@@ -238,7 +238,7 @@ FORMS = {
     "map": ("table", "markdown", "html", "csv", "json", "svg"),
     "circle-test": ("table", "json", "csv"),
     "report": ("html", "markdown"),
-    "check": ("text", "full", "json", "github", "gitlab", "junit", "sarif"),
+    "check": ("concise", "full", "json", "github", "gitlab", "junit", "sarif", "markdown"),
 }
 
 
@@ -404,7 +404,7 @@ def test_a_limit_of_any_form_is_searched_whatever_the_profiles_own_stations(
         profile = busplan.load_profile(ring_file)
         found, _ = largest_nodes(profile, model="plain")
         assert found == min(most, 37)
-        assert busplan.plan(profile, with_circle=False) is not None
+        assert busplan.plan(profile, circle=False) is not None
 
 
 def test_a_sweep_has_room_for_more_limits_than_bits_of_a_byte(run: Run, ring_file: Path) -> None:
@@ -446,7 +446,7 @@ def test_a_timing_model_of_one_kind_alone_is_refused_between_two(run: Run, ring:
 
 
 def test_a_plan_turns_its_setting_and_advice_names_it(run: Run, ring: Path) -> None:
-    answer = busplan.plan(ring, nodes=10, with_circle=False)
+    answer = busplan.plan(ring, nodes=10, circle=False)
     assert answer.free == ("rate", "slice_ratio", "period")
     assert answer.recommended_changes == {"bus.nodes": 10, "bus.rate_mbit_s": 2.0}
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 800"), encoding="utf-8")
@@ -462,7 +462,7 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
     ring.write_text(slower, encoding="utf-8")
     done = run("check", ring.name, "--no-circle", cwd=ring.parent)
     assert done.returncode == 1
-    assert "ring.toml:7:1: RG101 bus.rate_mbit_s: 0.5 Mbit/s is slower than any station" in done.stdout
+    assert "ring.toml:7:1: RG101 error: bus.rate_mbit_s: 0.5 Mbit/s is slower than any station" in done.stdout
     assert "41 stations are over the 40 of a ring" in run("capacity", ring.name, cwd=ring.parent).stdout
     assert "RG101" in run("rule", cwd=ring.parent).stdout
 
@@ -483,7 +483,7 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     )
     assert "Not in it" not in said
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1200"), encoding="utf-8")
-    assert "no bias of the model is known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
+    assert "no bias known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
     document = json.loads(run("capacity", ring.name, "--format", "json", cwd=ring.parent).stdout)
     assert document["results"][0]["bias_us"] is None
     rows = list(csv.DictReader(StringIO(run("capacity", ring.name, "--format", "csv", cwd=ring.parent).stdout)))
@@ -628,7 +628,7 @@ def test_a_limit_of_its_own_without_a_rule_fails_the_gate(run: Run, ring: Path) 
     ring.write_text(TEXT.replace("nodes = 5", "nodes = 41").replace("period_us = 1500", "period_us = 1e6"), "utf-8")
     done = run("check", ring.name, "--no-circle", cwd=ring.parent)
     assert done.returncode == 1
-    assert "BP101 cycle.period_us: 41 stations are over the 40 of a ring; a second ring has room" in done.stdout
+    assert "BP101 error: cycle.period_us: 41 stations are over the 40 of a ring; a second ring has room" in done.stdout
 
 
 def test_an_unknown_kind_is_answered_with_the_known_ones_at_its_line(run: Run, ring: Path) -> None:

@@ -115,15 +115,16 @@ def test_what_would_be_another_file_is_refused_by_name(
 class Locked:
     """Another run in its folder: it writes while it has the lock."""
 
-    def __init__(self, folder: Path, write: Callable[[], object]) -> None:
+    def __init__(self, folder: Path, write: Callable[[], object], *, for_s: float = 0.6) -> None:
         self._descriptor = os.open(folder, os.O_RDONLY)
         self._write = write
+        self._for_s = for_s
         self.written = 0.0
         flock(self._descriptor, LOCK_EX)
-        threading.Thread(target=self._end).start()
+        threading.Thread(target=self._end, daemon=True).start()
 
     def _end(self) -> None:
-        time.sleep(0.6)
+        time.sleep(self._for_s)
         self._write()
         self.written = time.monotonic()
         os.close(self._descriptor)
@@ -158,7 +159,7 @@ def test_a_run_that_never_ends_is_not_waited_for_forever(
 ) -> None:
     monkeypatch.setattr(rewrite, "PATIENCE_S", 0.1)
     before = change.path.read_bytes()
-    Locked(tmp_path, lambda: None)
+    Locked(tmp_path, lambda: None, for_s=30.0)  # longer than a command takes on a busy machine
     assert "another run has been changing a file of this folder for 0.1 s" in refused(*change.command, cwd=tmp_path)
     assert change.path.read_bytes() == before
 

@@ -257,8 +257,8 @@ def test_findings_are_at_the_place_of_the_key_and_say_the_change(run: Run, folde
     done = run("check", "mine.toml", "--no-circle", "--set", "cycle.period_us=200", cwd=folder)
     assert done.returncode == 1
     (line,) = done.stdout.splitlines()
-    assert line.startswith("mine.toml:9:1: BP101 cycle.period_us: the cycle needs ")
-    assert line.endswith(" (with --set cycle.period_us=200)")
+    assert line.startswith("mine.toml:9:1: BP101 error: cycle.period_us: the cycle needs ")
+    assert " (with --set cycle.period_us=200); " in line
     assert done.stderr == "With --set cycle.period_us=200.\nchecked 1 profile: 1 error, 0 warnings\n"
 
 
@@ -267,13 +267,13 @@ def test_a_suppression_works_and_is_not_idle_for_another_value(run: Run, folder:
         return run("check", "mine.toml", "--no-circle", *options, cwd=folder).stdout
 
     (folder / "mine.toml").write_text(PROFILE.replace("gap_count = 10", "gap_count = 7"), encoding="utf-8")
-    assert "BP902 BP110 has nothing to suppress" in findings()
+    assert "BP902 warning: BP110 has nothing to suppress" in findings()
     assert findings("--set", "bus.gap_count=optimal") == ""
     # A larger one is the finding that the comment suppresses.
     assert findings("--set", "bus.gap_count=63") == ""
     uncommented = PROFILE.replace("busplan: ignore[BP110]", "")
     (folder / "mine.toml").write_text(uncommented, encoding="utf-8")
-    assert "BP110 bus.gap_count" in findings("--set", "bus.gap_count=63")
+    assert "BP110 warning: bus.gap_count" in findings("--set", "bus.gap_count=63")
 
 
 def test_a_key_that_one_file_refuses_does_not_stop_the_others(run: Run, folder: Path) -> None:
@@ -290,7 +290,7 @@ def test_figures_of_the_changed_profile_are_compared_with_the_baseline(run: Run,
     kept = (folder / "b.json").read_bytes()
     done = run("check", "mine.toml", "--no-circle", "--baseline", "b.json", "--set", "node.axes=3", cwd=folder)
     assert done.returncode == 1
-    assert "BP301 bus.nodes: max_axes under the paper timing fell to" in done.stdout
+    assert "BP301 error: node.axes: 3, was 4: safe axes fell from" in done.stdout
     assert (folder / "b.json").read_bytes() == kept
 
 

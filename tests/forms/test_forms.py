@@ -328,3 +328,17 @@ def test_numbers_too_small_for_their_decimals_keep_their_digits() -> None:
 def test_a_figure_is_not_written_in_a_unit_that_it_does_not_convert_to() -> None:
     with pytest.raises(KeyError):
         with_unit(ShownValue(1.0, "margin_us", "mm"))
+
+
+class Blank(Drawing):
+    """A drawing that Markdown cannot show."""
+
+    def svg(self) -> str:
+        return '<svg xmlns="http://www.w3.org/2000/svg"></svg>\n'
+
+
+@pytest.mark.parametrize("caption", ["Reads take <most>, 3 us", "Reads take <most>, 3 us."])
+def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
+    chart = Chart(Blank(), Sentence((caption,)), Sentence(("The dot is the start.",)))
+    report = Report(Sentence(("x",)), lambda: (chart,), dict)
+    assert render(report, "markdown") == "### x\n\nReads take \\<most\\>, 3 us.\n"

@@ -118,7 +118,9 @@ def test_the_gate_names_the_limit_and_the_way_out(busplan: Run, own: Path) -> No
     own.write_text(without_time(1e6), encoding="utf-8")
     done = busplan("check", "own.toml", "--no-circle", cwd=own.parent)
     assert done.returncode == 1
-    assert "BP101 cycle.period_us: a cycle start takes 147.530 us, over 124.000 us: no time is left" in done.stdout
+    assert (
+        "BP101 error: cycle.period_us: a cycle start takes 147.530 us, over 124.000 us: no time is left" in done.stdout
+    )
     assert "less bus.isochronous_us, or no cycle master, leaves time" in done.stdout
 
 

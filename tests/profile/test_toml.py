@@ -486,7 +486,7 @@ def test_what_is_wrong_with_a_file_comes_placed() -> None:
     with pytest.raises(PlacedError) as caught:
         read(edited(("nodes = 2", "nodes = 0")))
     assert caught.value.placed == (
-        PlacedProblem(7, 1, "out-of-range", "bus.nodes = 0: must be 1 or more", "bus.nodes"),
+        PlacedProblem(7, 1, "out-of-range", "bus.nodes = 0: must be 1 or more", "bus.nodes", (9, 10)),
     )
     for content in (b"\xff", b"#" * (MAX_FILE_BYTES + 1), b"a", b"a = " + b"[" * 2000, b"a." * 21 + b"a = 1"):
         with pytest.raises(PlacedError) as caught:

@@ -13,10 +13,8 @@ from busplan.manual import page
 PAGE = page("python")
 
 
-def block(language: str) -> str:
-    (found,) = re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
-    assert isinstance(found, str)
-    return found
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 
 def test_the_plot_of_axes_against_period_is_five_lines_and_true(
@@ -25,7 +23,7 @@ def test_the_plot_of_axes_against_period_is_five_lines_and_true(
     pytest.importorskip("matplotlib")
     monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
-    script = block("python")
+    script = blocks("python")[0]
     assert len(script.split("\n\n")) == 2
     assert sum(map(bool, script.splitlines())) == 5
     names: dict[str, Any] = {}
@@ -34,7 +32,7 @@ def test_the_plot_of_axes_against_period_is_five_lines_and_true(
     try:
         (line,) = figure.axes[0].lines
         periods = list(range(250, 4001, 250))
-        found = busplan.capacity("paper-4ms", periods_us=periods, timing_models=["standard"]).results
+        found = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
         assert line.get_xdata().tolist() == periods
         assert line.get_ydata().tolist() == [one.safe_axes for one in found]
         assert len(set(line.get_ydata())) > 5
@@ -43,8 +41,16 @@ def test_the_plot_of_axes_against_period_is_five_lines_and_true(
     assert (tmp_path / "axes.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_the_pages_and_pictures_are_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(blocks("python")[1], "python.md", "exec"), {"busplan": busplan})
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    assert (tmp_path / "timeline.svg").read_text(encoding="utf-8").startswith("<svg ")
+
+
 def test_the_example_of_an_answer_is_the_programs_own() -> None:
-    example = doctest.DocTestParser().get_doctest(block("pycon"), {}, "python.md", "python.md", 0)
+    (block,) = blocks("pycon")
+    example = doctest.DocTestParser().get_doctest(block, {}, "python.md", "python.md", 0)
     assert len(example.examples) >= 5
     assert doctest.DocTestRunner().run(example).failed == 0
 

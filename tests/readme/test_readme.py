@@ -35,6 +35,7 @@ PAGES = {path: path.read_text(encoding="utf-8") for path in (README, *sorted(FOL
 CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 MAX_WIDTH = 130
+MOST_README_BYTES = 12_000
 
 
 def shown_runs() -> Iterator[tuple[str, str]]:
@@ -50,6 +51,30 @@ def shown_runs() -> Iterator[tuple[str, str]]:
 def test_output_blocks_are_the_programs_own(shell: Run, command: str, output: str, tmp_path: Path) -> None:
     run = shell(command, cwd=tmp_path)
     assert run.stdout + run.stderr == output
+
+
+def test_the_readme_is_short_and_its_picture_is_the_tool_s_own(shell: Run, tmp_path: Path) -> None:
+    assert len(PAGES[README].encode()) <= MOST_README_BYTES
+    (picture,) = re.findall(r'<img src="([^"]+)"', PAGES[README])
+    (command,) = re.findall(r"`(busplan map gantry-24 -o (?:\S+\.svg))`", PAGES[README])
+    shell(command, cwd=tmp_path)
+    assert (tmp_path / command.split()[-1]).read_bytes() == (ROOT / picture).read_bytes()
+
+
+def test_the_commands_for_a_machine_run_as_they_stand(shell: Run, tmp_path: Path) -> None:
+    section = PAGES[README].partition("\n## My machine\n")[2]
+    commands = re.findall(
+        r"^(busplan .*?)(?: +#.*)?$", section.partition("```sh\n")[2].partition("```")[0], re.MULTILINE
+    )
+    assert len(commands) >= 8
+    for command in commands:
+        assert shell(command, cwd=tmp_path).returncode == 0, command
+
+
+def test_the_python_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (block,) = re.findall(r"^```python\n(.*?)^```$", PAGES[README], re.MULTILINE | re.DOTALL)
+    exec(compile(block, "README.md", "exec"), {})
+    assert capsys.readouterr().out == "fits 5\n"
 
 
 def test_there_are_blocks_to_check() -> None:

@@ -24,6 +24,7 @@ from busplan.errors import PlacedError
 from busplan.profile import positions
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import decode
+from busplan.rules.baseline import Record
 from busplan.rules.finding import Finding
 from busplan.rules.gate import FileResult, check_document, unreadable
 from busplan.rules.registry import all_rules
@@ -141,6 +142,11 @@ MUTATIONS: list[Mutation] = [
 ]
 
 
+CLEAN = check_document(decode((Path(__file__).parent / "examples/BP001/valid.toml").read_bytes(), name="clean.toml"))
+RECORD = Record({"paper.margin_us": 1e6, "standard.safe_axes": 1e6}, CLEAN.keys)
+"""Of another profile, so that any key may have changed."""
+
+
 def mutated(seed: int) -> bytes:
     rng = random.Random(seed)
     content = rng.choice(SEEDS)
@@ -156,7 +162,7 @@ def gate(content: bytes) -> tuple[FileResult, list[str]]:
         document = decode(content, name="a.toml")
     except PlacedError as error:
         return unreadable("a.toml", error, content), lines
-    return check_document(document, with_circle=False, baseline={"paper.margin_us": 1e6}), lines
+    return check_document(document, with_circle=False, baseline=RECORD), lines
 
 
 def hold(content: bytes) -> FileResult:
@@ -170,11 +176,12 @@ def hold(content: bytes) -> FileResult:
     for finding, source in zip(result.findings, result.source, strict=True):
         assert 1 <= finding.line <= len(lines)
         assert 1 <= finding.column <= len(lines[finding.line - 1]) + 1
+        assert 1 <= finding.marked_column < finding.marked_end_column <= len(lines[finding.line - 1]) + 2
         assert source.rstrip("\r") == lines[finding.line - 1].rstrip("\r")
         assert finding.message
         assert finding.code in all_rules()
     assert list(result.findings) == sorted(result.findings, key=lambda one: (one.line, one.column, one.code))
-    for format_ in ("text", "full", "github"):
+    for format_ in ("concise", "full", "github", "markdown"):
         assert gate_format(format_).write(CheckReport((result,))).count("\n") >= len(result.findings)
     return result
 

@@ -1,5 +1,6 @@
 """All answers for one profile, as a page shows them; each comes from the function of its command."""
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import Capacity, capacity
@@ -15,7 +16,7 @@ from busplan.analysis.map.trade_off import TradeOff, trade_off
 from busplan.analysis.network import model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
-from busplan.progress import Progress
+from busplan.progress import Progress, part_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 
@@ -89,6 +90,26 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
         no_circle=no_circle,
         assumptions=assumptions(profile),
     )
+
+
+def answers_of_each(
+    profiles: Sequence[Profile], *, with_circle: bool = True, progress: Progress | None = None
+) -> list[AllAnswers]:
+    """Compute all answers for each of several profiles, with one progress for all.
+
+    Parameters
+    ----------
+    profiles, with_circle, progress
+        As for `all_answers`.
+    """
+    return [
+        all_answers(
+            one,
+            with_circle=with_circle,
+            progress=None if progress is None else part_of(progress, number=number, of=len(profiles)),
+        )
+        for number, one in enumerate(profiles)
+    ]
 
 
 def _schedule(profile: Profile) -> tuple[Schedule | None, tuple[str, ...]]:

@@ -74,6 +74,13 @@ def execution_changes(result: Calibration) -> dict[str, object]:
     return {f"{section(result)}.{key}": value for key, value in changes.items() if key != _KEPT}
 
 
+def execution_section(result: Calibration) -> dict[str, object]:
+    """The whole section of the execution time, with what the measurements do not say as it was."""
+    old = result.nodes.node.execution
+    kept = {_KEPT: getattr(old, _KEPT)} if _KEPT in old.model_fields_set else {}
+    return {**kept, **{key: value for key, value in execution_keys(result).items() if key != _KEPT}}
+
+
 def provenance(result: Calibration, *, source: str) -> str:
     """Origin of an execution time, as a one-line comment for the profile, without a date."""
     taken = "T1+T2 as measured" if result.way == "measured-halves" else f"packets by the {result.timing_model} model"

@@ -7,6 +7,7 @@ from busplan.answers.documents import changed_document, document
 from busplan.answers.gate.plain import finding_parts
 from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, State, count_value, joined, sentence
 from busplan.forms.numbers import nouns
+from busplan.rules.gate import Fit
 from busplan.rules.report import CheckReport
 
 
@@ -42,7 +43,12 @@ def summary_sentence(report: CheckReport) -> Sentence:
         count_value(counts.warnings, "warnings", at="/summary/warnings"),
         state=_state(report),
     )
-    return joined(summary, sentence("{} could not be checked", count_value(failed)), by="; ") if failed else summary
+    if failed:
+        summary = joined(summary, sentence("{} could not be checked", count_value(failed)), by="; ")
+    if report.others:
+        words = f"skipped {{}} {nouns(report.others, 'file')} without a schema_version"
+        summary = joined(summary, sentence(words, count_value(report.others)), by="; ")
+    return summary
 
 
 def _state(report: CheckReport) -> State:
@@ -64,6 +70,7 @@ def check_document(report: CheckReport) -> JsonDocument:
             "path": one.path,
             "profile": one.profile,
             "status": one.status,
+            **(one.fit or Fit(None, None, None))._asdict(),
             "findings": [finding._asdict() for finding in one.findings],
         }
         files.append(content if one.failure is None else {**content, "failure": one.failure})

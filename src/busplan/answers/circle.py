@@ -187,7 +187,11 @@ def circle_chart(
     if scale is None:
         return None
     part = "at constant speed" if result.path == "trapezoid" else "on the turn"
-    caption = sentence(f"Contour error {part}, at {{}} and {{}}", *setup_values(result, at=at))
+    setup = setup_values(result, at=at)
+    caption = sentence(f"Contour error {part}, at {{}} and {{}}", *setup)
+    if result.max_contour_error_mm is not None:
+        largest = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], result, at=at)
+        caption = sentence(f"The contour error {part} is {{}} or less, at {{}} and {{}}", largest, *setup)
     tolerance = ShownValue(tolerance_mm, "max_contour_error_mm", "um")
     limit = (
         sentence("the profile has no tolerance of the largest contour error.")

@@ -6,7 +6,7 @@ Keys carry their units and are stable between releases; new ones may be added.
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from busplan.forms.blocks import Code, JsonDocument, Record, Sentence, joined
+from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, joined
 from busplan.profile.changes import KeyChanges
 
 JSON_SCHEMA: Final = 1
@@ -29,6 +29,14 @@ def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDoc
     name = "changes" if "changes" not in content else "changes_of_both"
     head = {key: content[key] for key in ("schema", "command")}
     return {**head, name: {one.key: one.value for one in changes.by_set}, **content}
+
+
+def changed_report(report: Report, changes: KeyChanges) -> Report:
+    """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
+    return report._replace(
+        blocks=lambda: (*changes_sentences(changes), *report.blocks()),
+        document=lambda: changed_document(report.document(), changes),
+    )
 
 
 def changes_sentences(changes: KeyChanges) -> list[Sentence]:

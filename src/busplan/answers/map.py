@@ -18,6 +18,7 @@ from busplan.forms.blocks import (
     Record,
     Report,
     Sentence,
+    ShownValue,
     Swatch,
     Table,
     TableColumn,
@@ -80,9 +81,16 @@ def _remarks(found: TradeOff) -> Iterator[Sentence]:
 
 
 def map_chart(found: TradeOff) -> Chart:
-    """The picture, with what lies along which direction."""
+    """The picture, with how much fits and what lies along which direction."""
     title = sentence_text(headline(found))
-    return Chart(MapDrawing(found, title=title), Sentence((map_title(found),)))
+    fitting = sum(cell.state == "fits" for cell in found.cells)
+    marked = "" if found.own is None else ", this design marked"
+    caption = sentence(f"{{}} of {{}} settings fit, {map_title(found)}{marked}", *_counts(fitting, len(found.cells)))
+    return Chart(MapDrawing(found, title=title), caption)
+
+
+def _counts(*numbers: int) -> tuple[ShownValue, ...]:
+    return tuple(count_value(one) for one in numbers)
 
 
 def regions_table(found: TradeOff) -> Table:

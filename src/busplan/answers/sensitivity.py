@@ -76,7 +76,9 @@ def sensitivity_blocks(found: Sensitivity, *, at: str) -> Iterator[Block]:
     yield sensitivity_table(found, at=at)
     drawn = SensitivityDrawing(found)
     if not drawn.is_empty:
-        caption = Sentence(("Change of the margin, us: a bar to the left takes from it, one to the right adds to it",))
+        change = _capital(found.effects[0].change)
+        sides = "a bar to the left takes from it, one to the right adds to it"
+        caption = Sentence((f"{change} moves the margin most; {sides}, in us",))
         legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
         yield Chart(drawn, caption, legend)
     yield _headline(found, at=at)

@@ -10,10 +10,12 @@ from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, T
 from busplan.answers.capacity import safety_record
 from busplan.answers.documents import document
 from busplan.answers.verdict import story, warnings
-from busplan.buses.figure import VERDICT
+from busplan.buses.bus import IDLE
+from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
 from busplan.drawings.timeline.drawing import TimelineDrawing
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import charged, drawn_window, overruns
+from busplan.drawings.timeline.period import model_bars
 from busplan.drawings.timeline.svg import is_coarse
 from busplan.forms.blocks import (
     Block,
@@ -56,6 +58,7 @@ def _blocks(plan: Schedule) -> Iterator[Block]:
     """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
     yield headline(plan)
     yield from (Sentence((words,), "warns") for words in _warnings(plan))
+    yield margins_sentence(plan)
     yield timeline_chart(plan)
     yield totals_table(plan)
 
@@ -83,11 +86,35 @@ def timeline_chart(plan: Schedule) -> Chart:
     plan
         The schedule, narrowed to its window.
     """
-    subject = Sentence((f"One communication cycle by the {plan.figures.timing_model} model, ",))
     window = drawn_window(plan)
-    caption = joined(subject, charged(window), by="")
+    caption = joined(_most(window), charged(window), by="; ")
     legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
     return Chart(TimelineDrawing(plan, title=sentence_text(headline(plan))), _placed(caption, plan), legend)
+
+
+def _most(window: Schedule) -> Sentence:
+    """Say what takes most of the window."""
+    model = f"by the {window.figures.timing_model} model"
+    busy = [one for one in totals(window) if one.kind != IDLE.key]
+    if not busy:
+        return Sentence((f"Nothing but idle time {model}",))
+    most = max(busy, key=lambda one: one.total_us)
+    label = kind_of(window.profile, most.kind).label
+    taken = ShownValue(most.total_us, TOTAL.key, "us", TOTAL.decimals)
+    return sentence(f"Mostly {label}, {{}} {model}", taken)
+
+
+def margins_sentence(plan: Schedule) -> Sentence:
+    """Say what each timing model leaves of the slice."""
+    bars = model_bars(plan)
+    margins = (
+        sentence(
+            f"{{}} by the {one.timing_model} model",
+            figure_value(MARGIN, one.figures.margin_us, at=f"/margins/{number}/{MARGIN.key}"),
+        )
+        for number, one in enumerate(bars)
+    )
+    return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
 
 def totals_table(plan: Schedule) -> Table:
@@ -153,7 +180,12 @@ def _facts(plan: Schedule) -> JsonDocument:
 
 def timeline_document(plan: Schedule) -> JsonDocument:
     """Document of `busplan timeline --format json`: the cycle's figures, and events and totals of the window."""
-    return {**_facts(plan), "events": _event_records(plan), "totals": [one._asdict() for one in totals(plan)]}
+    margins = [
+        {"timing_model": one.timing_model, REQUIRED.key: one.figures.required_us, MARGIN.key: one.figures.margin_us}
+        for one in model_bars(plan)
+    ]
+    totals_ = [one._asdict() for one in totals(plan)]
+    return {**_facts(plan), "margins": margins, "events": _event_records(plan), "totals": totals_}
 
 
 def timeline_records(plan: Schedule) -> list[Record]:

@@ -1,6 +1,5 @@
 """`busplan.capacity`."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.analysis.capacity import figures as analysis
@@ -9,7 +8,8 @@ from busplan.analysis.capacity.sensitivity import Sensitivity, sensitivities
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.answers.capacity import capacity_report
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
+from busplan.api.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
+from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 
@@ -52,11 +52,12 @@ class CapacityAnswer(Answer):
         return Capacity(self.profile, self.periods)
 
 
+@renamed(periods_us="period_us", timing_models="timing_model")
 def capacity(
     profile: ProfileLike,
     *,
-    periods_us: Iterable[float] | None = None,
-    timing_models: Iterable[str] | None = None,
+    period_us: Periods | None = None,
+    timing_model: Models | None = None,
     sensitivity: bool = False,
 ) -> CapacityAnswer:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
@@ -65,11 +66,11 @@ def capacity(
     ----------
     profile
         The network: a `Profile`, a path or a shipped name.
-    periods_us
-        Communication periods T_s [us], shape (n,); by default the profile's own.
-    timing_models
-        Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
-        paper's equations as published, and "standard" for the standard's clock and packets.
+    period_us
+        Communication period T_s [us], or n of them; by default the profile's own.
+    timing_model
+        Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
+        the paper's equations as published, and "standard" for the standard's clock and packets.
     sensitivity
         If True, `sensitivities` say what moves the margin: by how much each small change of the network does, by the
         timing model that decides, and what binds next.
@@ -92,7 +93,7 @@ def capacity(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.capacity("paper-1ms", periods_us=[500])
+    >>> answer = busplan.capacity("paper-1ms", period_us=500)
     >>> [(one.timing_model, one.fits, one.max_axes) for one in answer.results]
     [('paper', True, 8), ('standard', False, 4)]
     >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
@@ -106,7 +107,7 @@ def capacity(
     network = load_profile(profile)
     found = analysis.capacity(
         network,
-        periods_us=None if periods_us is None else items(periods_us, name="periods_us"),
-        timing_models=checked_models(timing_models, network),
+        periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
+        timing_models=checked_models(timing_model, network),
     )
     return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found) if sensitivity else ())

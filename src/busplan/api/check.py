@@ -8,6 +8,7 @@ from busplan.analysis.circle.check import MOST_STEPS
 from busplan.answers.check import check_report, summary_sentence
 from busplan.api.answer import Answer
 from busplan.api.inputs import Path, argument, items
+from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.profile.collect import collect
@@ -53,14 +54,15 @@ class CheckAnswer(Answer):
         return CheckReport(self.files)
 
 
-def check(paths: Path | Iterable[Path], *, with_circle: bool = True, circle_steps: int = MOST_STEPS) -> CheckAnswer:
+@renamed(with_circle="circle")
+def check(paths: Path | Iterable[Path], *, circle: bool = True, circle_steps: int = MOST_STEPS) -> CheckAnswer:
     """Check whether profiles fit their bus and hold their circle.
 
     Parameters
     ----------
     paths
         One or several files, folders (every *.toml below with a `schema_version`) or shipped names.
-    with_circle
+    circle
         Run the circle test of profiles that ask for one.
     circle_steps
         Most simulated steps of each axis of a circle: a longer one is not run, and has a warning.
@@ -85,6 +87,4 @@ def check(paths: Path | Iterable[Path], *, with_circle: bool = True, circle_step
     """
     several = [paths] if isinstance(paths, str | os.PathLike) else items(paths, name="paths")
     sources = collect([argument(path) for path in several]).sources
-    return CheckAnswer(
-        tuple(check_source(source, with_circle=with_circle, circle_steps=circle_steps) for source in sources)
-    )
+    return CheckAnswer(tuple(check_source(source, with_circle=circle, circle_steps=circle_steps) for source in sources))

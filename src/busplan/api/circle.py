@@ -1,13 +1,13 @@
 """`busplan.circle_test`."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from busplan.analysis.circle import roundness as analysis
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
 from busplan.answers.circle import circle_report
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, items, load_profile
+from busplan.api.inputs import Periods, ProfileLike, load_profile, one_or_several
+from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -48,11 +48,12 @@ class CircleTestAnswer(Answer):
         return CircleTest(self.profile, self.results, self.runs)
 
 
+@renamed(periods_us="period_us", with_contributions="contributions")
 def circle_test(
     profile: ProfileLike,
     *,
-    periods_us: Iterable[float] | None = None,
-    with_contributions: bool = False,
+    period_us: Periods | None = None,
+    contributions: bool = False,
     progress: Progress | None = None,
 ) -> CircleTestAnswer:
     """Tell whether the circle is still round: simulate both axes at the communication period.
@@ -61,9 +62,9 @@ def circle_test(
     ----------
     profile
         The network, its servo and its circle: a `Profile`, a path or a shipped name.
-    periods_us
-        Communication periods T_s [us], shape (n,); by default the profile's own.
-    with_contributions
+    period_us
+        Communication period T_s [us], or n of them; by default the profile's own.
+    contributions
         If True, remove each error source in turn, and rank them.
     progress
         Called from time to time with the steps simulated and the steps known to be needed.
@@ -94,8 +95,8 @@ def circle_test(
     """
     found = analysis.circle_test(
         load_profile(profile),
-        periods_us=None if periods_us is None else items(periods_us, name="periods_us"),
-        with_contributions=with_contributions,
+        periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
+        with_contributions=contributions,
         progress=progress,
     )
-    return CircleTestAnswer(*found, with_contributions=with_contributions)
+    return CircleTestAnswer(*found, with_contributions=contributions)

@@ -16,6 +16,10 @@ from busplan.sections.profile import Profile
 Path = str | os.PathLike[str]
 """A str may also be the name of a shipped profile; a path object is always a path."""
 ProfileLike = Profile | Path
+Periods = float | Iterable[float]
+"""A communication period [us], or several."""
+Models = str | Iterable[str]
+"""The name of a timing model, or several."""
 MOST_FLOAT: Final = sys.float_info.max
 
 _Item = TypeVar("_Item")
@@ -101,23 +105,36 @@ def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
     return found
 
 
-def checked_models(timing_models: Iterable[str] | None, profile: Profile) -> tuple[str, ...]:
-    """Check the names of timing models; None means all of the profile's kind of bus.
+def one_or_several(values: Any, *, name: str) -> list[Any]:
+    """List of one value or of several, converted from NumPy.
+
+    Raises
+    ------
+    BusplanError
+        No values.
+    """
+    found = plain(values)
+    is_one = isinstance(found, str | os.PathLike) or not isinstance(found, Iterable)
+    return [found] if is_one else items(found, name=name)
+
+
+def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, ...]:
+    """Check the name of a timing model, or of several; None means all of the profile's kind of bus.
 
     Raises
     ------
     BusplanError
         An unknown or a repeated name.
     """
-    if timing_models is None:
+    if timing_model is None:
         return model_names(profile)
-    found = items(timing_models, name="timing_models")
+    found = one_or_several(timing_model, name="timing_model")
     names = [one.name for one in bus_of(profile).timing_models]
     if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(names):
         raise BusplanError(
-            f"timing_models {found!r}: expected {listed([*map(repr, names)], 'or')}, each once, in a list"
+            f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
         )
-    return tuple(known_model(profile, one, name="timing_models") for one in found)
+    return tuple(known_model(profile, one, name="timing_model") for one in found)
 
 
 def finite(value: object, *, name: str) -> float:

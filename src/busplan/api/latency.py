@@ -7,7 +7,8 @@ from busplan.analysis import latency as analysis
 from busplan.analysis.latency import Transaction
 from busplan.answers.latency import latency_report
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, checked_models, items, load_profile, whole
+from busplan.api.inputs import Models, ProfileLike, checked_models, load_profile, one_or_several, whole
+from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.forms.numbers import plural
 from busplan.sections.profile import Profile
@@ -39,11 +40,12 @@ class LatencyAnswer(Answer):
         return analysis.LatencyResult(self.profile.name, self.transactions)
 
 
+@renamed(payloads_bytes="payload_bytes", timing_models="timing_model")
 def latency(
     profile: ProfileLike,
     *,
-    payloads_bytes: Iterable[int] | None = None,
-    timing_models: Iterable[str] | None = None,
+    payload_bytes: int | Iterable[int] | None = None,
+    timing_model: Models | None = None,
 ) -> LatencyAnswer:
     """Show every phase of one read and one write of the farthest node.
 
@@ -51,11 +53,11 @@ def latency(
     ----------
     profile
         The network: a `Profile`, a path or a shipped name.
-    payloads_bytes
-        Payloads of both read and write [bytes], shape (n,); by default the profile's own.
-    timing_models
-        Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
-        paper's equations as published, and "standard" for the standard's clock and packets.
+    payload_bytes
+        Payload of both read and write [bytes], or n of them; by default the profile's own.
+    timing_model
+        Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
+        the paper's equations as published, and "standard" for the standard's clock and packets.
 
     Returns
     -------
@@ -74,15 +76,15 @@ def latency(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.latency("paper-two-node", payloads_bytes=[4, 1024], timing_models=["paper"])
+    >>> answer = busplan.latency("paper-two-node", payload_bytes=[4, 1024], timing_model="paper")
     >>> [(one.transaction, one.payload_bytes, round(one.phases.latency_us, 2)) for one in answer.transactions]
     [('read', 4, 43.17), ('write', 4, 43.17), ('read', 1024, 474.57), ('write', 1024, 474.57)]
     """
     network = load_profile(profile)
-    sizes = None if payloads_bytes is None else items(payloads_bytes, name="payloads_bytes")
+    sizes = None if payload_bytes is None else one_or_several(payload_bytes, name="payload_bytes")
     found = analysis.latency(
         network,
-        payloads_bytes=sizes and [whole(size, name="payloads_bytes") for size in sizes],
-        timing_models=checked_models(timing_models, network),
+        payloads_bytes=sizes and [whole(size, name="payload_bytes") for size in sizes],
+        timing_models=checked_models(timing_model, network),
     )
     return LatencyAnswer(network, found.transactions)

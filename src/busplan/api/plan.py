@@ -15,6 +15,7 @@ from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.answers.plan import plan_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, items, load_profile, plain, whole
+from busplan.api.renamed import renamed
 from busplan.buses.bus import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -85,6 +86,7 @@ class PlanAnswer(Answer):
         )
 
 
+@renamed(with_circle="circle")
 def plan(
     profile: ProfileLike,
     *,
@@ -94,7 +96,7 @@ def plan(
     gap_count: int | Literal["optimal"] | None = None,
     reserve: float | None = None,
     free: Iterable[str] | None = None,
-    with_circle: bool = True,
+    circle: bool = True,
     max_circles: int = MAX_CIRCLES,
 ) -> PlanAnswer:
     """Tell what to set, with all changes together, for a number of nodes or axes.
@@ -116,7 +118,7 @@ def plan(
     free
         Names of what may be changed, of gap_count, slice_ratio, responses, payload, period and nodes; by default gap
         count, slice ratio up to 0.9, and period.
-    with_circle
+    circle
         Run the circle test, if the profile has a section for it.
     max_circles
         Number of consecutive periods to test with the circle before the strides double [1].
@@ -140,7 +142,7 @@ def plan(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.plan("paper-1ms", axes=16, with_circle=False)
+    >>> answer = busplan.plan("paper-1ms", axes=16, circle=False)
     >>> answer.recommended_changes
     {'bus.nodes': 4, 'bus.gap_count': 10}
     >>> busplan.capacity(answer.recommended.profile).verdicts[0].models_agree
@@ -159,7 +161,7 @@ def plan(
         "bus.gap_count": gap_count,
         "limits.reserve": least,
     }
-    with_circle = with_circle and network.asks_for_circle
+    with_circle = circle and network.asks_for_circle
     tries = whole(max_circles, name="max_circles")
     found = analysis.plan(
         network,

@@ -20,11 +20,13 @@ from busplan.analysis.sweep.circles import (
     with_circles,
 )
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
-from busplan.answers.sweep.rows import json_footer, json_header, json_rows
+from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows
 from busplan.answers.sweep.top import CIRCLE_COLUMNS, Tally, TopRows, default_columns, sweep_report
 from busplan.api.answer import Answer
-from busplan.api.inputs import ProfileLike, checked_models, items, load_profile
+from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
+from busplan.api.renamed import renamed
 from busplan.errors import BusplanError
+from busplan.forms import Form
 from busplan.forms.blocks import Report
 from busplan.forms.csv_rows import spelled
 from busplan.profile.kinds import words_of
@@ -84,6 +86,11 @@ class SweepAnswer(Answer):
         rows = "".join(json_rows(block, self.columns) for block in self.blocks)
         return header + rows + json_footer(complete=True)
 
+    def _text(self, form: Form) -> str:
+        if form == "csv":
+            return csv_header(self.columns) + "".join(block_text(one, self.columns, style="csv") for one in self.blocks)
+        return Answer._text(self, form)  # noqa: SLF001 - super() knows no class with slots made anew
+
     def _report(self) -> Report:
         circle = [name for name in CIRCLE_COLUMNS if name in self.columns]
         shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.profile), *circle))
@@ -110,12 +117,13 @@ def _spelled(column: Column) -> Array:
     return words[column.values]
 
 
+@renamed(timing_models="timing_model", with_circle="circle")
 def sweep(
     profile: ProfileLike,
     *,
     vary: Mapping[str, str | Iterable[object]],
-    timing_models: Iterable[str] | None = None,
-    with_circle: bool = False,
+    timing_model: Models | None = None,
+    circle: bool = False,
     force: bool = False,
 ) -> SweepAnswer:
     """Compute capacity over a grid: any keys of the profile, every combination.
@@ -127,10 +135,10 @@ def sweep(
     vary
         Values by dotted key, in the key's unit: a list, range or array of shape (n,), or text as on the command line:
         "250:8000:250". They may include words that a key takes, such as "optimal". The last key changes fastest.
-    timing_models
-        Names of timing models, in this order; by default all of the kind of bus. IEEE 1394 has "paper" for the
-        paper's equations as published, and "standard" for the standard's clock and packets.
-    with_circle
+    timing_model
+        Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
+        the paper's equations as published, and "standard" for the standard's clock and packets.
+    circle
         Also run the circle test of every point, and add its columns (errors in mm, margins).
     force
         Allow more than 1,000 circle tests.
@@ -153,14 +161,14 @@ def sweep(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [500, 1000, 4000]}, timing_models=["standard"])
+    >>> answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [500, 1000, 4000]}, timing_model="standard")
     >>> answer["safe_axes"]
     array([ 4, 12, 52])
     >>> answer["limited_by"].tolist(), len(answer)
     (['time', 'time', 'time'], 3)
     """
     network = load_profile(profile)
-    asked = None if timing_models is None else checked_models(timing_models, network)
+    asked = None if timing_model is None else checked_models(timing_model, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
@@ -168,21 +176,21 @@ def sweep(
     grid = checked_grid(
         network,
         {key: axis_values(network, key, given, name="vary") for key, given in vary.items()},
-        with_circle=with_circle,
+        with_circle=circle,
         option="vary",
-        circle_option="with_circle=True",
+        circle_option="circle=True",
     )
     if grid.points > MOST_POINTS:
         raise BusplanError(
             f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
             "write them with busplan sweep -o FILE.csv"
         )
-    models = grid_models(network, grid, asked, name="timing_models")
+    models = grid_models(network, grid, asked, name="timing_model")
     blocks = analysis.sweep(network, grid, timing_models=models)
-    if with_circle:
+    if circle:
         _require_circles(network, grid, force=force)
         blocks = (with_circles(network, block, run=_run_here) for block in blocks)
-    return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=with_circle), tuple(blocks))
+    return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=circle), tuple(blocks))
 
 
 def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
@@ -218,7 +226,7 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
 def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:
     if grid.points > MOST_CIRCLES_UNASKED and not force:
         raise BusplanError(
-            f"with_circle: {grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
+            f"circle: {grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
             "without force=True; vary less, or give it"
         )
     require_circles(profile, grid)

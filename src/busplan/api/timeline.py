@@ -7,6 +7,7 @@ from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule,
 from busplan.answers.timeline import timeline_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
+from busplan.drawings.timeline.svg import timeline_svg
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
@@ -46,6 +47,9 @@ class TimelineAnswer(Answer):
 
     def _report(self) -> Report:
         return timeline_report(self._found)
+
+    def _repr_svg_(self) -> str:
+        return timeline_svg(self._found, title=self._headline())
 
     @property
     def _found(self) -> Schedule:

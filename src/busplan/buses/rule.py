@@ -1,7 +1,7 @@
 """What a rule of the gate is, and what it may ask: figures, figures after changes, a cure."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol
 
 if TYPE_CHECKING:
     from busplan.sections.profile import Profile
@@ -9,11 +9,22 @@ if TYPE_CHECKING:
 Severity = Literal["error", "warning"]
 
 
+class Mending(NamedTuple):
+    """How a problem is mended."""
+
+    help: str = ""
+    """In words."""
+    cure: tuple[str, ...] = ()
+    """Lines of TOML, each a key with the value that mends it."""
+
+
 class RuleProblem(NamedTuple):
-    """One thing that a rule found: the dotted key that causes it, and what is wrong."""
+    """One thing that a rule found: the dotted key that causes it, what is wrong, and how it is mended."""
 
     key: str
     message: str
+    help: str = ""
+    cure: tuple[str, ...] = ()
 
 
 class RuleFigures(Protocol):
@@ -93,8 +104,8 @@ class RuleSubject(Protocol):
     def after(self, changes: Mapping[str, object]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
 
-    def cure(self) -> str:
-        """The least change after which the profile holds every constraint of a plan, in words."""
+    def cure(self) -> Mending:
+        """The least change after which the profile holds every constraint of a plan."""
 
 
 class Rule(NamedTuple):
@@ -129,17 +140,33 @@ def contradicts(fits: bool, one: RuleFigures) -> bool:
     return not is_shown if fits else one.verdict == "fits"
 
 
-def microseconds(value_us: float) -> str:
-    """Write a time for a finding."""
-    return f"{value_us:.3f} us"
+_MOST_DECIMALS: Final = 9
+
+
+def told_apart(one: float, other: float) -> tuple[str, str]:
+    """Write two numbers with one decimal, or with as many as tell them apart.
+
+    Examples
+    --------
+    >>> told_apart(348.461939453, 250.0), told_apart(250.0004, 250.0)
+    (('348.5', '250.0'), ('250.0004', '250.0000'))
+    """
+    for decimals in range(1, _MOST_DECIMALS + 1):
+        texts = f"{one:.{decimals}f}", f"{other:.{decimals}f}"
+        if texts[0] != texts[1]:
+            return texts
+    return f"{one:.1f}", f"{other:.1f}"
 
 
 def overrun(one: RuleFigures) -> str:
-    """Say by how much a cycle is too long, as far as it is known."""
-    sides = f"the cycle needs {microseconds(one.required_us)} of {microseconds(one.available_us)}"
+    """Say what a cycle needs of its slice, and the margin as far as it is known."""
+    needs, given = told_apart(one.required_us, one.available_us)
+    return f"needs {needs} us of {given} us, {margin(one)}"
+
+
+def margin(one: RuleFigures) -> str:
+    """Say how large the margin is, as far as it is known."""
     if one.uncertainty_us is None or one.margin_corrected_us is None:
-        return f"{sides} under the {one.timing_model} timing, {microseconds(-one.margin_us)} too much"
-    margin = f"{one.margin_corrected_us:.1f} +/- {one.uncertainty_us:.1f} us"
-    if one.bias_us is None:
-        return f"{sides}; the margin is {margin}, and no bias of the model is known"
-    return f"{sides}; with the model's bias the margin is {margin}"
+        return f"margin {told_apart(one.margin_us, 0.0)[0]} us under the {one.timing_model} timing"
+    said = f"{told_apart(one.margin_corrected_us, 0.0)[0]} +/- {one.uncertainty_us:.1f} us"
+    return f"corrected margin {said}" if one.bias_us is not None else f"margin {said}, no bias known"

@@ -80,12 +80,9 @@ def report_with(changes: KeyChanges, report: "Report") -> "Report":
     """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
     if not changes.by_set:
         return report
-    from busplan.answers.documents import changed_document, changes_sentences
+    from busplan.answers.documents import changed_report
 
-    return report._replace(
-        blocks=lambda: (*changes_sentences(changes), *report.blocks()),
-        document=lambda: changed_document(report.document(), changes),
-    )
+    return changed_report(report, changes)
 
 
 @contextmanager

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.answers.gate import FORMATS, gate_format
+from busplan.cli.answering import columns
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
-from busplan.cli.output import PlanFailsError, emit_text, say, write_document
+from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -48,14 +49,16 @@ def check_command(
     ],
     changes: KeyChanges = NO_CHANGES,
     format_: Annotated[
-        FormatName,
+        FormatName | None,
         typer.Option(
             "--format",
             envvar="BUSPLAN_FORMAT",
-            help=f"Form of the report; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are for the build "
-            "service.",
+            metavar="FORM",
+            help="Form of the report: concise is one line a finding, full shows the line of the file with the value "
+            f"underlined, json is the document of all; {', '.join(_BUILD_FORMATS[:-1])} and {_BUILD_FORMATS[-1]} are "
+            "for the build service.  [default: full on a terminal, otherwise concise]",
         ),
-    ] = "text",
+    ] = None,
     output: Annotated[Path | None, output_option("Write the report to FILE")] = None,
     fail_on: Annotated[
         Literal["error", "warning"], typer.Option("--fail-on", help="Least severity that fails the check.")
@@ -86,6 +89,10 @@ def check_command(
     update_baseline: Annotated[
         bool, typer.Option("--update-baseline", help="Record what the profiles carry now in the --baseline file.")
     ] = False,
+    skip_others: Annotated[
+        bool,
+        typer.Option("--skip-others", help="Skip named files that claim no `schema_version`, and count them."),
+    ] = False,
     jobs: Annotated[
         int, typer.Option("--jobs", "-j", metavar="N", min=1, help="Number of processes to check with.")
     ] = 1,
@@ -99,7 +106,7 @@ def check_command(
 ) -> None:
     """Fail a build when a profile no longer fits its bus or its circle.
 
-    Each finding is a line: `path:line:column: CODE message`. `busplan rule CODE` explains it. A comment
+    Each finding has a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment
     `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. Exits 0 when clean, 1 with
     findings at or above --fail-on, 2 when it could not do the job; one broken file does not stop the others.
 
@@ -115,7 +122,7 @@ def check_command(
     from busplan.rules.gate import check_source
     from busplan.rules.report import CheckReport
 
-    collection = collect(paths, stdin_name=stdin_filename)
+    collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
     _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
     recorded = _read_baseline(baseline, needed=not update_baseline)
     before = None
@@ -134,7 +141,8 @@ def check_command(
         changes=changes,
         record=update_baseline,
     )
-    report = CheckReport(_check(collection.sources, one, jobs=jobs), changes)
+    others = len(collection.skipped) if skip_others else 0
+    report = CheckReport(_check(collection.sources, one, jobs=jobs), changes, others=others)
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if verbose:
@@ -190,6 +198,8 @@ def _check(
 def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":
     if path is None or (not needed and not path.exists()):
         return None
+    if needed and not path.exists():
+        raise BusplanError(f"{path}: no such file; record it with --update-baseline")
     from busplan.profile.toml import read_bytes
     from busplan.rules.baseline import MAX_BASELINE_BYTES, read_baseline
 
@@ -206,9 +216,9 @@ def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":
 
 def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
     """Record the checked profiles; others keep their record."""
-    from busplan.rules.baseline import write_baseline
+    from busplan.rules.baseline import Record, write_baseline
 
-    now = {file.path: file.figures for file in report.files if file.figures}
+    now = {file.path: Record(file.figures, file.keys) for file in report.files if file.figures}
     with changing(path):
         # Read again: another run may have changed it since the check began.
         old = _read_baseline(path, needed=False)
@@ -221,11 +231,14 @@ def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
         say(f"warning: {path}: dropped {', '.join(gone)}, recorded by other timing models; check them, too")
 
 
-def _write(report: "CheckReport", *, format_: str, output: Path | None) -> None:
-    chosen = gate_format(format_)
-    text = chosen.write(report)
-    if output is None and FORMATS[format_].reader == "people":
-        emit_text(text)
+def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -> None:
+    """Write the report; without a format, as a person at a terminal or a program behind a pipe reads it best."""
+    name = format_ or ("full" if output is None and is_terminal() else "concise")
+    chosen = gate_format(name)
+    if output is not None or FORMATS[name].reader != "people":
+        write_document(chosen.write(report), output, quiet=True)
+    elif is_styled():
+        emit_text(chosen.on_terminal(report, width=columns()))
     else:
-        write_document(text, output, quiet=True)
+        emit_text(chosen.write(report))
     say(*chosen.log(report))

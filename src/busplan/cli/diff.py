@@ -1,6 +1,5 @@
 """`busplan diff`."""
 
-from itertools import count
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,15 +19,11 @@ from busplan.cli.options import (
 )
 from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
-from busplan.cli.several import load_each, part_of
+from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from busplan.analysis.circle.roundness import CircleFigures
-    from busplan.progress import Progress
     from busplan.sections.profile import Profile
 
 
@@ -85,6 +80,7 @@ def diff_command(
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
+        from busplan.analysis.comparison.circle_tests import circle_tests
         from busplan.analysis.comparison.difference import difference
         from busplan.answers.diff import diff_report
         from busplan.answers.diff_headline import regression_words
@@ -92,7 +88,7 @@ def diff_command(
 
         one, other = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
         with progress_bar("circle tests") as progress:
-            test = _circle(progress) if circle else None
+            test = circle_tests(progress) if circle else None
             found = difference(one, other, timing_models=_models(timing, one, other), circle=test)
         give(diff_report(found, arguments=(a, b)))
     regressions = found.regressions(tolerance=allowed / 100)
@@ -122,15 +118,3 @@ def _tolerance(percent: float | None, *, wanted: bool) -> float:
     if not (isfinite(percent) and percent >= 0):
         raise BusplanError(f"--tolerance {percent:g}: must be 0 or more, in percent")
     return percent
-
-
-def _circle(progress: "Progress") -> "Callable[[Profile], CircleFigures]":
-    """Make a function that runs the circle test, with one progress for both profiles."""
-    number = count()
-
-    def run(plan: "Profile") -> "CircleFigures":
-        from busplan.analysis.circle.roundness import circle_test
-
-        return circle_test(plan, explain=False, progress=part_of(progress, number=next(number), of=2)).results[0]
-
-    return run

@@ -95,9 +95,14 @@ def write_document(document: str | bytes, output: Path | None, *, quiet: bool = 
         say(f"wrote {output}")
 
 
+def is_terminal() -> bool:
+    """Whether a person at a terminal reads standard output."""
+    return sys.stdout.isatty()
+
+
 def is_styled() -> bool:
     """Whether to write colours: on a terminal, or with FORCE_COLOR."""
-    return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or sys.stdout.isatty()
+    return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or is_terminal()
 
 
 def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:

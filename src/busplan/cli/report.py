@@ -10,7 +10,7 @@ from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, tak
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import OutputOption, complete_profile, format_option
 from busplan.cli.progress import progress_bar
-from busplan.cli.several import load_each, part_of
+from busplan.cli.several import load_each
 from busplan.errors import BusplanError
 from busplan.forms import Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -80,13 +80,10 @@ def report_command(
 def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, changes: KeyChanges, circle: bool
 ) -> "Report":
-    from busplan.analysis.all_answers import all_answers
+    from busplan.analysis.all_answers import answers_of_each
     from busplan.answers.page.report import ReportedProfile, page_report
 
-    subjects = []
     with progress_bar("circle tests") as progress:
-        for number, (argument, plan) in enumerate(zip(arguments, plans, strict=True)):
-            own = part_of(progress, number=number, of=len(plans))
-            found = all_answers(plan, with_circle=circle, progress=own)
-            subjects.append(ReportedProfile(argument, found, changes))
+        found = answers_of_each(plans, with_circle=circle, progress=progress)
+    subjects = [ReportedProfile(argument, one, changes) for argument, one in zip(arguments, found, strict=True)]
     return page_report(subjects, title=title)

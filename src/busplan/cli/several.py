@@ -1,18 +1,14 @@
-"""Common parts of commands with several profiles: read them all, and show one progress."""
+"""Common part of commands with several profiles: read them all."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from busplan.errors import BusplanError
-from busplan.progress import Progress
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from busplan.sections.profile import Profile
-
-_PARTS: Final = 1000
-"""Progress steps of one piece of work."""
 
 
 def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "list[Profile]":
@@ -43,22 +39,3 @@ def load_each(arguments: Iterable[str], load: "Callable[[str], Profile]") -> "li
     if problems:
         raise BusplanError(*dict.fromkeys(problems))
     return plans
-
-
-def part_of(progress: Progress, *, number: int, of: int) -> Progress:
-    """Progress of one of several equal pieces of work.
-
-    Parameters
-    ----------
-    progress
-        Progress of all pieces.
-    number
-        Number of the piece, from 0.
-    of
-        Number of pieces.
-    """
-
-    def report(done: int, total: int) -> None:
-        progress(number * _PARTS + done * _PARTS // total, of * _PARTS)
-
-    return report

@@ -101,7 +101,7 @@ def _drawing(job: "SweepJob") -> "FigureData | None":
     from busplan.drawings.sweep_plot import FigureData, require_drawable
 
     require_drawable(job.grid)
-    return FigureData(job.grid, figure=job.figure, timing_models=job.timing_models)
+    return FigureData(job.profile, job.grid, figure=job.figure, timing_models=job.timing_models)
 
 
 def _require_circles(job: "SweepJob") -> None:

@@ -2,21 +2,25 @@
 
 from collections.abc import Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, Final
+from textwrap import fill
 
 import numpy as np
 
+from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
-from busplan.analysis.sweep.grid import Array, Grid
+from busplan.analysis.sweep.grid import Grid
 from busplan.drawings.circle_plot import metadata, require_matplotlib
+from busplan.drawings.sweep_scales import key_label, plot_scale, plotted_figure
+from busplan.drawings.sweep_words import Panel, Plotted, caption
 from busplan.errors import BusplanError
+from busplan.sections.base import value_at
+from busplan.sections.profile import Profile
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-MAX_DRAWN: Final = 250_000
+MAX_DRAWN = 250_000
 """Most points of a figure: more would not be visible."""
-_MAX_KEYS: Final = 2
+_MAX_KEYS = 2
+_LINE_CHARACTERS = 100
+_MAP_INCHES = 6.4
 
 
 def require_drawable(grid: Grid) -> None:
@@ -36,17 +40,33 @@ def require_drawable(grid: Grid) -> None:
 
 
 class FigureData:
-    """One figure over the whole grid under each timing model, collected block by block."""
+    """One figure over the whole grid under each timing model, collected block by block.
 
-    def __init__(self, grid: Grid, *, figure: str, timing_models: Sequence[str]) -> None:
-        self._grid, self._figure, self._models = grid, figure, timing_models
+    Parameters
+    ----------
+    profile
+        The network: this design, which the picture marks.
+    grid
+        The grid.
+    figure
+        Name of the column.
+    timing_models
+        The timing models.
+    """
+
+    def __init__(self, profile: Profile, grid: Grid, *, figure: str, timing_models: Sequence[str]) -> None:
+        self._profile, self._grid, self._name, self._models = profile, grid, figure, timing_models
         self._values = np.full((grid.points, len(timing_models)), np.nan)
+        self._unsafe = np.zeros((grid.points, len(timing_models)), dtype=bool)
 
     def add(self, block: SweepBlock) -> None:
         """Add a block."""
-        start = block.chunk.start
-        rows = block.rows(self._figure).reshape(-1, len(self._models))
-        self._values[start : start + block.chunk.points] = rows
+        points = slice(block.chunk.start, block.chunk.start + block.chunk.points)
+        self._values[points] = block.rows(self._name).reshape(-1, len(self._models))
+        safety = bus_of(self._profile).safety_figure
+        for number, safe in enumerate(block.columns(safety.key) if safety else ()):
+            unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
+            self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
 
     def draw(self, title: str, *, file_format: str) -> bytes:
         """Draw the collected values, the timing models side by side; the same sweep gives the same bytes.
@@ -61,59 +81,52 @@ class FigureData:
         from matplotlib import rc_context
         from matplotlib.figure import Figure
 
-        varied = [key for key, axis in self._grid.axes.items() if axis.size > 1] or [next(iter(self._grid.axes))]
+        from busplan.drawings.sweep_panels import draw_curves, draw_maps
+
+        plotted = self.plotted()
+        is_map = len(plotted.scales) == _MAX_KEYS
+        width = _MAP_INCHES * max(1, len(plotted.panels)) + 1.0 if is_map else 8.0
         buffer = BytesIO()
         with rc_context({"text.parse_math": False, "svg.hashsalt": "busplan"}):
-            is_map = len(varied) == _MAX_KEYS
-            figure = Figure(figsize=(6.0 * (len(self._models) if is_map else 1.3), 4.8), layout="constrained")
-            fixed = ", ".join(
-                f"{key} = {axis.part(0, 1)[0]}" for key, axis in self._grid.axes.items() if key not in varied
-            )
-            figure.suptitle(f"{title}: {self._figure}{f', {fixed}' if fixed else ''}")
-            if is_map:
-                self._maps(figure, varied)
-            else:
-                self._curves(figure.subplots(), varied[0])
+            figure = Figure(figsize=(width, 5.4), layout="constrained")
+            head = fill(f"{title}: {plotted.label}{self._fixed()}", _LINE_CHARACTERS)
+            figure.suptitle(f"{head}\n{fill(caption(plotted), int(13 * width))}", fontsize=11)
+            (draw_maps if is_map else draw_curves)(figure, plotted)
             figure.savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
         return buffer.getvalue()
 
-    def _curves(self, axes: "Axes", key: str) -> None:
-        places, labels = self._places(key)
-        # Mark single points only if there are few.
-        marker = "." if len(places) <= 100 else ""  # noqa: PLR2004
-        for number, model in enumerate(self._models):
-            if np.isnan(self._values[:, number]).all():
-                continue  # a figure that the model does not have
-            axes.plot(places, self._values[:, number], label=model, marker=marker, linestyle=("-", "--")[number % 2])
-        if labels is not None:
-            axes.set_xticks(places, labels)
-        axes.set_xlabel(key)
-        axes.set_ylabel(self._figure)
-        axes.grid(visible=True, linewidth=0.4, color="0.85")
-        axes.legend(title="timing model")
-
-    def _maps(self, figure: Any, varied: Sequence[str]) -> None:
-        down, across = varied
-        shape = (self._grid.axes[down].size, self._grid.axes[across].size)
-        finite = self._values[np.isfinite(self._values)]
-        low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-        (y, y_labels), (x, x_labels) = self._places(down), self._places(across)
-        for number, axes in enumerate(figure.subplots(1, len(self._models), squeeze=False)[0]):
-            image = axes.pcolormesh(
-                x, y, self._values[:, number].reshape(shape), vmin=low, vmax=high, shading="nearest", rasterized=True
+    def plotted(self) -> Plotted:
+        """What is drawn, in words and in its unit."""
+        keys = self._varied()
+        figure, factor = plotted_figure(self._profile, self._name)
+        shape = tuple(self._grid.axes[key].size for key in keys)
+        panels = tuple(
+            Panel(model, number, factor * values.reshape(shape), unsafe.reshape(shape))
+            for number, (model, values, unsafe) in enumerate(
+                zip(self._models, self._values.T, self._unsafe.T, strict=True)
             )
-            if x_labels is not None:
-                axes.set_xticks(x, x_labels)
-            if y_labels is not None:
-                axes.set_yticks(y, y_labels)
-            axes.set_xlabel(across)
-            axes.set_ylabel(down)
-            axes.set_title(f"{self._models[number]} model")
-        figure.colorbar(image, ax=figure.axes, label=self._figure)
+            if not np.isnan(values).all()  # a figure that the model does not have
+        )
+        as_cells = len(keys) == _MAX_KEYS
+        scales = tuple(plot_scale(self._profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
+        if not self._is_own():
+            scales = tuple(one._replace(own=None) for one in scales)
+        bus = bus_of(self._profile)
+        return Plotted(figure, scales, panels, bus.deciding_model, bus.safety)
 
-    def _places(self, key: str) -> tuple[Array, list[str] | None]:
-        """Positions of a key's values along its axis, and their labels unless these are the numbers."""
-        values = self._grid.axes[key].part(0, self._grid.axes[key].size)
-        if values.dtype == object or not (np.diff(values) > 0).all():
-            return np.arange(values.size), [str(one) for one in values]
-        return values, None
+    def _varied(self) -> list[str]:
+        """Keys with several values; the only key if none has."""
+        varied = [key for key, axis in self._grid.axes.items() if axis.size > 1]
+        return varied or [next(iter(self._grid.axes))]
+
+    def _single(self) -> dict[str, object]:
+        """Keys with one value."""
+        varied = self._varied()
+        return {key: axis.part(0, 1).tolist()[0] for key, axis in self._grid.axes.items() if key not in varied}
+
+    def _is_own(self) -> bool:
+        """Whether the keys with one value have that of this design."""
+        return all(value_at(self._profile, key) == value for key, value in self._single().items())
+
+    def _fixed(self) -> str:
+        return "".join(f"; {key_label(self._profile, key)}: {value}" for key, value in self._single().items())

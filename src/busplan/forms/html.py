@@ -1,10 +1,11 @@
 """An answer as one self-contained HTML file: no network, no script; light, dark, narrow and printed styles."""
 
 from collections.abc import Iterator, Sequence
+from importlib.resources import files
 from itertools import groupby
 from typing import Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from busplan import __version__
@@ -35,6 +36,32 @@ def page(report: Report) -> str:
     str
         The whole document. The same answer always gives the same document.
     """
+    found = shown_blocks(report)
+    return _template("page.html.j2").render(
+        title=report.title,
+        blocks=found,
+        program=f"busplan {__version__}",
+        colours=Markup(_colours(found)),  # noqa: S704 - our own constants
+    )
+
+
+def fragment(report: Report) -> str:
+    """Write the blocks of an answer as a piece of HTML for a notebook, whose styles reach nothing outside it.
+
+    Parameters
+    ----------
+    report
+        The answer.
+    """
+    found = shown_blocks(report)
+    page = files("busplan.forms") / "templates"
+    chart, style = ((page / name).read_text(encoding="utf-8") for name in ("chart.css", "style.css"))
+    # The rules are nested in one of the piece; what the page's root has, it has itself.
+    own = f"{chart}{_colours(found)}{style}".replace(":root", "&")
+    return _template("fragment.html.j2").render(blocks=found, style=Markup(own))  # noqa: S704 - as above
+
+
+def _template(name: str) -> Template:
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
         autoescape=True,
@@ -44,9 +71,9 @@ def page(report: Report) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    for name in (*_TYPES, *_BLOCKS):
-        kind = getattr(made_of, name)
-        environment.tests[name.lower()] = lambda one, kind=kind: isinstance(one, kind)
+    for each in (*_TYPES, *_BLOCKS):
+        kind = getattr(made_of, each)
+        environment.tests[each.lower()] = lambda one, kind=kind: isinstance(one, kind)
     environment.filters |= {
         "exact": lambda value: json_text(value.value),
         "exact_unit": lambda value: unit_of(value.key),
@@ -61,16 +88,14 @@ def page(report: Report) -> str:
         "svg": Markup,
         "holds_sections": lambda section: any(isinstance(one, Chapter) for one in section.blocks),
     }
-    found = shown_blocks(report)
+    return environment.get_template(name)
+
+
+def _colours(blocks: Sequence[Block]) -> str:
+    """Rules of the drawings among the blocks, and of inks on a light and on a dark background."""
     light, dark = fills(".chart")
-    styles = dict.fromkeys(chart.drawing.stylesheet for chart in _charts(found))
-    colours = Markup(f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n")  # noqa: S704 - our own constants
-    return environment.get_template("page.html.j2").render(
-        title=report.title,
-        blocks=found,
-        program=f"busplan {__version__}",
-        colours=colours,
-    )
+    styles = dict.fromkeys(chart.drawing.stylesheet for chart in _charts(blocks))
+    return f"{''.join(styles)}{light}{DARK}{{\n{dark}}}\n"
 
 
 def _shown(piece: object) -> object:

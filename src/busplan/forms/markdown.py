@@ -72,12 +72,7 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
             yield from _caption(block.caption)
             yield from _table(block)
         case Chart():
-            drawn = block.drawing.mermaid()
-            if drawn is not None:
-                yield from (*_caption(block.caption), "```mermaid", drawn.rstrip("\n"), "```")
-            elif block.drawing.is_text_in_markdown:
-                lines = block.drawing.characters(_TEXT_WIDTH) or ()
-                yield from (*_caption(block.caption), "```text", *plain_text(lines).splitlines(), "```")
+            yield from _chart(block)
         case Snippet():
             yield from (f"```{block.language}", *block.lines, "```")
         case Calculation():
@@ -93,6 +88,18 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
             yield from _blocks(block.blocks, level=level + 1)
         case Command():
             yield code(block.line)
+
+
+def _chart(chart: Chart) -> Iterator[str]:
+    """A drawing as a diagram or in characters; where it is neither, what it shows in words."""
+    mermaid = chart.drawing.mermaid()
+    lines = chart.drawing.characters(_TEXT_WIDTH) if chart.drawing.is_text_in_markdown and mermaid is None else None
+    if mermaid is not None:
+        yield from (*_caption(chart.caption), "```mermaid", mermaid.rstrip("\n"), "```")
+    elif lines:
+        yield from (*_caption(chart.caption), "```text", *plain_text(lines).splitlines(), "```")
+    else:
+        yield f"{_sentence(chart.caption).removesuffix('.')}."
 
 
 def _caption(caption: Sentence | None) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ _FACTORS: Final = {("", "%"): 100.0, ("mm", "um"): 1e3, ("us", "ms"): 1e-3, ("us
 """Factor from the unit of a key to the unit it is written in; the key `per_byte_us` is in us/byte."""
 _MILLISECOND_US: Final = 1e3
 _SECOND_US: Final = 1e6
-_SILENT: Final = frozenset(("", "1", "nodes", "axes"))
+SILENT_UNITS: Final = frozenset(("", "1", "nodes", "axes"))
 """Units that a sentence does not repeat behind a figure: a noun names them."""
 ROUNDING_UM: Final = 1e-6
 """Lengths below a picometre, in um, are float rounding."""
@@ -59,7 +59,7 @@ def with_unit(value: ShownValue) -> str:
 
 def unit_text(value: ShownValue) -> str:
     """Unit behind a figure in a sentence, with its space."""
-    if value.unit in _SILENT or figure_text(value) == MISSING:
+    if value.unit in SILENT_UNITS or figure_text(value) == MISSING:
         return ""
     return "%" if value.unit == "%" else f" {value.unit}"
 
@@ -131,7 +131,7 @@ def listed(words: Sequence[str], last: str) -> str:
     return f"{', '.join(before)} {last} {end}" if before else end
 
 
-def _factor(value: ShownValue) -> float:
+def factor_of(value: ShownValue) -> float:
     """Factor to the unit a value is written in; KeyError for an unknown pair. A key without a unit has that unit."""
     own = unit_of(value.key)
     if own == value.unit or not value.unit or (not own and value.unit != "%"):
@@ -140,7 +140,7 @@ def _factor(value: ShownValue) -> float:
 
 
 def _number(value: ShownValue) -> str:
-    factor = _factor(value)
+    factor = factor_of(value)
     number = value.value if factor == 1.0 else value.value * factor
     if isnan(number):
         return MISSING

@@ -28,10 +28,10 @@ class Collection(NamedTuple):
 
     sources: tuple[ProfileSource, ...]
     skipped: tuple[str, ...]
-    """TOML files below a folder without a `schema_version`."""
+    """Files without a `schema_version`: TOML files below a folder, and with `skip_others` those that are named."""
 
 
-def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collection:
+def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>", skip_others: bool = False) -> Collection:
     """Find the profiles of a list of paths, each once.
 
     Parameters
@@ -41,6 +41,8 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
         and "-" for standard input.
     stdin_name
         Name of standard input in messages.
+    skip_others
+        If True, skip named files that claim no `schema_version`, too; without it they are checked, and refused.
 
     Returns
     -------
@@ -52,7 +54,7 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
     names: set[str] = set()
     skipped: list[str] = []
     for argument in arguments:
-        for source in _meant(argument, stdin_name=stdin_name, skipped=skipped):
+        for source in _meant(argument, stdin_name=stdin_name, skipped=skipped, skip_others=skip_others):
             key = _place(source.path).as_posix() if source.failure is None else source.failure
             if key in sources:
                 continue
@@ -60,10 +62,10 @@ def collect(arguments: Sequence[str], *, stdin_name: str = "<stdin>") -> Collect
             taken = source.failure is None and source.name in names
             sources[key] = source._replace(name=source.path.absolute().as_posix()) if taken else source
             names.add(source.name)
-    return Collection(tuple(sources.values()), tuple(skipped))
+    return Collection(tuple(sources.values()), tuple(dict.fromkeys(skipped)))
 
 
-def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[ProfileSource]:
+def _meant(argument: str, *, stdin_name: str, skipped: list[str], skip_others: bool) -> Iterator[ProfileSource]:
     """Sources of one argument: one, or all below a folder."""
     try:
         path, name = locate(argument)
@@ -73,6 +75,8 @@ def _meant(argument: str, *, stdin_name: str, skipped: list[str]) -> Iterator[Pr
             yield ProfileSource(path, name)
         elif path.is_dir():
             yield from _below(path, skipped)
+        elif skip_others and path.is_file() and not _claims(path):
+            skipped.append(_name(path))
         else:
             yield ProfileSource(path, _name(path))
     except (BusplanError, ValueError) as error:  # ValueError: a NUL in the path

@@ -7,7 +7,7 @@ from codecs import BOM_UTF8
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
 
 from busplan.errors import PlacedError, PlacedProblem
 
@@ -65,6 +65,16 @@ def text_of(content: bytes, *, name: str, wanted: str) -> str:
         raise PlacedError(name, (PlacedProblem(line, column, "syntax", message),)) from None
 
 
+class Spot(NamedTuple):
+    """The line and column of a key, and the columns on that line of what is to be marked, all counted from 1."""
+
+    line: int
+    column: int
+    marked_column: int
+    marked_end_column: int
+    """The column behind the last."""
+
+
 @dataclass(frozen=True)
 class Document:
     """A TOML text with its name in messages."""
@@ -98,6 +108,29 @@ class Document:
         while path and path not in self.places:
             path = path[:-1]
         return self.places[path].key_start if path else 0
+
+    def spot(self, path: "KeyPath", *, marks_key: bool = False) -> Spot:
+        """Place of a key with its value marked; if the key is missing, of the nearest table around it.
+
+        Parameters
+        ----------
+        path
+            Path of the key.
+        marks_key
+            If True, mark the key instead of its value.
+        """
+        found = path
+        while found and found not in self.places:
+            found = found[:-1]
+        if not found:
+            return Spot(1, 1, 1, 2)
+        place = self.places[found]
+        marks_key = marks_key or found != path
+        start, end = (place.key_start, place.key_end) if marks_key else (place.value_start, place.value_end)
+        line, column = self.lines.line_and_column(place.key_start)
+        # A value starts on the line of its key; one of several lines is marked on the first.
+        marked = column + start - place.key_start
+        return Spot(line, column, marked, marked + len(self.text[start:end].partition("\n")[0]))
 
     def syntax_error(self, offset: int, message: str) -> PlacedError:
         """Make the error for invalid TOML at an offset."""

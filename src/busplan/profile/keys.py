@@ -4,7 +4,29 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final, Literal, NamedTuple
 
 from busplan.errors import BusplanError
+from busplan.sections.base import Section
 from busplan.sections.profile import Profile
+
+
+def default_of(profile: Profile, key: str) -> object:
+    """Default value of a key that a profile has, as plain data; None if it has none.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> default_of(load("paper-4ms").profile, "bus.gap_count"), default_of(load("paper-4ms").profile, "bus.nodes")
+    (63, None)
+    """
+    *sections, last = key.split(".")
+    inner: object = profile
+    for part in sections:
+        of_name = [one for one in inner if getattr(one, NAME) == part] if isinstance(inner, tuple) else []
+        inner = of_name[0] if of_name else getattr(inner, part)
+    field = type(inner).model_fields[last] if isinstance(inner, Section) else None
+    if field is None or field.is_required():
+        return None
+    default = field.get_default(call_default_factory=True)
+    return list(default) if isinstance(default, tuple) else default
 
 
 class KeyValue(NamedTuple):

@@ -45,11 +45,12 @@ class Measurement(NamedTuple):
     """T1 + T2, if measured."""
 
 
-class _Cell(NamedTuple):
+class MeasuredCell(NamedTuple):
     """One value of a line, without surrounding spaces and quotes."""
 
     text: str
     column: int
+    """Where it stands in the line, from 1."""
 
 
 def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
@@ -85,11 +86,35 @@ def parse_measurements(content: bytes, *, name: str) -> tuple[Measurement, ...]:
     if not rows:
         raise PlacedError(name, (PlacedProblem(1, 1, "missing-key", f"no header; {_EXPECTED}"),))
     line, header = rows[0]
+    return measurements_below(header, rows[1:], line=line, name=name)
+
+
+def measurements_below(
+    header: Sequence[MeasuredCell], rows: Sequence[tuple[int, Sequence[MeasuredCell]]], *, line: int, name: str
+) -> tuple[Measurement, ...]:
+    """Read the rows below a header.
+
+    Parameters
+    ----------
+    header
+        Names of the columns.
+    rows
+        Each row with its line, from 1.
+    line
+        Line of the header.
+    name
+        Name of the measurements in messages.
+
+    Raises
+    ------
+    PlacedError
+        All problems, with their places.
+    """
     problems = list(_header_problems(line, header))
     if problems:
         raise PlacedError(name, tuple(problems))
     columns = [cell.text for cell in header]
-    found = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows[1:]]
+    found = [_measurement(line, dict(zip(columns, cells, strict=False)), cells, columns) for line, cells in rows]
     problems = sorted(one for each in found if isinstance(each, list) for one in each)
     if problems:
         raise PlacedError(name, tuple(problems))
@@ -106,7 +131,7 @@ def _decoded(content: bytes, *, name: str) -> str:
     return text_of(content, name=name, wanted="save it as CSV in UTF-8")
 
 
-def _rows(text: str) -> Iterator[tuple[int, list[_Cell]]]:
+def _rows(text: str) -> Iterator[tuple[int, list[MeasuredCell]]]:
     """Lines with values, and their numbers."""
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
         values = line.partition("#")[0]
@@ -114,18 +139,18 @@ def _rows(text: str) -> Iterator[tuple[int, list[_Cell]]]:
             yield number, list(_cells(values))
 
 
-def _cells(values: str) -> Iterator[_Cell]:
+def _cells(values: str) -> Iterator[MeasuredCell]:
     column = 1
     for written in values.split(","):
         text = written.strip()
         start = column + len(written) - len(written.lstrip())
         quoted = len(text) > 1 and text[0] == text[-1] == '"'
-        yield _Cell(text[1:-1].strip() if quoted else text, start)
+        yield MeasuredCell(text[1:-1].strip() if quoted else text, start)
         column += len(written) + 1
 
 
-def _header_problems(line: int, header: Sequence[_Cell]) -> Iterator[PlacedProblem]:
-    def problem(cell: _Cell, message: str, kind: ProblemKind = "unknown-key") -> PlacedProblem:
+def _header_problems(line: int, header: Sequence[MeasuredCell]) -> Iterator[PlacedProblem]:
+    def problem(cell: MeasuredCell, message: str, kind: ProblemKind = "unknown-key") -> PlacedProblem:
         return PlacedProblem(line, cell.column, kind, message)
 
     names = [cell.text for cell in header]
@@ -171,7 +196,7 @@ def _meant(written: str) -> str:
 
 
 def _measurement(
-    line: int, values: dict[str, _Cell], cells: Sequence[_Cell], columns: Sequence[str]
+    line: int, values: dict[str, MeasuredCell], cells: Sequence[MeasuredCell], columns: Sequence[str]
 ) -> Measurement | list[PlacedProblem]:
     """Parse one line, or list all its problems."""
     if len(cells) != len(columns):

@@ -217,15 +217,15 @@ def refusal(error: ValidationError | None, data: dict[str, Any], document: Docum
     """
     found = _unknown_kind(data) if error is None else findings(error, data)
     placed = sorted(((document.nearest(one.path), one) for one in found), key=lambda pair: pair[0])
-    return PlacedError(document.name, tuple(_problem(document, offset, one) for offset, one in placed))
+    return PlacedError(document.name, tuple(_problem(document, one) for _, one in placed))
 
 
-def _problem(document: Document, offset: int, found: KeyFinding) -> PlacedProblem:
+def _problem(document: Document, found: KeyFinding) -> PlacedProblem:
     key = _shortened(found.key, limit=100)
     written = _shortened(_written(document, found)) if found.shows_value else ""
     subject = f"{key} = {written}" if written else key
-    line, column = document.lines.line_and_column(offset)
-    return PlacedProblem(line, column, found.kind, f"{subject}: {found.message}", found.key)
+    line, column, *marked = document.spot(found.path, marks_key=found.kind == "unknown-key")
+    return PlacedProblem(line, column, found.kind, f"{subject}: {found.message}", found.key, (marked[0], marked[1]))
 
 
 def _written(document: Document, found: KeyFinding) -> str:

@@ -6,7 +6,7 @@ from typing import Any, Final
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.rule import Rule, RuleFigures, RuleProblem, RuleSubject, overrun
+from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -17,28 +17,27 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
     broken = [limit for limit in map(bus.limit, one.exceeded) if limit is not None]
     alone = [limit for limit in broken if not limit.has_rule]
     for limit in alone:
-        way_out = f"; {limit.way_out}" if limit.way_out else ""
-        yield RuleProblem("cycle.period_us", f"{limit.words(network_of(subject.profile))}{way_out}")
+        yield RuleProblem("cycle.period_us", limit.words(network_of(subject.profile)), limit.way_out)
     if not alone and (TIME in one.exceeded or not broken):
-        yield RuleProblem("cycle.period_us", f"{overrun(one)}; {subject.cure()}")
+        yield RuleProblem("cycle.period_us", f"the cycle {overrun(one)}", *subject.cure())
 
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle may fit, but what is known of it does not show so."""
     one, reserve = subject.deciding, subject.profile.limits.reserve
     if one.verdict == NOT_SHOWN:
-        asked = f", and limits.reserve asks for {reserve:.0%} of the slice" if reserve else ""
-        yield RuleProblem("cycle.period_us", f"not shown to fit: {overrun(one)}{asked}; {subject.cure()}")
+        asked = f"{margin(one)}, limits.reserve asks for {reserve * one.available_us:.1f} us"
+        words = asked if reserve else overrun(one)
+        yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", *subject.cure())
 
 
 def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The slice is fuller than [limits] allows."""
     limit, one = subject.profile.limits.max_utilisation, subject.deciding
     if limit is not None and one.utilisation > limit:
-        yield RuleProblem(
-            "limits.max_utilisation",
-            f"{one.utilisation:.1%} of the slice is used, {limit:.1%} allowed; {subject.cure()}",
-        )
+        used, allowed = told_apart(100 * one.utilisation, 100 * limit)
+        words = f"{used}% of the slice is used, {allowed}% allowed"
+        yield RuleProblem("limits.max_utilisation", words, *subject.cure())
 
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -47,7 +46,7 @@ def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     for counts in _counted(one):
         spare = (counts.safe_nodes or 0) - counts.nodes
         if limit is not None and spare < limit:
-            yield RuleProblem("limits.min_spare_nodes", _too_few(subject, counts, spare, limit))
+            yield RuleProblem("limits.min_spare_nodes", _spare(counts, spare, limit), *_room(subject, counts))
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -56,7 +55,7 @@ def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     for counts in _counted(one):
         spare = (counts.safe_axes or 0) - counts.axes
         if limit is not None and counts.axes and spare < limit:
-            yield RuleProblem("limits.min_spare_axes", _too_few(subject, counts, spare, limit))
+            yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, limit), *_room(subject, counts))
 
 
 def _counted(one: RuleFigures) -> Sequence[Any]:
@@ -64,13 +63,18 @@ def _counted(one: RuleFigures) -> Sequence[Any]:
     return one.groups or (one,)
 
 
-def _too_few(subject: RuleSubject, counts: Any, spare: int, limit: int) -> str:
-    """Say what is missing, what limits the nodes, and how to make room for more."""
-    of = f"group {counts.name}: " if subject.deciding.groups else ""
-    bound = bus_of(subject.profile).limit(counts.safe_limited_by)
-    cure = subject.cure() if bound is None or bound.is_safety else bound.way_out
-    said = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
-    return f"{of}{said}; limited by {counts.safe_limited_by}; {cure}"
+def _spare(counts: Any, spare: int, limit: int) -> str:
+    """How many are to spare, and what limits them."""
+    name = getattr(counts, "name", "")
+    group = f"group {name}: " if name else ""
+    words = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
+    return f"{group}{words}; limited by {counts.safe_limited_by}"
+
+
+def _room(subject: RuleSubject, counts: Any) -> Mending:
+    """How to make room for more nodes."""
+    limit = bus_of(subject.profile).limit(counts.safe_limited_by)
+    return subject.cure() if limit is None or limit.is_safety else Mending(limit.way_out)
 
 
 def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -81,7 +85,8 @@ def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
             continue
         yield RuleProblem(
             group.key("execution.grade"),
-            "the execution time is an assumption, and the largest terms rest on it; measure it on the node",
+            "the execution time is an assumption, and the largest terms rest on it",
+            "measure it on the node",
         )
 
 

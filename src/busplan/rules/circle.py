@@ -44,22 +44,23 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
         result = circle_test(subject.profile).results[0]
     except ParameterError as error:
         for refused in error.refused:
-            yield "BP203", RuleProblem(_key_of(refused.name, subject.profile), refused.message)
+            key = _key_of(refused.name, subject.profile)
+            # The key says the name already.
+            words, _, way_out = refused.message.removeprefix(f"{key.rpartition('.')[2]} = ").partition("; ")
+            yield "BP203", RuleProblem(key, words, way_out)
         return
     first = to_attack(result)
-    attack = (
-        "; no single error source of the profile explains it" if first is None else f"; attack {first[0].source} first"
-    )
+    attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
     for failure in result.failures:
         stability = failure.name in STABILITY
         # A finding needs a key in the file: a default limit has none.
         said = failure.name in subject.profile.tolerance.model_fields_set
         key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
         gain = subject.profile.servo.position_gain_per_s
-        cure = "; lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
+        way_out = "lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
         if failure.name in CONTOUR_MEASURES and failure.value is not None:
-            cure = attack
-        yield "BP202" if stability else "BP201", RuleProblem(key, f"{failure.text}{cure}")
+            way_out = attack
+        yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
 
 
 def _key_of(name: str, profile: Profile) -> str:

@@ -10,9 +10,10 @@ from busplan.analysis.circle.check import MOST_STEPS, CircleCheck
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.advice import changeable, cure
 from busplan.analysis.planning.freedoms import PERIOD
-from busplan.buses.rule import Severity
+from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
 from busplan.forms.numbers import listed
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.document import Spot
 from busplan.profile.toml import LoadedProfile, override
 from busplan.profile.write import short_text
 
@@ -24,9 +25,40 @@ class Finding(NamedTuple):
     rule: str
     severity: Severity
     message: str
+    """What is wrong and how it is mended, in one line."""
     key: str
     line: int
     column: int
+    marked_column: int
+    """First column of the value, or of what stands for it: a name, a comment."""
+    marked_end_column: int
+    """The column behind its last."""
+    problem: str
+    """What is wrong."""
+    help: str | None = None
+    """How it is mended, in words."""
+    cure: str | None = None
+    """How it is mended, as lines of TOML: key = value."""
+
+
+def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> Finding:
+    """Make the finding of a problem.
+
+    Parameters
+    ----------
+    rule
+        The rule that is broken.
+    problem
+        The problem, with its key and how it is mended.
+    spot
+        Its place.
+    words
+        What is wrong, with the key and the circumstances.
+    """
+    cure = f"cheapest cure: {', '.join(problem.cure)}" if problem.cure else ""
+    message = "; ".join(filter(None, (words, problem.help, cure)))
+    mending = problem.help or None, "\n".join(problem.cure) or None
+    return Finding(rule.code, rule.name, rule.severity, message, problem.key, *spot, words, *mending)
 
 
 class Subject:
@@ -83,16 +115,15 @@ class Subject:
         """Capacity under the timing model that decides, with new values by dotted key."""
         return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
-    def cure(self) -> str:
-        """The least change after which the profile holds every constraint of a plan, in words; one for all rules."""
+    def cure(self) -> Mending:
+        """The least change after which the profile holds every constraint of a plan; one for all rules."""
         return self._cure
 
     @cached_property
-    def _cure(self) -> str:
+    def _cure(self) -> Mending:
         circle = None if self._circle_steps is None else CircleCheck(most_steps=self._circle_steps)
         found = cure(self.profile, circle=circle)
         if found.changes is None:
-            return f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}"
-        lines = ", ".join(f"{key} = {short_text(value)}" for key, value in found.changes.items())
-        first = "the period must change; " if PERIOD in found.changes else ""
-        return f"{first}cheapest cure: {lines}"
+            return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}")
+        lines = tuple(f"{key} = {short_text(value)}" for key, value in found.changes.items())
+        return Mending("the period must change" if PERIOD in found.changes else "", lines)

@@ -8,17 +8,29 @@ from busplan.buses.rule import Rule, RuleProblem
 from busplan.errors import BusplanError, PlacedError
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.profile.collect import ProfileSource
-from busplan.profile.document import Document
+from busplan.profile.document import Document, Spot
 from busplan.profile.keys import path_of
 from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.rules import circle
-from busplan.rules.baseline import Recorded, figures_of, regressions
+from busplan.rules.baseline import Record, figures_of, keys_of
 from busplan.rules.file import BY_KIND
-from busplan.rules.finding import Finding, Subject
+from busplan.rules.finding import Finding, Subject, finding_of
 from busplan.rules.registry import BASELINE, all_rules, cycle_rules
+from busplan.rules.regression import regression
 from busplan.rules.suppression import suppress
 
 Status = Literal["ok", "findings", "error"]
+
+
+class Fit(NamedTuple):
+    """How the cycle of a profile fits its slice, by the timing model that decides."""
+
+    verdict: str | None
+    """fits, not shown to fit, or does not fit."""
+    margin_corrected_us: float | None
+    """What is left of the slice, less the bias [us]."""
+    uncertainty_us: float | None
+    """Expanded uncertainty of that [us]."""
 
 
 class FileResult(NamedTuple):
@@ -35,6 +47,10 @@ class FileResult(NamedTuple):
     """Source line of each finding."""
     failure: str | None = None
     """Why the file could not be checked; None if it was checked."""
+    keys: Mapping[str, object] | None = None
+    """Keys for a baseline; None as the figures are empty."""
+    fit: Fit | None = None
+    """How the cycle fits; None if the profile cannot be read."""
 
     @property
     def status(self) -> Status:
@@ -50,7 +66,7 @@ def check_source(
     with_circle: bool = True,
     circle_steps: int = MOST_STEPS,
     changes: KeyChanges = NO_CHANGES,
-    recorded: Mapping[str, Recorded] | None = None,
+    recorded: Mapping[str, Record] | None = None,
     record: bool = False,
 ) -> FileResult:
     """Read one file and check it against all rules.
@@ -66,7 +82,7 @@ def check_source(
     changes
         Changes of the profile; if its schema refuses them, the result has a failure.
     recorded
-        Baseline figures by file name; None for no baseline.
+        Records of a baseline by file name; None for no baseline.
     record
         Whether to give the figures that a baseline records.
     """
@@ -80,7 +96,7 @@ def check_source(
         document = decode(content, name=source.name)
     except PlacedError as error:
         return unreadable(source.name, error, content)
-    before = None if recorded is None else recorded.get(source.name, {})
+    before = None if recorded is None else recorded.get(source.name, Record({}))
     return check_document(
         document,
         with_circle=with_circle,
@@ -97,7 +113,7 @@ def check_document(
     with_circle: bool = True,
     circle_steps: int = MOST_STEPS,
     changes: KeyChanges = NO_CHANGES,
-    baseline: Recorded | None = None,
+    baseline: Record | None = None,
     record: bool = True,
 ) -> FileResult:
     """Check one document against all rules.
@@ -113,7 +129,7 @@ def check_document(
     changes
         Changes of the profile; if its schema refuses them, the result has a failure.
     baseline
-        Baseline figures of the profile; None for no baseline.
+        Record of the profile in a baseline; None for none.
     record
         Whether to give the figures that a baseline records.
 
@@ -126,7 +142,7 @@ def check_document(
         profile = validate(document)
     except PlacedError as error:
         # These cannot be suppressed: nothing else of the file was checked.
-        return _result(document, None, list(_of_file(error)), {})
+        return _result(document, None, list(_of_file(error)))
     try:
         profile = changes.applied(profile)
     except BusplanError as error:
@@ -141,14 +157,16 @@ def check_document(
         found += [_placed(subject, all_rules()[code], problem) for code, problem in problems]
         ran |= circle.answered(subject, problems)
     if baseline is not None:
-        lost = regressions(figures_of(subject), baseline)
+        lost = regression(subject, baseline)
         found += [_placed(subject, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
     if changes.each:
         # What a comment suppresses is of the file as it is.
         ran = set()
-    figures = figures_of(subject) if record else {}
-    return _result(document, profile.name, suppress(found, document, ran=ran), figures)
+    one = subject.deciding
+    fit = Fit(one.verdict, one.margin_corrected_us, one.uncertainty_us)
+    result = _result(document, profile.name, suppress(found, document, ran=ran))._replace(fit=fit)
+    return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
 
 
 def _findings(subject: Subject, rules: Iterable[Rule]) -> Iterator[Finding]:
@@ -170,20 +188,19 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
     for number, one in enumerate(error.placed):
         rule = BY_KIND[one.kind]
         more = f"; {error.hidden} more problems of this file are not listed" if error.hidden and number == last else ""
-        yield Finding(rule.code, rule.name, rule.severity, one.message + more, one.key, one.line, one.column)
+        spot = Spot(one.line, one.column, *(one.marked or (one.column, one.column + 1)))
+        words = one.message + more
+        yield finding_of(rule, RuleProblem(one.key, words), spot, words=words)
 
 
 def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Make a finding at the line of the problem's key, or of the table that should have it."""
     document = subject.document
-    line, column = document.lines.line_and_column(
-        document.nearest(path_of(document.data() if "group." in problem.key else {}, problem.key))
-    )
-    message = f"{problem.key}: {problem.message}{subject.origin}"
-    return Finding(rule.code, rule.name, rule.severity, message, problem.key, line, column)
+    spot = document.spot(path_of(document.data() if "group." in problem.key else {}, problem.key))
+    return finding_of(rule, problem, spot, words=f"{problem.key}: {problem.message}{subject.origin}")
 
 
-def _result(document: Document, name: str | None, found: list[Finding], figures: dict[str, float]) -> FileResult:
+def _result(document: Document, name: str | None, found: list[Finding]) -> FileResult:
     ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
     lines = document.text.split("\n") if ordered else []
-    return FileResult(document.name, name, ordered, figures, tuple(lines[one.line - 1] for one in ordered))
+    return FileResult(document.name, name, ordered, {}, tuple(lines[one.line - 1] for one in ordered))

@@ -16,9 +16,10 @@ BASELINE: Final = Rule(
     "baseline-regression",
     "error",
     "the profile lost axes or margin against the baseline",
-    "`--baseline FILE` holds what each profile could carry when it was recorded: axes and margin under every "
-    "timing model. A change that costs some of it must be meant: record it with `--update-baseline`, so that the "
-    "review sees it.",
+    "`--baseline FILE` holds what each profile could carry when it was recorded, axes and margin under every timing "
+    "model, and the keys that its file said. The finding is at the changed key that costs some of it; a baseline "
+    "without keys has it at the name. A change that costs must be meant: record it with `--update-baseline`, so that "
+    "the review sees it.",
 )
 SUPPRESSION_WITHOUT_REASON: Final = Rule(
     "BP901",

@@ -30,9 +30,11 @@ class Located(NamedTuple):
 class CheckReport:
     """Result of one run of the gate."""
 
-    def __init__(self, files: tuple[FileResult, ...], changes: KeyChanges = NO_CHANGES) -> None:
+    def __init__(self, files: tuple[FileResult, ...], changes: KeyChanges = NO_CHANGES, *, others: int = 0) -> None:
         self.files = files
         self.changes = changes
+        self.others = others
+        """How many files were skipped because they are no profiles."""
 
     @cached_property
     def summary(self) -> Summary:

@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Final, NamedTuple
 
-from busplan.buses.rule import Rule
-from busplan.profile.document import Document
-from busplan.rules.finding import Finding
+from busplan.buses.rule import Rule, RuleProblem
+from busplan.profile.document import Document, Spot
+from busplan.rules.finding import Finding, finding_of
 from busplan.rules.registry import NEVER_SUPPRESSED, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON, all_rules
 
 MARK: Final = "busplan:"
@@ -20,8 +20,7 @@ class Suppression(NamedTuple):
     codes: tuple[str, ...]
     """Rule codes; empty if the comment is not understood."""
     reason: str
-    line: int
-    column: int
+    spot: Spot
     of_line: int
 
 
@@ -34,12 +33,14 @@ def suppressions(document: Document) -> Iterator[Suppression]:
             continue
         match = _COMMENT.match(document.text, offset)
         line, column = document.lines.line_and_column(offset)
+        written = document.text[offset:].partition("\n")[0].rstrip()
+        spot = Spot(line, column, column, column + len(written))
         if match is None:
-            yield Suppression((), "", line, column, line)
+            yield Suppression((), "", spot, line)
             continue
         alone = not document.text[document.lines.offset(line, 1) : offset].strip()
         codes = tuple(code.strip() for code in match["codes"].split(","))
-        yield Suppression(codes, match["reason"].strip(), line, column, line + 1 if alone else line)
+        yield Suppression(codes, match["reason"].strip(), spot, line + 1 if alone else line)
 
 
 def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> list[Finding]:
@@ -58,12 +59,11 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
     own: list[Finding] = []
     for one in suppressions(document):
         if not one.codes:
-            message = "the comment suppresses nothing; write # busplan: ignore[CODE] reason"
-            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))
+            way_out = "write # busplan: ignore[CODE] reason"
+            own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, "the comment suppresses nothing", way_out))
         elif not one.reason:
-            own.append(
-                _finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason; add why behind the bracket")
-            )
+            way_out = "add why behind the bracket"
+            own.append(_finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason", way_out))
         for code in one.codes:
             hit = [finding for finding in left if finding.code == code and finding.line == one.of_line]
             left = [finding for finding in left if finding not in hit]
@@ -77,5 +77,5 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
     return left + own
 
 
-def _finding(rule: Rule, one: Suppression, message: str) -> Finding:
-    return Finding(rule.code, rule.name, rule.severity, message, "", one.line, one.column)
+def _finding(rule: Rule, one: Suppression, words: str, way_out: str = "") -> Finding:
+    return finding_of(rule, RuleProblem("", words, way_out), one.spot, words=words)

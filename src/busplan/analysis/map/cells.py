@@ -19,7 +19,7 @@ CELL_FIGURES: Final = (
 """Columns of a sweep that a cell is made of."""
 
 
-class Setting(NamedTuple):
+class MapPoint(NamedTuple):
     """One combination of values that a profile can have."""
 
     changes: dict[str, Value]
@@ -66,7 +66,7 @@ class Region(NamedTuple):
     cells: int
 
 
-def cell_of(setting: Setting, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
+def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value) -> Cell:
     """Make a cell before any circle.
 
     Parameters

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple, Protocol, TypeVar
 from busplan.analysis.circle.estimate import NOTHING, announce, estimate
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import setup
-from busplan.analysis.map.cells import Cell, Setting
+from busplan.analysis.map.cells import Cell, MapPoint
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress
@@ -55,7 +55,7 @@ def _judge(task: _Task) -> _Judgement:
 
 def judged(
     profile: Profile,
-    fitting: Mapping[Place, tuple[Cell, Setting]],
+    fitting: Mapping[Place, tuple[Cell, MapPoint]],
     *,
     mapper: Mapper,
     progress: Progress | None,

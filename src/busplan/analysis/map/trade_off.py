@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import TIME
-from busplan.analysis.map.cells import CELL_FIGURES, STATES, Cell, NotDrawn, Region, Setting, cell_of
+from busplan.analysis.map.cells import CELL_FIGURES, STATES, Cell, MapPoint, NotDrawn, Region, cell_of
 from busplan.analysis.map.circles import Mapper, Place, judged
 from busplan.analysis.map.direction import AXES, PERIOD, Direction, nodes_with, own_value, profile_key
 from busplan.analysis.map.ranges import default_direction
@@ -131,9 +131,9 @@ def trade_off(
         for row, one_y in enumerate(y.values)
         for column, one_x in enumerate(x.values)
     }
-    found = {place: one for place, one in settings.items() if isinstance(one, Setting)}
+    found = {place: one for place, one in settings.items() if isinstance(one, MapPoint)}
     if not found:
-        reason = next(one for one in settings.values() if not isinstance(one, Setting))
+        reason = next(one for one in settings.values() if not isinstance(one, MapPoint))
         raise BusplanError(f"no setting of this map can exist: {reason}")
     cells = {
         (row, column): cell_of(found[row, column], figures, x=x.values[column], y=y.values[row])
@@ -159,7 +159,7 @@ def trade_off(
     return TradeOff(profile, x, y, rows, with_circle, reasons[0] if reasons else "")
 
 
-def _setting(profile: Profile, *along: tuple[str, Value]) -> Setting | str:
+def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
     """The profile at a point of the map, or why there is none."""
     changes: dict[str, Value] = {}
     try:
@@ -168,12 +168,12 @@ def _setting(profile: Profile, *along: tuple[str, Value]) -> Setting | str:
             own = profile_key(key, profile)
             is_axes = key == AXES
             changes[own] = nodes_with(value, override(profile, dict(changes)), nodes_key=own) if is_axes else value
-        return Setting(changes, override(profile, dict(changes)))
+        return MapPoint(changes, override(profile, dict(changes)))
     except BusplanError as error:
         return error.problems[0]
 
 
-def _swept(profile: Profile, settings: Mapping[Place, Setting]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
+def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
     """Figures of each setting, from sweeps over grids without any other setting."""
     places: dict[tuple[object, ...], Place] = {tuple(one.changes.values()): at for at, one in settings.items()}
     model = bus_of(profile).deciding_model
@@ -184,7 +184,7 @@ def _swept(profile: Profile, settings: Mapping[Place, Setting]) -> Iterator[tupl
                 yield places[point], block.row(index, CELL_FIGURES)
 
 
-def _grids(settings: Collection[Setting]) -> Iterator[Grid]:
+def _grids(settings: Collection[MapPoint]) -> Iterator[Grid]:
     """Full grids that have every setting once: lines with the same values along them are one grid."""
     across_key, along_key = next(iter(settings)).changes
     lines: dict[Value, list[Value]] = {}

@@ -7,7 +7,7 @@ from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.check import MOST_STEPS, CircleCheck
 from busplan.analysis.network import bus_of
-from busplan.analysis.planning.freedoms import PERIOD, freed
+from busplan.analysis.planning.freedoms import freed
 from busplan.analysis.planning.machine import with_nodes
 from busplan.analysis.planning.search import Search
 from busplan.buses.bus import Value
@@ -25,11 +25,6 @@ class Change(NamedTuple):
     """Nodes that the change is made for."""
     figures: CapacityFigures
     """The capacity after it, under the model that decides."""
-
-    @property
-    def keeps_period(self) -> bool:
-        """Whether the period stays as it is."""
-        return PERIOD not in self.changes
 
 
 class Cure(NamedTuple):

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.grid import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, Grid
 from busplan.analysis.planning.machine import (
     NODES_KEY,
     Changes,
@@ -17,6 +16,7 @@ from busplan.analysis.planning.machine import (
     with_nodes,
     with_payload_within,
 )
+from busplan.analysis.planning.short_numbers import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, ShortNumbers
 from busplan.buses.bus import Cost
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -125,7 +125,7 @@ def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> I
     for one in search.combinations(changes, cheaper):
         needed_us = search.need_us(one)
         if fits_in(needed_us, available_us=MOST_RATIO * period_us):
-            found.add(_first(RATIOS, needed_us, lambda ratio: ratio * period_us))
+            found.add(RATIOS.number(place_of(RATIOS, needed_us, each_us=period_us)))
     yield from ({RATIO: ratio} for ratio in sorted(found) if own < ratio <= MOST_RATIO)
 
 
@@ -154,10 +154,9 @@ def _periods(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> 
     if needed_us == inf:
         return
     grid, own_us = period_grid(search.profile(changes)), search.period_us(changes)
-    least = place_of_period(grid, needed_us, ratio)
-    below = grid.place(own_us) - 1
-    above = below + 1 + (grid.number(below + 1) <= own_us)
-    above = max(above, least)
+    least = place_of(grid, needed_us, each_us=ratio)
+    at = grid.place(own_us)
+    below, above = at - 1, max(at + (grid.number(at) <= own_us), least)
     stride = 1
     for tried in count():
         if tried >= search.max_circles:
@@ -193,21 +192,24 @@ def most_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom], *
     return low
 
 
-def period_grid(profile: "Profile") -> Grid:
+def period_grid(profile: "Profile") -> ShortNumbers:
     """Periods that are advised: multiples of the circle's step, where the profile asks for a circle."""
-    return Grid(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
+    return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 
-def place_of_period(grid: Grid, needed_us: float, ratio: float) -> int:
-    """The place of the shortest period whose slice gives some time [us]."""
-    return grid.place(_first(grid, needed_us, lambda period_us: ratio * period_us, estimate=needed_us / ratio))
+def place_of(grid: ShortNumbers, needed_us: float, *, each_us: float) -> int:
+    """The place of the smallest number of a grid with which the slice gives some time.
 
-
-def _first(
-    grid: Grid, needed_us: float, available_us: Callable[[float], float], *, estimate: float | None = None
-) -> float:
-    """The smallest number of a grid with which the slice gives some time [us]."""
-    place = grid.place(needed_us / available_us(1.0) if estimate is None else estimate)
-    while not fits_in(needed_us, available_us=available_us(grid.number(place))):
+    Parameters
+    ----------
+    grid
+        Periods [us], or slice ratios [1].
+    needed_us
+        What the slice must give [us].
+    each_us
+        What it gives for each unit of the grid: the slice ratio, or the period.
+    """
+    place = grid.place(needed_us / each_us)
+    while not fits_in(needed_us, available_us=each_us * grid.number(place)):
         place += 1
-    return grid.number(place)
+    return place

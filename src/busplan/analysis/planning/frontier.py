@@ -5,7 +5,7 @@ from math import inf
 
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import CIRCLE
-from busplan.analysis.planning.freedoms import PERIOD, Freedom, most_nodes, period_grid, place_of_period
+from busplan.analysis.planning.freedoms import PERIOD, Freedom, most_nodes, period_grid, place_of
 from busplan.analysis.planning.machine import with_nodes, with_payload
 from busplan.analysis.planning.option import Impossible, Option, option
 from busplan.analysis.planning.search import Search
@@ -38,7 +38,7 @@ def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
     needed_us = search.least_need_us({}, cheap)
     if needed_us == inf:
         return Impossible(title, search.binding(cheap).why)
-    first = place = place_of_period(grid, needed_us, search.most_ratio({}, cheap))
+    first = place = place_of(grid, needed_us, each_us=search.most_ratio({}, cheap))
     tried = 0
     while grid.number(place) <= MAX_TIME_US:
         found = search.least(cheap, {PERIOD: grid.number(place)})

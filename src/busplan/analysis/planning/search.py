@@ -7,8 +7,8 @@ from typing import Final
 from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.planning.constraints import CIRCLE, STEP, Need, needs, refused_period
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom
-from busplan.analysis.planning.grid import MOST_RATIO
 from busplan.analysis.planning.machine import Changes
+from busplan.analysis.planning.short_numbers import MOST_RATIO
 from busplan.buses.bus import Cost, Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override

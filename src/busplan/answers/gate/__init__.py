@@ -15,6 +15,18 @@ class GateFormat(ABC):
     def write(self, report: "CheckReport") -> str:
         """Write a report."""
 
+    def on_terminal(self, report: "CheckReport", *, width: int) -> str:  # noqa: ARG002 - most formats have one look
+        """Write a report in the colours of a terminal.
+
+        Parameters
+        ----------
+        report
+            The report.
+        width
+            Width of sentences and source lines, in columns.
+        """
+        return self.write(report)
+
     def log(self, report: "CheckReport") -> list[str]:  # noqa: ARG002 - most formats log nothing
         """Further lines for standard error."""
         return []
@@ -32,13 +44,15 @@ class Registered(NamedTuple):
 
 
 FORMATS: Final[dict[str, Registered]] = {
-    "text": Registered("plain", "Text", "people"),
-    "full": Registered("plain", "Full", "people"),
+    "concise": Registered("plain", "Concise", "people"),
+    "full": Registered("full", "Full", "people"),
+    "text": Registered("plain", "Concise", "people"),
     "json": Registered("documents", "Json", "programs"),
     "github": Registered("github", "GitHub", "builds"),
     "gitlab": Registered("documents", "GitLab", "builds"),
     "junit": Registered("junit", "JUnit", "builds"),
     "sarif": Registered("sarif", "Sarif", "builds"),
+    "markdown": Registered("markdown", "Markdown", "builds"),
 }
 """Every format by its name, in the order of the help."""
 

@@ -1,7 +1,7 @@
 """Findings as workflow commands, which GitHub shows next to the line of the file."""
 
 from busplan.answers.gate import GateFormat
-from busplan.answers.gate.plain import Text
+from busplan.answers.gate.plain import Concise
 from busplan.printable import printable
 from busplan.rules.report import CheckReport, Located
 
@@ -15,7 +15,7 @@ class GitHub(GateFormat):
 
     def log(self, report: CheckReport) -> list[str]:
         """Every finding: GitHub shows only ten annotations of a severity in a step."""
-        return Text().write(report).splitlines()
+        return Concise().write(report).splitlines()
 
 
 def _command(one: Located) -> str:

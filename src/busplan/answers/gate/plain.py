@@ -1,72 +1,47 @@
 """Findings as lines: for people, editors and build logs."""
 
-from collections.abc import Iterator
 from typing import Final
-from unicodedata import category, east_asian_width
 
 from busplan.answers.gate import GateFormat
+from busplan.buses.rule import Severity
+from busplan.forms.lines import Line, Mark, Tone, plain_text, styled_text
 from busplan.printable import printable
 from busplan.rules.finding import Finding
 from busplan.rules.report import CheckReport
 
-_WIDEST: Final = 160
-"""Longest source line shown whole; of a longer one `full` shows the part around the finding."""
+TONES: Final[dict[Severity, Tone]] = {"error": "fails", "warning": "warns"}
+"""Colour of each severity, which is always said in a word, too."""
 
 
 def finding_parts(path: str, finding: Finding) -> tuple[str, str]:
     """Place and message of a finding."""
-    return f"{path}:{finding.line}:{finding.column}:", f"{finding.code} {finding.message}"
+    return f"{path}:{finding.line}:{finding.column}:", f"{finding.code} {finding.severity}: {finding.message}"
 
 
 def finding_line(path: str, finding: Finding) -> str:
-    """Write path:line:column: CODE message."""
+    """Write path:line:column: CODE severity: message."""
     return printable(" ".join(finding_parts(path, finding)))
 
 
-class Text(GateFormat):
+def marked_line(text: str, path: str, finding: Finding) -> Line:
+    """Mark the place, the code and the severity of a line that begins with them."""
+    place, words = finding_parts(path, finding)
+    start = len(printable(place)) + 1
+    said = Mark(start, start + words.index(": "), TONES[finding.severity])
+    return Line(text, "drawn", (Mark(0, start, "title"), said))
+
+
+class Concise(GateFormat):
     """One line for each finding."""
 
     def write(self, report: CheckReport) -> str:
         """Write the lines."""
-        return "".join(f"{finding_line(one.path, one.finding)}\n" for one in report.located)
+        return plain_text(_lines(report))
+
+    def on_terminal(self, report: CheckReport, *, width: int) -> str:  # noqa: ARG002 - a line is a line
+        """Write the lines in colours; a terminal breaks them itself, so that each can be copied."""
+        return styled_text(_lines(report))
 
 
-class Full(GateFormat):
-    """Each finding with its line of the file and a caret below its column."""
-
-    def write(self, report: CheckReport) -> str:
-        """Write the lines of each finding."""
-        return "".join(f"{line}\n" for line in _full(report))
-
-
-def _full(report: CheckReport) -> Iterator[str]:
-    for one in report.located:
-        number = str(one.finding.line)
-        margin = " " * len(number)
-        source, before = _shown(one.source, one.finding.column - 1)
-        indent = "".join(map(_space, before))
-        yield f"{finding_line(one.path, one.finding)}"
-        yield f"{margin} |"
-        yield f"{number} | {source}"
-        yield f"{margin} | {indent}^ {one.finding.rule} ({one.finding.severity})"
-        yield ""
-
-
-def _shown(source: str, offset: int) -> tuple[str, str]:
-    """A source line as shown, and its part before an offset."""
-    harmless = "\t".join(printable(part, write=lambda _: " ") for part in source.split("\t"))
-    if len(harmless) <= _WIDEST:
-        return harmless, harmless[:offset]
-    start = max(0, min(offset - _WIDEST // 2, len(harmless) - _WIDEST))
-    before = f"{'...' if start else ''}{harmless[start:offset]}"
-    after = harmless[offset : start + _WIDEST]
-    return f"{before}{after}{'...' if start + _WIDEST < len(harmless) else ''}", before
-
-
-def _space(character: str) -> str:
-    """Spaces as wide as a character; a tab stays a tab, whatever its width."""
-    if character == "\t":
-        return character
-    if category(character) in ("Mn", "Me"):
-        return ""
-    return "  " if east_asian_width(character) in "WF" else " "
+def _lines(report: CheckReport) -> list[Line]:
+    return [marked_line(finding_line(one.path, one.finding), one.path, one.finding) for one in report.located]

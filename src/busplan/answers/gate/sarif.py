@@ -12,7 +12,9 @@ from urllib.parse import quote
 
 from busplan import __version__
 from busplan.answers.gate import GateFormat
+from busplan.answers.rules import rule_report
 from busplan.buses.rule import Rule
+from busplan.forms import markdown, terminal
 from busplan.forms.blocks import JsonDocument
 from busplan.printable import json_text
 from busplan.rules.registry import all_rules
@@ -51,12 +53,13 @@ class Sarif(GateFormat):
 
 
 def _rule(rule: Rule) -> JsonDocument:
+    page = rule_report(rule)
     return {
         "id": rule.code,
         "name": "".join(word.capitalize() for word in rule.name.split("-")),
         "shortDescription": {"text": rule.summary},
         "fullDescription": {"text": rule.explanation},
-        "help": {"text": rule.explanation},
+        "help": {"text": terminal.text(page), "markdown": markdown.text(page)},
         "defaultConfiguration": {"level": rule.severity},
     }
 
@@ -72,11 +75,17 @@ def _result(one: Located) -> JsonDocument:
             {
                 "physicalLocation": {
                     "artifactLocation": _artifact(one.path),
-                    "region": {"startLine": finding.line, "startColumn": finding.column},
+                    "region": {
+                        "startLine": finding.line,
+                        "startColumn": finding.column,
+                        "endColumn": finding.marked_end_column,
+                    },
                 }
             }
         ],
         "partialFingerprints": {"busplanFinding/v1": one.fingerprint},
+        # SARIF's own fixes are edits of a file, and a cure may be a key that the file does not say.
+        **({"properties": {"cure": finding.cure}} if finding.cure else {}),
     }
 
 

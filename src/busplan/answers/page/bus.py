@@ -14,12 +14,15 @@ from busplan.answers.sensitivity import sensitivity_blocks
 from busplan.answers.timeline import timeline_chart, totals_table
 from busplan.answers.verdict import places_of, verdict_sentences
 from busplan.buses.figure import (
+    AXES,
     BINDING_TERM,
     LIMITED_BY,
     MARGIN_CORRECTED,
     MAX_AXES,
     MAX_NODES,
+    NODES,
     PERIOD,
+    REQUIRED,
     SAFE_AXES,
     SAFE_LIMITED_BY,
     SAFE_NODES,
@@ -46,8 +49,9 @@ from busplan.forms.blocks import (
     count_value,
     sentence,
 )
-from busplan.forms.numbers import nouns
+from busplan.forms.numbers import nouns, period_value
 
+_ORDER: Final = "The terms stand in the order of the table, and what they leave comes last."
 _OVER_PERIOD: Final = (SAFE_NODES, SAFE_AXES, SAFE_LIMITED_BY)
 """Under the timing model that decides."""
 _CLOSED: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
@@ -126,9 +130,22 @@ def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
         ),
         Sentence(("Terms of the cycle, us",)),
     )
-    caption = Sentence(("The terms of the cycle, in the order of the table, and what they leave.",))
-    chart = Chart(TermsDrawing(results), caption)
-    return Chapter(Sentence(("Where the microseconds go",)), (chart, source.gives(table), source.line), "terms")
+    chart = Chart(TermsDrawing(results), _largest_term(answer), Sentence((_ORDER,)))
+    blocks = (source.gives(chart), source.gives(table), source.line)
+    return Chapter(Sentence(("Where the microseconds go",)), blocks, "terms")
+
+
+def _largest_term(answer: AllAnswers) -> Sentence:
+    """Say which term takes most, by the model that decides."""
+    results, deciding = answer.capacity.results, answer.verdict.deciding
+    number = next(at for at, one in enumerate(results) if one.timing_model == deciding.timing_model)
+    at = f"/results/{number}"
+    term = max(bus_of(answer.profile).term_figures, key=lambda one: getattr(deciding, one.key))
+    return sentence(
+        f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
+        attribute_value(REQUIRED, deciding, at=at),
+        attribute_value(term, deciding, at=at),
+    )
 
 
 def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
@@ -151,11 +168,15 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
     source, steps = sources["axes"], answer.steps
     network = network_of(answer.profile)
     nodes, axes = int(network.nodes), int(network.axes)
+    deciding = answer.verdict.deciding
+    most = deciding.safe_axes or 0
     caption = sentence(
-        f"Axes that a period carries{_curves(answer)}; the point is this profile's own {{}} "
-        f"{nouns(axes, 'axis')}, on {{}} {nouns(nodes, 'node')}.",
-        count_value(axes, "axes"),
-        count_value(nodes, "nodes"),
+        f"At {{}} a bus carries {{}} {nouns(most, 'axis')} shown to fit, and this profile has {{}}, "
+        f"on {{}} {nouns(nodes, 'node')}",
+        period_value(deciding.period_us),
+        count_value(most, SAFE_AXES.key),
+        count_value(axes, AXES.key),
+        count_value(nodes, NODES.key),
     )
     table = Table(
         (
@@ -169,7 +190,7 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
         tuple(_over_period(answer)),
         Sentence(("Nodes and axes at the profile's own period and about it",)),
     )
-    chart = Chart(AxesDrawing(answer.profile, steps), caption)
+    chart = Chart(AxesDrawing(answer.profile, steps), caption, Sentence((_curves(answer),)))
     return Chapter(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
 
 
@@ -226,4 +247,5 @@ def _curves(answer: AllAnswers) -> str:
     """Legend of the curves."""
     names = [f"{one.timing_model}, {'shown to fit' if one.is_safe else 'the closed form'}" for one in answer.steps]
     marks = ("solid with a square", "dashed with a diamond")
-    return ": " + "; ".join(f"{name}: {mark}" for name, mark in zip(names, marks, strict=False))
+    curves = (f"{name}: {mark}" for name, mark in zip(names, marks, strict=False))
+    return f"The axes that a period carries, {'; '.join(curves)}; the point is this profile's own."

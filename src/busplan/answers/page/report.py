@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
+from busplan.analysis.derivation.origin import Input
 from busplan.analysis.network import bus_of
 from busplan.answers.assumptions import assumptions_table
 from busplan.answers.circle_verdict import verdict_words
@@ -136,7 +137,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     yield _facts(subject)
     questions = (bus_question(answer, found), circle_question(answer, found))
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
-    yield Chapter(Sentence(("Verdict",)), (*questions, *lines), "verdict")
+    yield Chapter(Sentence(("Verdict",)), (*_assumed(answer.assumptions), *questions, *lines), "verdict")
     yield models_part(answer, found)
     yield timeline_part(answer, found)
     yield terms_part(answer, found)
@@ -150,6 +151,21 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     assumptions = found["explain"].gives(assumptions_table(answer.assumptions))
     yield Chapter(Sentence(("What it rests on",)), (assumptions, found["explain"].line), "assumptions")
     yield _commands(found)
+
+
+_MOST_NAMED: Final = 6
+"""Keys that are named before the verdict; the table at the end has all."""
+
+
+def _assumed(assumptions: Sequence[Input]) -> Iterator[Sentence]:
+    """Say which keys of the profile are assumed, before any figure that rests on them."""
+    names = [one.name for one in assumptions if one.grade == "assumed" and "." in one.name]
+    if names:
+        parts = [part for name in names[:_MOST_NAMED] for part in (Code(name), ", ")][:-1]
+        more = len(names) - _MOST_NAMED
+        rest = f" and {more} more" if more > 0 else ""
+        verb = "is" if len(names) == 1 else "are"
+        yield Sentence((*parts, f"{rest} {verb} assumed: nobody has measured what these figures rest on."), "warns")
 
 
 def _facts(subject: _Subject) -> Facts:

@@ -13,7 +13,7 @@ from busplan.buses.ieee1394.constants import (
     REFERENCE_CABLE_M,
     padded_bytes,
 )
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, microseconds, overrun
+from busplan.buses.rule import Rule, RuleProblem, RuleSubject, contradicts, margin, told_apart
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 if TYPE_CHECKING:
@@ -42,8 +42,8 @@ def fits_only_until_bus_reset(subject: RuleSubject) -> Iterator[RuleProblem]:
         if after.verdict != "fits":
             yield RuleProblem(
                 "bus.gap_count",
-                f"fits with gap count {one.gap_count} alone; with the {MAX_GAP_COUNT} of a bus after its reset: "
-                f"{after.verdict}, {overrun(after)}; have the bus manager write the gap count after each reset",
+                f"fits at {one.gap_count}, {after.verdict} at {MAX_GAP_COUNT} after a bus reset: {margin(after)}",
+                "have the bus manager write the gap count after each reset",
             )
 
 
@@ -53,7 +53,7 @@ def too_many_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
         each = subject.profile.alike_nodes
         nodes = sum(one.nodes for one in each)
         yield RuleProblem(
-            each[-1].nodes_key, f"{nodes} nodes are over the {MAX_NODES:g} of one bus; put the others on a second bus"
+            each[-1].nodes_key, f"{nodes} nodes are over the {MAX_NODES:g} of one bus", "put the others on a second bus"
         )
 
 
@@ -61,10 +61,11 @@ def too_many_hops(subject: RuleSubject) -> Iterator[RuleProblem]:
     """More cable hops than the standard allows."""
     if "hops" in subject.deciding.exceeded:
         chain = _bus(subject).max_hops is None
-        cure = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
+        way_out = f"a tree with bus.max_hops = {MAX_HOPS:g} or less would do" if chain else "rewire the tree"
         yield RuleProblem(
             subject.profile.alike_nodes[-1].nodes_key if chain else "bus.max_hops",
-            f"{subject.deciding.hops} hops are over the {MAX_HOPS:g} of one bus; {cure}",
+            f"{subject.deciding.hops} hops are over the {MAX_HOPS:g} of one bus",
+            way_out,
         )
 
 
@@ -75,8 +76,8 @@ def payload_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     for key, size in _payloads(subject):
         if size > most:
             faster = [speed for speed, limit in MAX_PAYLOAD_BYTES.items() if size <= limit]
-            cure = f'bus.speed = "{faster[0]}" would do' if faster else "share it out among several transactions"
-            yield RuleProblem(key, f"{size} bytes are over the {most} bytes of a packet at {speed}; {cure}")
+            way_out = f'bus.speed = "{faster[0]}" would do' if faster else "share it out among several transactions"
+            yield RuleProblem(key, f"{size} bytes are over the {most} bytes of a packet at {speed}", way_out)
 
 
 def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -86,7 +87,8 @@ def payload_not_quadlets(subject: RuleSubject) -> Iterator[RuleProblem]:
             padded = padded_bytes(size)
             yield RuleProblem(
                 key,
-                f"{size} bytes are no whole number of quadlets; {padded} bytes travel anyway; use or say {padded}",
+                f"{size} bytes are no whole number of quadlets; {padded} bytes travel anyway",
+                f"use or say {padded}",
             )
 
 
@@ -99,11 +101,12 @@ def gap_count_unsafe(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A gap count below the table."""
     one = subject.deciding
     if not one.gap_count_safe:
+        is_standard = _bus(subject).cable_is_standard
         yield RuleProblem(
             "bus.gap_count",
             f"gap count {one.gap_count} is unsafe for {one.hops} hops; the smallest safe one is {one.safe_gap_count}"
-            f"{'' if _bus(subject).cable_is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}; "
-            f"{subject.cure()}",
+            f"{'' if is_standard else f' for cables of up to {REFERENCE_CABLE_M:g} m'}",
+            *subject.cure(),
         )
 
 
@@ -115,16 +118,17 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
         after = subject.after({"bus.gap_count": "optimal"})
         won = "" if one.safe_nodes is None else _won((after.safe_nodes or 0) - one.safe_nodes)
+        saved, _ = told_apart(one.required_us - after.required_us, 0.0)
+        safe = one.safe_gap_count
         yield RuleProblem(
             "bus.gap_count",
-            f"gap count {one.gap_count} is above the {one.safe_gap_count} that {one.hops} hops need; "
-            f"the latter would save {microseconds(one.required_us - after.required_us)} a cycle"
-            f"{won}",
+            f"gap count {one.gap_count} is above the {safe} that {one.hops} hops need; "
+            f"{safe} saves {saved} us a cycle{won}",
         )
 
 
 def _won(nodes: int) -> str:
-    return f" and win {nodes} node{'s' * (nodes != 1)}"
+    return f" and wins {nodes} node{'s' * (nodes != 1)}"
 
 
 RULES: Final = (

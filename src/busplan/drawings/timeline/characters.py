@@ -19,8 +19,18 @@ from busplan.drawings.timeline.lanes import (
     overruns,
     shows_overrun,
     stretches,
-    strip_title,
     time_text,
+)
+from busplan.drawings.timeline.period import (
+    BEYOND,
+    LEFT,
+    NEEDED,
+    REST,
+    Span,
+    model_bars,
+    period_end_us,
+    period_title,
+    rest,
 )
 from busplan.forms.lines import BLANK, Line
 from busplan.forms.scale import ticks
@@ -30,10 +40,11 @@ NARROWEST: Final = 60
 _TICK_COLUMNS: Final = 9
 _OVER: Final = "!"
 _WINDOW: Final = "^"
+_PERIOD_MARKS: Final = {NEEDED: "#", LEFT: ".", BEYOND: _OVER, REST: "-"}
 
 
 def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
-    """Draw the whole slice as a strip, and the window in lanes.
+    """Draw the whole period as a strip, what each timing model leaves of the slice, and the window in lanes.
 
     Parameters
     ----------
@@ -49,24 +60,33 @@ def timeline_lines(plan: Schedule, *, width: int) -> list[Line]:
 
 
 def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
-    """The whole slice in one row, transaction by transaction, and the time beyond it."""
-    parts = stretches(plan.cycle_events)
+    """The whole period in one row, transaction by transaction, the time beyond its slice, and a row for each model."""
+    parts, behind, bars = stretches(plan.cycle_events), rest(plan), model_bars(plan)
     styles = {one.kind: kind_of(plan.profile, one.kind) for one in parts}
     rows = {"cycle": [(styles[one.kind].mark, one.event) for one in parts]}
     legend = [f"{style.mark} {style.label}" for style in styles.values()]
+    if behind is not None:
+        rows["cycle"].append((_PERIOD_MARKS[REST], behind))
+    for one in bars:
+        rows[one.timing_model] = [(_PERIOD_MARKS[part.label], _event(plan, part)) for part in one.spans]
+    shown = {part.label for one in bars for part in one.spans}
     if overruns(plan):
         rows["over"] = [(_OVER, beyond(plan))]
-        legend.append(f"{_OVER} beyond the slice")
+    legend += [f"{mark} {label}" for label, mark in _PERIOD_MARKS.items() if label in shown]
     if not plan.is_whole:
-        rows["window"] = [(_WINDOW, plan.cycle_events[0]._replace(start_us=plan.from_us, end_us=plan.to_us))]
+        rows["window"] = [(_WINDOW, _event(plan, Span("", plan.from_us, plan.to_us)))]
         legend.append(f"{_WINDOW} shown below")
     gutter = max(map(len, rows))
-    bar = _Bar(0.0, plan.end_us, width - gutter - 3)
-    yield Line(f"{strip_title(plan)}, {bar.per_column}", "heading")
+    bar = _Bar(0.0, period_end_us(plan, bars), width - gutter - 3)
+    yield Line(f"{period_title(plan)}, {bar.per_column}", "heading")
     for label, row in rows.items():
         yield Line(f"{label:<{gutter}} |{bar.cells(row)}|", "fails" if label == "over" else "drawn")
     yield bar.scale(gutter + 2)
     yield from legend_lines(legend, width=width)
+
+
+def _event(plan: Schedule, part: Span) -> Event:
+    return plan.cycle_events[0]._replace(start_us=part.start_us, end_us=part.end_us)
 
 
 def _node_rows(window: Schedule, *, width: int) -> Iterator[Line]:

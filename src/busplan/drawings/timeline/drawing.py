@@ -30,7 +30,7 @@ class TimelineDrawing(Drawing):
         return timeline_svg(self._plan, title=self._title, inline=True)
 
     def characters(self, width: int) -> list[Line]:
-        """Draw the whole slice as a strip, and the window in lanes."""
+        """Draw the whole period as a strip, and the window in lanes."""
         return timeline_lines(self._plan, width=width)
 
     def mermaid(self) -> str:

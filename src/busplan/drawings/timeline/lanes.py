@@ -66,14 +66,6 @@ def beyond(plan: Schedule) -> Event:
     return plan.cycle_events[-1]._replace(start_us=plan.figures.available_us, end_us=plan.end_us)
 
 
-def strip_title(plan: Schedule) -> str:
-    """Title of the strip above the lanes."""
-    slice_us = time_text(plan.figures.available_us)
-    if overruns(plan):
-        return f"The cycle of {time_text(plan.end_us)} us, beyond its slice of {slice_us} us"
-    return f"The slice of {slice_us} us"
-
-
 def drawn_window(plan: Schedule) -> Schedule:
     """The part that the lanes show: the window or, without one, the cycle without its idle rest."""
     return plan._replace(to_us=plan.used_us) if plan.is_whole else plan

@@ -7,7 +7,7 @@ from warnings import catch_warnings, simplefilter
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
 
 from busplan.analysis.timeline.schedule import SHARE, TOTAL, Event, Schedule, Total, totals
 from busplan.drawings.timeline.kinds import kind_of
@@ -22,15 +22,17 @@ from busplan.drawings.timeline.lanes import (
     overruns,
     shows_overrun,
     stretches,
-    strip_title,
     time_text,
 )
+from busplan.drawings.timeline.period import BEYOND, LEFT, NEEDED, REST, model_bars, period_end_us, period_title, rest
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
 from busplan.forms.inks import INKS
 from busplan.forms.numbers import with_unit
 
 _OVER: Final = "#b3261e"
+_REST: Final = "#f4f6f8"
+_PERIOD_COLOURS: Final = {NEEDED: INKS["long-gap"].light, LEFT: INKS["fits"].light, BEYOND: _OVER, REST: _REST}
 _TITLE_CHARACTERS: Final = 110
 _LANE_INCHES: Final = 0.28
 _MOST_LANE_INCHES: Final = 60.0
@@ -38,7 +40,7 @@ _MOST_LANE_INCHES: Final = 60.0
 
 
 def timeline_png(plan: Schedule, *, title: str) -> bytes:
-    """Draw the slice as a strip, the window in lanes, and a legend with the total of each kind.
+    """Draw the period as a strip, the margin of each timing model, the window in lanes, and a legend with totals.
 
     Parameters
     ----------
@@ -58,8 +60,8 @@ def timeline_png(plan: Schedule, *, title: str) -> bytes:
     buffer = BytesIO()
     # A dollar sign in a name starts no formula.
     with rc_context({"text.parse_math": False}):
-        figure = Figure(figsize=(11.0, lane_inches + 2.9), layout="constrained")
-        strip, area = figure.subplots(2, 1, height_ratios=(0.7, lane_inches))
+        figure = Figure(figsize=(11.0, lane_inches + 3.5), layout="constrained")
+        strip, area = figure.subplots(2, 1, height_ratios=(1.3, lane_inches))
         head = "\n".join(wrap(title, _TITLE_CHARACTERS))
         figure.suptitle(head, fontsize=11, color="black" if plan.figures.fits else _OVER)
         _strip(strip, plan, window)
@@ -91,22 +93,34 @@ def _bar(axes: Any, event: Event, *, lane: float, colour: str, height: float = 0
 
 
 def _strip(axes: Any, plan: Schedule, window: Schedule) -> None:
-    """Draw the whole slice as one bar, transaction by transaction, with the window of the lanes."""
-    parts = stretches(plan.cycle_events)
+    """Draw the whole period as one bar, transaction by transaction, and one for each timing model."""
+    parts, bars, behind = stretches(plan.cycle_events), model_bars(plan), rest(plan)
     for one in parts:
         _bar(axes, one.event, lane=0.0, colour=_colour(plan, one.kind))
     if window.from_us > 0 or window.to_us < plan.end_us:
-        axes.axvspan(window.from_us, window.to_us, fill=False, linewidth=1.5)
+        corner, size = (window.from_us, -0.5), (window.to_us - window.from_us, 1.0)
+        axes.add_patch(Rectangle(corner, *size, fill=False, linewidth=1.5))
+    for number, bar in enumerate(bars, start=1):
+        for part in bar.spans:
+            span = plan.cycle_events[0]._replace(start_us=part.start_us, end_us=part.end_us)
+            _bar(axes, span, lane=number, colour=_PERIOD_COLOURS[part.label])
     if overruns(plan):
         _over(axes, plan)
-    axes.set_xlim(0.0, plan.end_us)
-    axes.set_yticks([])
+    elif behind is not None:
+        axes.axvline(plan.figures.available_us, color="black", linewidth=1.2, linestyle=(0, (3, 2)))
+        _bar(axes, behind, lane=0.0, colour=_REST)
+    axes.set_xlim(0.0, period_end_us(plan, bars))
+    axes.set_ylim(len(bars) + 0.5, -0.6)
+    words = [f"{one.timing_model}: {one.words}" for one in bars]
+    axes.set_yticks(range(len(bars) + 1), ["cycle", *words], fontsize=8)
     kinds = dict.fromkeys(one.kind for one in parts)
     handles = [Patch(color=_colour(plan, kind), label=kind_of(plan.profile, kind).label) for kind in kinds]
+    shown = dict.fromkeys(part.label for bar in bars for part in bar.spans)
+    handles += [Patch(color=_PERIOD_COLOURS[label], label=label) for label in shown]
     axes.legend(
-        handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles), fontsize=8, frameon=False
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=len(handles), fontsize=8, frameon=False
     )
-    axes.set_title(strip_title(plan), fontsize=9, loc="left")
+    axes.set_title(period_title(plan), fontsize=9, loc="left")
 
 
 def _draw(axes: Any, lanes: tuple[Lane, ...], window: Schedule) -> None:

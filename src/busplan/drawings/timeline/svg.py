@@ -18,9 +18,19 @@ from busplan.drawings.timeline.lanes import (
     overruns,
     shows_overrun,
     stretches,
-    strip_title,
     subject,
     time_text,
+)
+from busplan.drawings.timeline.period import (
+    BEYOND,
+    LEFT,
+    NEEDED,
+    REST,
+    ModelBar,
+    model_bars,
+    period_end_us,
+    period_title,
+    rest,
 )
 from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
@@ -30,6 +40,8 @@ from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, parag
 
 _BAR: Final = 18
 _GAP: Final = 14
+_THIN: Final = 8
+_PERIOD_CSS: Final = {NEEDED: "long-gap", LEFT: "fits", BEYOND: "late", REST: "track"}
 _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _MOST_BARS: Final = 400
@@ -37,7 +49,7 @@ _MOST_BARS: Final = 400
 
 
 def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
-    """Draw the slice as a strip, the window in lanes, and a legend with the total of each kind.
+    """Draw the period as a strip, the margin of each timing model, the window in lanes, and a legend with totals.
 
     It fills the width of its container, from 320 px on.
 
@@ -81,31 +93,53 @@ def _above(body: Element, plan: Schedule, window: Schedule, *, title: str) -> in
 
 
 def _strip(body: Element, plan: Schedule, window: Schedule, *, y: int) -> int:
-    """Draw the whole slice as one bar, transaction by transaction, with the window of the lanes."""
-    parts = stretches(plan.cycle_events)
-    y = _strip_legend(body, plan, parts, y=paragraph(body, strip_title(plan), y=y, css="head")) + 4
-    scale = Scale(0.0, plan.end_us)
+    """Draw the whole period as one bar, transaction by transaction, and one for each timing model."""
+    parts, bars, behind = stretches(plan.cycle_events), model_bars(plan), rest(plan)
+    y = _strip_legend(body, plan, parts, bars, y=paragraph(body, period_title(plan), y=y, css="head")) + 4
+    scale = Scale(0.0, period_end_us(plan, bars))
+    if behind is not None:
+        scale.rect(body, behind, y=y, height=_BAR, css="track", title=_tip(REST, behind))
     if overruns(plan):
         _over(body, plan, scale, y=y - 3, height=_BAR + 6)
     _Bars(body, plan, scale).draw(plan.cycle_events, y=y, height=_BAR, coarse=True)
-    if overruns(plan):
-        _edge(body, plan, scale, y=y - 3, height=_BAR + 6)
     if window.from_us > 0 or window.to_us < plan.end_us:
         shown_part = plan.cycle_events[0]._replace(start_us=window.from_us, end_us=window.to_us)
         scale.rect(body, shown_part, y=y - 2, height=_BAR + 4, css="window", title=_tip("drawn below", shown_part))
-    return scale.marks(body, top=y + _BAR, bottom=y + _BAR)
+    top, y, ends = y + _BAR, y + _BAR + 4, []
+    for one in bars:
+        y = _model(body, one, scale, y=y)
+        ends.append(y)
+    if behind is not None or overruns(plan):
+        x = f"{scale.percent(plan.figures.available_us):.5g}%"
+        css = "edge" if overruns(plan) else "end"
+        # Not through the words between the bars.
+        for from_, to in ((top - _BAR - 3, top + 3), *((one - _THIN - 4, one) for one in ends)):
+            SubElement(body, "line", {"x1": x, "x2": x, "y1": str(from_), "y2": str(to), "class": css})
+    return scale.marks(body, top=y, bottom=y)
 
 
-def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], *, y: int) -> int:
-    """Draw the colours of the strip, wrapped for a phone, and return the y below them."""
+def _model(body: Element, one: ModelBar, scale: Scale, *, y: int) -> int:
+    """Draw what a timing model needs and leaves of the slice, and return the y below it."""
+    text_at(body, f"{one.timing_model}: {one.words}", x="0", y=y + 14, css="small")
+    for part in one.spans:
+        css = _PERIOD_CSS[part.label]
+        tip = f"{part.label} by the {one.timing_model} model, {time_text(part.end_us - part.start_us)} us"
+        scale.rect(body, part, y=y + LINE, height=_THIN, css=css, title=tip)
+    return y + LINE + _THIN + 2
+
+
+def _strip_legend(body: Element, plan: Schedule, parts: Iterable[Stretch], bars: Iterable[ModelBar], *, y: int) -> int:
+    """Draw the colours of the strip and of the models, wrapped for a phone, and return the y below them."""
+    kinds = (kind_of(plan.profile, one.kind) for one in parts)
+    colours: dict[str, str] = {kind.label: kind.ink for kind in kinds}
+    colours |= {part.label: _PERIOD_CSS[part.label] for one in bars for part in one.spans}
     x = 0
-    for key in dict.fromkeys(one.kind for one in parts):
-        kind = kind_of(plan.profile, key)
-        width = 30 + 7 * len(kind.label)
+    for label, css in colours.items():
+        width = 30 + 7 * len(label)
         if x + width > PHONE:
             x, y = 0, y + LINE
-        SubElement(body, "rect", {"class": kind.ink, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
-        text_at(body, kind.label, x=str(x + 15), y=y + 15, css="small")
+        SubElement(body, "rect", {"class": css, "x": str(x), "y": str(y + 5), "width": "10", "height": "10"})
+        text_at(body, label, x=str(x + 15), y=y + 15, css="small")
         x += width
     return y + LINE
 

@@ -1,4 +1,4 @@
-"""`busplan.trade_off`."""
+"""`busplan.map_`."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from busplan.analysis.map.trade_off import TradeOff
 from busplan.answers.map import headline, map_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, load_profile
+from busplan.api.renamed import renamed
 from busplan.api.sweep import axis_values
 from busplan.drawings.map.svg import map_svg
 from busplan.errors import BusplanError
@@ -21,8 +22,8 @@ Along = Mapping[str, str | Iterable[object]]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class TradeOffAnswer(Answer):
-    """Answer of `trade_off`: a map, which a notebook draws.
+class MapAnswer(Answer):
+    """Answer of `map_`: where a design fits, which a notebook draws.
 
     Parameters
     ----------
@@ -63,10 +64,6 @@ class TradeOffAnswer(Answer):
     def _repr_svg_(self) -> str:
         return map_svg(self._found, title=sentence_text(headline(self._found)))
 
-    def _repr_html_(self) -> str:
-        # A notebook prefers HTML to SVG.
-        return self._repr_svg_()
-
     def _report(self) -> Report:
         return map_report(self._found)
 
@@ -75,13 +72,14 @@ class TradeOffAnswer(Answer):
         return TradeOff(self.profile, self.x, self.y, self.rows, self.with_circle, self.not_judged)
 
 
-def trade_off(
+@renamed(with_circle="circle")
+def map_(
     profile: ProfileLike,
     *,
     x: Along | None = None,
     y: Along | None = None,
-    with_circle: bool = False,
-) -> TradeOffAnswer:
+    circle: bool = False,
+) -> MapAnswer:
     """Tell where over two keys a design fits, and what limits it elsewhere: `busplan map`.
 
     Parameters
@@ -92,12 +90,12 @@ def trade_off(
         What lies across and what lies up: one dotted key, or "axes" for the axes of all nodes, with up to 64 values in
         its unit, as `sweep` takes them: {"bus.gap_count": [7, 63, "optimal"]}. By default the axes, and the period
         [us].
-    with_circle
+    circle
         Also run the circle test of every setting that fits, up to 1,000.
 
     Returns
     -------
-    TradeOffAnswer
+    MapAnswer
         Its `rows` have the shape (values of y, values of x). In a notebook it is a picture.
 
     Raises
@@ -108,17 +106,17 @@ def trade_off(
     Examples
     --------
     >>> import busplan
-    >>> answer = busplan.trade_off("paper-4ms", x={"axes": range(4, 13, 4)}, y={"cycle.period_us": [500, 1000]})
+    >>> answer = busplan.map_("paper-4ms", x={"axes": range(4, 13, 4)}, y={"cycle.period_us": [500, 1000]})
     >>> [[cell.state for cell in row] for row in answer.rows]
     [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
     """
     network = load_profile(profile)
-    return TradeOffAnswer(
+    return MapAnswer(
         *analysis.trade_off(
             network,
-            x=_direction(network, x, name="x", with_circle=with_circle),
-            y=_direction(network, y, name="y", with_circle=with_circle),
-            with_circle=with_circle,
+            x=_direction(network, x, name="x", with_circle=circle),
+            y=_direction(network, y, name="y", with_circle=circle),
+            with_circle=circle,
         )
     )
 
@@ -134,5 +132,10 @@ def _direction(profile: Profile, along: Along | None, *, name: str, with_circle:
         key,
         axis_values(profile, key, values, name=name),
         option=name,
-        circle_option=None if with_circle else "with_circle=True",
+        circle_option=None if with_circle else "circle=True",
     )
+
+
+TradeOffAnswer = MapAnswer
+trade_off = map_
+"""The old names, for one release."""

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from busplan.analysis.capacity.cycle import FIT_ROUNDING
 
 
-class Grid(NamedTuple):
+class ShortNumbers(NamedTuple):
     """The multiples of a step that have a few significant digits, in decimal arithmetic: 3 * 0.1 is 0.3.
 
     Parameters
@@ -26,7 +26,7 @@ class Grid(NamedTuple):
 
         Examples
         --------
-        >>> [Grid(0.1, 1).number(place) for place in (1, 9, 10, 11)]
+        >>> [ShortNumbers(0.1, 1).number(place) for place in (1, 9, 10, 11)]
         [0.1, 0.9, 1.0, 2.0]
         """
         return float(self._multiple(place) * Decimal(str(self.step)))
@@ -36,7 +36,7 @@ class Grid(NamedTuple):
 
         Examples
         --------
-        >>> [Grid(100, 3).number(Grid(100, 3).place(least)) for least in (0, 1087.2, 1100, 123_456)]
+        >>> [ShortNumbers(100, 3).number(ShortNumbers(100, 3).place(least)) for least in (0, 1087.2, 1100, 123_456)]
         [100.0, 1100.0, 1100.0, 124000.0]
         """
         steps = ceil(Decimal(least * (1 - FIT_ROUNDING)) / Decimal(str(self.step)))
@@ -52,7 +52,7 @@ class Grid(NamedTuple):
         return (place - blocks * 9 * first) * scale
 
 
-RATIOS: Final = Grid(0.01, 2)
+RATIOS: Final = ShortNumbers(0.01, 2)
 """Slice ratios that are advised."""
 MOST_RATIO: Final = 0.9
 """Largest slice ratio that is advised: the host computes in the rest of the period. Chosen."""

@@ -1,0 +1,30 @@
+"""The circle tests of a comparison; importing this loads no simulation."""
+
+from itertools import count
+from typing import TYPE_CHECKING
+
+from busplan.analysis.comparison.difference import ComputeCircleFigures
+from busplan.progress import Progress, part_of
+
+if TYPE_CHECKING:
+    from busplan.analysis.circle.roundness import CircleFigures
+    from busplan.sections.profile import Profile
+
+
+def circle_tests(progress: Progress | None = None) -> ComputeCircleFigures:
+    """Make the function that runs the circle test of each of two profiles, with one progress for both.
+
+    Parameters
+    ----------
+    progress
+        Called from time to time with the work done and the total work.
+    """
+    number = count()
+
+    def run(profile: "Profile") -> "CircleFigures":
+        from busplan.analysis.circle.roundness import circle_test
+
+        part = None if progress is None else part_of(progress, number=next(number), of=2)
+        return circle_test(profile, explain=False, progress=part).results[0]
+
+    return run

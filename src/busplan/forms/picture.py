@@ -1,0 +1,41 @@
+"""The picture of an answer as an SVG of its own."""
+
+from collections.abc import Sequence
+from importlib.resources import files
+
+from busplan.forms.blocks import Block, Chapter, Chart
+from busplan.forms.inks import DARK, fills
+
+_PAPER = ".chart{background:var(--paper)}\n"
+
+
+def first_picture(blocks: Sequence[Block]) -> str | None:
+    """Write the first chart of an answer as SVG with its style sheet, for light and dark backgrounds.
+
+    Parameters
+    ----------
+    blocks
+        Blocks of the answer.
+
+    Returns
+    -------
+    str or None
+        None if no chart can be drawn.
+    """
+    for block in blocks:
+        if isinstance(block, Chapter):
+            found = first_picture(block.blocks)
+        else:
+            found = block.drawing.svg() if isinstance(block, Chart) else None
+            found = None if found is None else _styled(found)
+        if found is not None:
+            return found
+    return None
+
+
+def _styled(svg: str) -> str:
+    """Add the style sheet of the page's charts to a drawing."""
+    chart = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
+    light, dark = fills(".chart")
+    head, body = svg.split(">", 1)
+    return f"{head}>\n<style>{chart}{_PAPER}{light}{DARK}{{{dark}}}</style>{body}"
