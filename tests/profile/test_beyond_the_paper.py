@@ -102,7 +102,7 @@ def test_cycle_starts_that_leave_no_time_are_a_broken_limit_without_a_loop(own: 
     assert 0 < one.required_us < 1e6  # finite, and nobody waited for a fixed point
     said = str(busplan.capacity(own))
     assert "a cycle start takes 147.530 us, over 124.000 us: no time is left for the nodes" in said
-    assert busplan.plan(own, with_circle=False).recommended_changes is None
+    assert busplan.plan(own, circle=False).recommended_changes is None
 
 
 @pytest.mark.parametrize("command", ["capacity", "latency", "plan", "timeline", "explain", "report"])
