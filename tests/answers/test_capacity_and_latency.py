@@ -154,6 +154,22 @@ def test_one_table_a_payload_and_one_for_all_periods(profile: Profile) -> None:
     assert text.index("at 500 us: ") < text.index("Not in it: ")
 
 
+def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Profile) -> None:
+    result = capacity(profile, periods_us=[1000.0, 500.0])
+    report = capacity_report(result, verdicts(result))
+    lines = render(report, "table").splitlines()
+    row = {line[: line.index("  ", 4)].strip(): line for line in lines if line.count("  ") > 2}
+    assert [row[name].count(" !") for name in ("corrected margin", "margin", "required <= available")] == [1, 1, 1]
+    assert "does not fit" in row["verdict"]
+    assert "!" not in row["verdict"]
+    assert lines[-1].startswith("! fails. Not shown: ")
+    # What takes no time and what decides nothing is detail.
+    assert not {"hold", "host", "utilisation", "smallest period"} & set(row)
+    whole = render(report._replace(is_whole=True), "table")
+    assert all(f"\n{name}  " in whole for name in ("  hold", "  host", "utilisation", "smallest period"))
+    assert "Not shown" not in whole
+
+
 @pytest.mark.parametrize("period_us", [1000.0, 600.0, 100.0])
 def test_every_figure_of_the_blocks_stands_in_the_document(
     profile: Profile, period_us: float, values_in_their_places: Callable[[Report], int]

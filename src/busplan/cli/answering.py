@@ -123,3 +123,10 @@ def terminal_width() -> int | None:
     from shutil import get_terminal_size
 
     return max(get_terminal_size().columns, _NARROWEST)
+
+
+def columns() -> int:
+    """Width to lay out lines for that are always of a width: the terminal's, or a fixed one."""
+    from busplan.forms.terminal import WIDTH
+
+    return terminal_width() or WIDTH

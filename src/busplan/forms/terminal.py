@@ -24,7 +24,7 @@ from busplan.forms.numbers import with_unit
 from busplan.forms.text_tables import table_lines
 from busplan.forms.wrapping import wrapped
 
-_WIDTH: Final = 80
+WIDTH: Final = 80
 """Width of a drawing if there is no terminal, in columns."""
 
 
@@ -83,8 +83,9 @@ def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]
         case Table():
             return [*_caption(block.caption, width), *table_lines(block, width=width, is_whole=is_whole)]
         case Chart():
-            drawn = block.drawing.characters(width or _WIDTH)
-            return [*_caption(block.caption, width), *(_inside(line, width) for line in drawn)] if drawn else []
+            drawn = block.drawing.characters(width or WIDTH)
+            lines = (piece for line in drawn or () for piece in _drawn_lines(line, width))
+            return [*_caption(block.caption, width), *lines] if drawn else []
         case Command():
             return [Line(f"$ {block.line}", "drawn")]
         case Snippet():
@@ -100,11 +101,13 @@ def _lines(block: Block, width: int | None, *, is_whole: bool) -> Sequence[Line]
             return [*title, *block_lines(block.blocks, width=width, is_whole=is_whole)]
 
 
-def _inside(line: Line, width: int | None) -> Line:
-    """The line of a drawing with its last label moved to the left, if it reaches beyond the width."""
+def _drawn_lines(line: Line, width: int | None) -> list[Line]:
+    """A line of a drawing: words are wrapped, a label that reaches beyond the width is moved to the left."""
+    if line.tone != "drawn":
+        return wrapped(line, width)
     beyond = 0 if width is None else len(line.text) - width
     before, gap, label = line.text.rpartition(" " * (beyond + 1)) if beyond > 0 else ("", "", "")
-    return line._replace(text=f"{before} {label}") if gap else line
+    return [line._replace(text=f"{before} {label}") if gap else line]
 
 
 def _caption(caption: Sentence | None, width: int | None) -> list[Line]:
