@@ -63,7 +63,7 @@ def test_both_names_at_once_are_refused() -> None:
 # --- one name for one thing -------------------------------------------------------------------------------
 
 OF_THE_COMMAND = {"all", "format", "output", "set", "jobs", "help"}
-"""Options that say where and how much to write, how many processes, or change the profile, which load_profile(changes=) does."""
+"""Options that say where and what to write, the processes, or change the profile, which load_profile(changes=) does."""
 ALONE = {
     "calibrate": {"apply", "nodes", "gap-count"},
     "check": {"set", "annotate", "baseline", "update-baseline", "require-baseline", "prefix", "no-shipped"},
