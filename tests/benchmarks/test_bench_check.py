@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(find_spec("check_jsonschema") is None, reason="c
 @pytest.fixture(params=["clean", "every third with findings"])
 def folder(request: pytest.FixtureRequest, tmp_path: Path, size: Callable[[int, int], int]) -> Path:
     for number in range(size(FILES, 30)):
-        text = SHIPPED[number % len(SHIPPED)].replace("\nname = ", f"\nname = '{number}' #")
+        text = SHIPPED[number % len(SHIPPED)].replace("\nname = ", f"\nname = '{number}' #", 1)
         if request.param != "clean" and number % 3 == 0:
             # Still of the right shape: one cycle that does not fit, and a payload of no whole number of quadlets.
             text = text.replace("period_us = ", "period_us = 200 #").replace("read_bytes = ", "read_bytes = 7 #")

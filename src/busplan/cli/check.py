@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.answers.gate import FORMATS, gate_format
-from busplan.cli.answering import terminal_width
+from busplan.cli.answering import columns
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import complete_profile, output_option
@@ -238,7 +238,7 @@ def _write(report: "CheckReport", *, format_: str | None, output: Path | None) -
     if output is not None or FORMATS[name].reader != "people":
         write_document(chosen.write(report), output, quiet=True)
     elif is_styled():
-        emit_text(chosen.on_terminal(report, width=terminal_width()))
+        emit_text(chosen.on_terminal(report, width=columns()))
     else:
         emit_text(chosen.write(report))
     say(*chosen.log(report))

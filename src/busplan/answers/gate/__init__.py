@@ -15,7 +15,7 @@ class GateFormat(ABC):
     def write(self, report: "CheckReport") -> str:
         """Write a report."""
 
-    def on_terminal(self, report: "CheckReport", *, width: int | None) -> str:  # noqa: ARG002 - most have one look
+    def on_terminal(self, report: "CheckReport", *, width: int) -> str:  # noqa: ARG002 - most formats have one look
         """Write a report in the colours of a terminal.
 
         Parameters
@@ -23,7 +23,7 @@ class GateFormat(ABC):
         report
             The report.
         width
-            Width of sentences and source lines, in columns; None without a terminal.
+            Width of sentences and source lines, in columns.
         """
         return self.write(report)
 

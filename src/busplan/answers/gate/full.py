@@ -28,9 +28,9 @@ class Full(GateFormat):
         """Write the lines of each finding."""
         return plain_text(_lines(report, WIDTH))
 
-    def on_terminal(self, report: CheckReport, *, width: int | None) -> str:
+    def on_terminal(self, report: CheckReport, *, width: int) -> str:
         """Write the lines of each finding in colours."""
-        return styled_text(_lines(report, min(width or WIDTH, WIDTH)))
+        return styled_text(_lines(report, min(width, WIDTH)))
 
 
 def _lines(report: CheckReport, width: int) -> Iterator[Line]:

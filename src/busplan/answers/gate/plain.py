@@ -38,7 +38,7 @@ class Concise(GateFormat):
         """Write the lines."""
         return plain_text(_lines(report))
 
-    def on_terminal(self, report: CheckReport, *, width: int | None) -> str:  # noqa: ARG002 - a line is a line
+    def on_terminal(self, report: CheckReport, *, width: int) -> str:  # noqa: ARG002 - a line is a line
         """Write the lines in colours; a terminal breaks them itself, so that each can be copied."""
         return styled_text(_lines(report))
 
