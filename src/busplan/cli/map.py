@@ -12,7 +12,7 @@ from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, tak
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.output import write_document
-from busplan.cli.pictures import picture_form
+from busplan.cli.pictures import picture_form, picture_title
 from busplan.cli.vary import VALUES_HELP, parse_axis
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
@@ -124,11 +124,9 @@ def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: b
 
 def _picture(found: "TradeOff", form: Picture, changes: KeyChanges) -> str | bytes:
     """The drawing as a file of its own."""
-    from busplan.answers.documents import changes_sentences
     from busplan.answers.map import headline
-    from busplan.forms.columns import sentence_text
 
-    title = " ".join(map(sentence_text, (headline(found), *changes_sentences(changes))))
+    title = picture_title(headline(found), changes)
     match form:
         case "svg":
             from busplan.drawings.map.svg import map_svg

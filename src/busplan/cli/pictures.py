@@ -1,10 +1,15 @@
-"""Choose the form of an answer that may also be a picture."""
+"""The form of an answer that may also be a picture, and the title of that."""
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from busplan.cli.options import AnyForm, form_of_file
 from busplan.cli.output import refuse_terminal
+from busplan.profile.changes import KeyChanges
+
+if TYPE_CHECKING:
+    from busplan.forms.blocks import Sentence
 
 
 def picture_form(given: AnyForm | None, output: Path | None, *, forms: Mapping[str, AnyForm]) -> AnyForm:
@@ -32,3 +37,11 @@ def picture_form(given: AnyForm | None, output: Path | None, *, forms: Mapping[s
 
         require_matplotlib(f"--format {chosen}")
     return chosen
+
+
+def picture_title(headline: "Sentence", changes: KeyChanges) -> str:
+    """Title of a picture that is a file of its own: the headline of its answer, and what was set."""
+    from busplan.answers.documents import changes_sentences
+    from busplan.forms.columns import sentence_text
+
+    return " ".join(map(sentence_text, (headline, *changes_sentences(changes))))

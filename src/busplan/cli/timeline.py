@@ -19,7 +19,7 @@ from busplan.cli.options import (
     timing_model,
 )
 from busplan.cli.output import write_document
-from busplan.cli.pictures import picture_form
+from busplan.cli.pictures import picture_form, picture_title
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -145,11 +145,9 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
 
 def _picture(shown: "Schedule", form: Picture, changes: KeyChanges) -> str | bytes:
     """The drawing as a file of its own."""
-    from busplan.answers.documents import changes_sentences
     from busplan.answers.timeline import headline
-    from busplan.forms.columns import sentence_text
 
-    title = " ".join(map(sentence_text, (headline(shown), *changes_sentences(changes))))
+    title = picture_title(headline(shown), changes)
     match form:
         case "mermaid":
             from busplan.drawings.timeline.mermaid import timeline_mermaid

@@ -30,7 +30,7 @@ _NAMES: Final = by_key((SAFE_NODES, SAFE_AXES, MARGIN_CORRECTED, MAX_NODES, MAX_
 """Figures of a baseline, in the order in which a finding says them."""
 
 
-class Change(NamedTuple):
+class ChangedValue(NamedTuple):
     """A value that was recorded, and that of today."""
 
     before: object
@@ -70,20 +70,20 @@ def _is_less(value: float, before: float) -> bool:
     return before - value > _ROUNDING * max(abs(before), 1.0)
 
 
-def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, Change]:
+def _causes(subject: Subject, before: Mapping[str, object], lost: Mapping[str, object]) -> dict[str, ChangedValue]:
     """Changed keys whose recorded value alone would win back some of what was lost; all of them if none would."""
     changed = _changed(subject, before)
     found = {key: one for key, one in changed.items() if _wins_back(subject, key, one.before, lost)}
     return found or changed
 
 
-def _changed(subject: Subject, before: Mapping[str, object]) -> dict[str, Change]:
+def _changed(subject: Subject, before: Mapping[str, object]) -> dict[str, ChangedValue]:
     """Keys with another value than recorded; one that a file does not say has its default."""
     profile = subject.profile
     values, said = dict(flat(profile.model_dump(mode="json"))), keys_of(profile)
-    found: dict[str, Change] = {}
+    found: dict[str, ChangedValue] = {}
     for key in dict.fromkeys((*said, *before)):
-        one = Change(before[key] if key in before else default_of(profile, key), values.get(key))
+        one = ChangedValue(before[key] if key in before else default_of(profile, key), values.get(key))
         if one.before != one.now:
             found[key] = one
     return found
@@ -99,7 +99,7 @@ def _wins_back(subject: Subject, key: str, value: object, lost: Mapping[str, obj
     return any(name in then and _is_less(now[name], then[name]) for name in lost)
 
 
-def _keys(changes: Mapping[str, Change]) -> str:
+def _keys(changes: Mapping[str, ChangedValue]) -> str:
     """Say how keys changed; the finding begins with the first of them."""
     first, *others = (f"{_shown(one.now)}, was {_shown(one.before)}" for one in changes.values())
     named = [f"{key} = {words}" for key, words in zip(list(changes)[1:], others, strict=True)][: _MOST_NAMED - 1]

@@ -26,7 +26,7 @@ from busplan.drawings.timeline.period import (
     LEFT,
     NEEDED,
     REST,
-    Span,
+    PeriodPart,
     model_bars,
     period_end_us,
     period_title,
@@ -74,7 +74,7 @@ def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
         rows["over"] = [(_OVER, beyond(plan))]
     legend += [f"{mark} {label}" for label, mark in _PERIOD_MARKS.items() if label in shown]
     if not plan.is_whole:
-        rows["window"] = [(_WINDOW, _event(plan, Span("", plan.from_us, plan.to_us)))]
+        rows["window"] = [(_WINDOW, _event(plan, PeriodPart("", plan.from_us, plan.to_us)))]
         legend.append(f"{_WINDOW} shown below")
     gutter = max(map(len, rows))
     bar = _Bar(0.0, period_end_us(plan, bars), width - gutter - 3)
@@ -85,7 +85,7 @@ def _strip(plan: Schedule, *, width: int) -> Iterator[Line]:
     yield from legend_lines(legend, width=width)
 
 
-def _event(plan: Schedule, part: Span) -> Event:
+def _event(plan: Schedule, part: PeriodPart) -> Event:
     return plan.cycle_events[0]._replace(start_us=part.start_us, end_us=part.end_us)
 
 

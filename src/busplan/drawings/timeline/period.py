@@ -17,7 +17,7 @@ LEFT: Final = "margin"
 BEYOND: Final = "beyond the slice"
 
 
-class Span(NamedTuple):
+class PeriodPart(NamedTuple):
     """A part of the period."""
 
     label: str
@@ -40,15 +40,15 @@ class ModelBar(NamedTuple):
         return f"{needed} needed, margin {with_unit(figure_value(MARGIN, self.figures.margin_us))}"
 
     @property
-    def spans(self) -> Iterator[Span]:
+    def spans(self) -> Iterator[PeriodPart]:
         """The time needed, what is left of the slice or goes beyond it, and the rest of the period."""
         needed_us, slice_us = self.figures.required_us, self.figures.available_us
-        yield Span(NEEDED, 0.0, min(needed_us, slice_us))
+        yield PeriodPart(NEEDED, 0.0, min(needed_us, slice_us))
         used_us = max(needed_us, slice_us)
         if used_us > min(needed_us, slice_us):
-            yield Span(LEFT if slice_us > needed_us else BEYOND, min(needed_us, slice_us), used_us)
+            yield PeriodPart(LEFT if slice_us > needed_us else BEYOND, min(needed_us, slice_us), used_us)
         if self.figures.period_us > used_us:
-            yield Span(REST, used_us, self.figures.period_us)
+            yield PeriodPart(REST, used_us, self.figures.period_us)
 
 
 def model_bars(plan: Schedule) -> tuple[ModelBar, ...]:
