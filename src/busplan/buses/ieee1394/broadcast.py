@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from busplan.buses.bus import BusEvent, BusLatency
+from busplan.buses.ieee1394 import figures
 from busplan.buses.ieee1394.broadcast_terms import BroadcastTerms, Idle, hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
     BLOCK_READ_REQUEST_BYTES,
@@ -67,7 +68,7 @@ class BroadcastCycle(BroadcastTerms):
             "host_us": self.idle.host_us,
             "transaction_us": write_us + self.idle.us,
         }
-        return {**common, **read}, {**common, **write}
+        return _in_order({**common, **read}), _in_order({**common, **write})
 
     def figures(self) -> Mapping[str, Number | None]:
         """How the bus is set, and the latencies; the paper has no number of nodes for this schedule."""
@@ -144,3 +145,8 @@ def _waits(idle: Idle, where: str) -> list[BusEvent]:
         BusEvent("arbitration_reset_gap", "cycle_idle_us", plain(idle.gap_us), f"arbitration reset gap {where}"),
         BusEvent("host", "cycle_host_us", plain(idle.host_us), f"host's own time {where}"),
     ]
+
+
+def _in_order(phases: Mapping[str, Number]) -> dict[str, Number]:
+    """Phases in the order of the document."""
+    return {figure.key: phases[figure.key] for figure in figures.LATENCY if figure.key in phases}
