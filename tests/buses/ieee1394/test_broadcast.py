@@ -172,7 +172,9 @@ def test_no_simulated_cycle_takes_longer_than_the_closed_form(drawn: tuple[Profi
     longest_us = max(after - before for before, after in pairwise(run.starts_us))
     closed_us = figures(profile, model="standard").required_us
     assert longest_us <= closed_us + ROUNDING_US
-    if bus["scene"].first_start_us is None and bus["scene"].nodes[0].hops == bus["scene"].hops:
+    scene = bus["scene"]
+    # Below gap count 8 the first node's 150 clocks end the fairness interval, and the host has its turn earlier.
+    if scene.first_start_us is None and scene.nodes[0].hops == scene.hops and scene.reset_gap_us > 150 / 49.152:
         assert longest_us == pytest.approx(closed_us, abs=ROUNDING_US)  # nothing is charged that the bus does not take
 
 
