@@ -26,6 +26,7 @@ COMMANDS: Final = (
     "rule",
     "schema",
     "manual",
+    "evidence",
     "paper",
     "profiles",
     "init",

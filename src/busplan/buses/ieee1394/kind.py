@@ -43,7 +43,7 @@ from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Profile
-    from busplan.buses.published import PaperSection
+    from busplan.buses.published import EvidenceSection
 
 _PHASES: Final = by_key(figures.LATENCY)
 _HOST_STEP_US: Final = 10.0
@@ -138,6 +138,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         {"host.transaction_us": 0.0},
         {"cycle.retries": 0},
     )
+    evidence_data = ("paper", "dvrk", "ieee1394")
+    evidence_profiles = ("paper-two-node", "dvrk")
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
@@ -288,11 +290,18 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             )
         return found
 
-    def published_sections(self, network: Network, published: Mapping[str, Any]) -> "tuple[PaperSection, ...]":
-        """Compare the published figures of the paper's bench with what the equations give."""
-        from busplan.buses.ieee1394.paper import bus_sections  # one command alone asks for it
+    def evidence(
+        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
+    ) -> "tuple[EvidenceSection, ...]":
+        """Compare what is published of the paper's bench, of the dVRK and of the bus with what the equations give."""
+        from busplan.buses.ieee1394.evidence import kit_sections, standard_sections  # one command alone asks for it
+        from busplan.buses.ieee1394.paper import bus_sections
 
-        return bus_sections(network, published)
+        return (
+            *bus_sections(networks["paper-two-node"], published["paper"]),
+            *kit_sections(networks["dvrk"], published["dvrk"]),
+            *standard_sections(published["ieee1394"]),
+        )
 
 
 def _gap_count(network: Network) -> Setting:
