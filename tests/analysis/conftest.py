@@ -259,7 +259,10 @@ def _with(profile: Profile, *, host_us: float) -> Profile:
     """The same network without cycle starts, with another time of the host."""
     own: Any = profile
     bus = own.bus.model_copy(update={"cycle_master": False})
-    return own.model_copy(update={"bus": bus, "host": own.host.model_copy(update={"transaction_us": host_us})})
+    found: Profile = own.model_copy(
+        update={"bus": bus, "host": own.host.model_copy(update={"transaction_us": host_us})}
+    )
+    return found
 
 
 def _starts(profile: Profile, nodes: int) -> int:

@@ -196,13 +196,12 @@ def _gap_counts(published: Published) -> EvidenceSection:
         published["phy"],
         published["cable"],
     )
-    hop_us = cable["delay_us_per_m"] * cable["length_m"] + phy["delay_us"]
+    hop_us: float = cable["delay_us_per_m"] * cable["length_m"] + phy["delay_us"]
 
     def derived(hops: int) -> int:
-        ticks = 2 * hop_us * given["base_rate_mhz"] * hops
-        return max(
-            ceil((ticks + offset) / slope) for offset, slope in zip(given["offsets"], given["slopes"], strict=True)
-        )
+        ticks: float = 2 * hop_us * given["base_rate_mhz"] * hops
+        conditions: list[tuple[int, int]] = list(zip(given["offsets"], given["slopes"], strict=True))
+        return max(ceil((ticks + offset) / slope) for offset, slope in conditions)
 
     table = list(enumerate(given["by_hops"], start=1))
     found = {
