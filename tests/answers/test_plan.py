@@ -78,7 +78,7 @@ def test_no_plan_says_what_binds_and_what_would_be_enough(paper: Profile) -> Non
         ": NO PLAN. No change of gap count and slice ratio is enough: the cycle needs a slice of 1237.520 us to be "
         "shown to fit, and at most 900.000 us can be given."
     )
-    assert others[:3] == [
+    assert others[:4] == [
         (
             'Enough would be to free the responses: node.read_response = "concatenated" (if the nodes can), '
             "cycle.slice_ratio = 0.89, bus.gap_count = 21."
