@@ -37,6 +37,7 @@ def exact_required_us(profile: Profile, model: str, nodes: int, *, extra_us: flo
     acknowledge_us = way_us + Fraction("0.25")
     sub_us, reset_us = Fraction(29 + 16 * gap) / clock, Fraction(53 + 32 * gap) / clock
     host_us = Fraction(data["host"]["transaction_us"])
+    is_broadcast = cycle["schedule"] == "broadcast"
 
     def packets(kind: str, size: int) -> tuple[int, int]:
         paper_bytes = size + int(payload["overhead_bytes"])
@@ -65,18 +66,55 @@ def exact_required_us(profile: Profile, model: str, nodes: int, *, extra_us: flo
         waits_us = max(first_us + max(reset_us, host_us), most_us + max(sub_us, host_us))
         return Fraction(half_us + arbitration_us + data_us(response) + acknowledge_us + waits_us)
 
-    total = Fraction(cycle["nonperiodic_us"]) + nodes * (transaction_us("read") + transaction_us("write"))
+    total = Fraction(cycle["nonperiodic_us"])
+    total += _broadcasts_us(data, nodes) if is_broadcast else nodes * (transaction_us("read") + transaction_us("write"))
     if model == "paper":
         sync = cycle["sync"]
         return total + Fraction(sync["ping_us"]) + Fraction(sync["ping_per_node_us"]) * (nodes - 1)
-    total += arbitration_us + data_us(20) + reset_us
-    largest = max(packets(kind, payload[f"{kind}_bytes"])[0] for kind in ("read", "write"))
+    if is_broadcast:
+        largest = 24 + nodes * _filled(payload["write_bytes"])
+    else:
+        total += arbitration_us + data_us(20) + reset_us
+        largest = max(packets(kind, payload[f"{kind}_bytes"])[0] for kind in ("read", "write"))
     total += cycle["retries"] * (arbitration_us + data_us(largest) + acknowledge_us + reset_us)
     total += Fraction(extra_us)
     if bus["cycle_master"]:
         start_us = reset_us + arbitration_us + way_us + Fraction(160) / base + Fraction(bus["isochronous_us"])
         total += _number_of_starts(total, start_us) * start_us
     return Fraction(total)
+
+
+def _filled(size: int) -> int:
+    """A payload in whole quadlets, with the quadlet before it."""
+    return -(-size // 4) * 4 + 4
+
+
+def _broadcasts_us(data: dict[str, Any], nodes: int) -> Fraction:
+    """One query, a broadcast of each node, one read of the hub, one write, the steps of the protocol one by one."""
+    bus, payload, cycle, host_us = data["bus"], data["payload"], data["cycle"], Fraction(data["host"]["transaction_us"])
+    hops, gap = _setup(bus, nodes)
+    base, rate = Fraction("98.304"), {"S100": 1, "S200": 2, "S400": 4}[bus["speed"]] * Fraction("98.304")
+    phy_us = Fraction(14) / base if bus["phy_delay_us"] is None else Fraction(bus["phy_delay_us"])
+    way_us = hops * (Fraction("0.023") * Fraction(bus["cable_length_m"]) / Fraction("4.5") + phy_us)
+    sub_us, reset_us, hold_us = Fraction(29 + 16 * gap) / base, Fraction(53 + 32 * gap) / base, Fraction("1.63")
+    is_fast = cycle["broadcast_request"] == "isochronous"
+    gap_us, asked_us = (0, way_us + hold_us) if is_fast else (sub_us, way_us + hold_us + Fraction(4 * gap) / base)
+
+    def sent_us(size: int) -> Fraction:
+        """Arbitration and data of a packet of the host."""
+        return way_us + hold_us + Fraction(4 * gap) / base + way_us + Fraction(8 * size) / rate
+
+    acknowledge_us = way_us + Fraction("0.25")
+    now_us = asked_at_us = sent_us(20) + acknowledge_us
+    now_us += max(Fraction(0), Fraction(150) / Fraction("49.152") - gap_us)
+    for _ in range(nodes):
+        now_us += gap_us + asked_us + way_us + Fraction(8 * (24 + _filled(payload["read_bytes"]))) / rate
+    now_us = max(now_us + reset_us, max(now_us, asked_at_us + 10 + 5 * nodes) + host_us)
+    now_us += sent_us(20) + acknowledge_us
+    now_us += way_us + Fraction(8 * (24 + nodes * _filled(payload["read_bytes"]) + 4)) / rate + acknowledge_us
+    now_us += max(reset_us, host_us)
+    now_us += sent_us(24 + nodes * _filled(payload["write_bytes"])) + acknowledge_us
+    return Fraction(now_us + max(reset_us, host_us))
 
 
 def _setup(bus: dict[str, Any], nodes: int) -> tuple[int, int]:
@@ -115,6 +153,8 @@ def table_1_residuals_us() -> list[float]:
 def exact_safe_required_us(profile: Profile, nodes: int) -> Fraction:
     """What the slice must give for a cycle to be shown to fit; exact but for its bias and its uncertainty."""
     data = profile.model_dump()
+    if data["cycle"]["schedule"] == "broadcast":
+        return _safe_broadcasts_us(profile, nodes)
     bus, node, host, retries = data["bus"], data["node"], data["host"], data["cycle"]["retries"]
     execution = node["execution"]
     hops, gap = _setup(bus, nodes)
@@ -175,6 +215,56 @@ def exact_safe_required_us(profile: Profile, nodes: int) -> Fraction:
     return needed / (1 - Fraction(data["limits"]["reserve"]))
 
 
+def _safe_broadcasts_us(profile: Profile, nodes: int) -> Fraction:
+    """The same for the broadcast schedule: each of its packets is half a transaction."""
+    data = profile.model_dump()
+    bus, host, cycle = data["bus"], data["host"], data["cycle"]
+    hops, gap = _setup(bus, nodes)
+    residuals_us = table_1_residuals_us()
+    packets = nodes + 4 + cycle["retries"]
+    with_gap = packets if cycle["broadcast_request"] == "priority" else packets - nodes
+    gap_term_us = 2 * (63 - gap) / 98.304
+    step_us = 0.1 * host["transaction_us"] if host["uncertainty_us"] is None else host["uncertainty_us"]
+
+    def at(steps: int) -> float:
+        """The cycle with another time of the host, without starts: only the difference is used."""
+        return float(
+            exact_required_us(_with(profile, host_us=host["transaction_us"] + steps * step_us), "standard", nodes)
+        )
+
+    own_us = at(0)
+    hop_delays = 11 + 2 * nodes + 3 * cycle["retries"] + 2 * _starts(profile, nodes)
+    doubts_us = (
+        packets * stdev(residuals_us) * sqrt(1 + 1 / 8),
+        with_gap * gap_term_us / sqrt(3),
+        0.0 if bus["phy_delay_us"] is not None else hop_delays * hops * 0.020 / sqrt(3),
+        max(at(2) - own_us, own_us - at(-2)) / 2,
+    )
+    extra_us = packets * fmean(residuals_us) + with_gap * gap_term_us + 2 * sqrt(sum(us**2 for us in doubts_us))
+    needed = exact_required_us(profile, "standard", nodes, extra_us=extra_us)
+    return needed / (1 - Fraction(data["limits"]["reserve"]))
+
+
+def carries_broadcasts(profile: Profile, nodes: int) -> bool:
+    """Whether a hub collects the data of so many nodes, and its block and the write fit a packet."""
+    data = profile.model_dump()
+    if data["cycle"]["schedule"] != "broadcast":
+        return True
+    most = {"S100": 512, "S200": 1024, "S400": 2048}[data["bus"]["speed"]]
+    read, write = (_filled(data["payload"][f"{kind}_bytes"]) for kind in ("read", "write"))
+    return nodes <= 16 and nodes * read + 4 <= most and nodes * write <= most
+
+
+def _with(profile: Profile, *, host_us: float) -> Profile:
+    """The same network without cycle starts, with another time of the host."""
+    own: Any = profile
+    bus = own.bus.model_copy(update={"cycle_master": False})
+    found: Profile = own.model_copy(
+        update={"bus": bus, "host": own.host.model_copy(update={"transaction_us": host_us})}
+    )
+    return found
+
+
 def _starts(profile: Profile, nodes: int) -> int:
     """Cycle starts in a cycle, from what it needs with and without them."""
     if not profile.bus.cycle_master:
@@ -225,6 +315,8 @@ def profiles(draw: st.DrawFn) -> Profile:
         "bus__isochronous_us": draw(st.floats(0.0, 40.0)) if master else 0.0,
         "bus__phy_delay_us": draw(st.one_of(st.none(), st.floats(0.01, 0.2))),
         "cycle__retries": draw(st.integers(0, 5)),
+        "cycle__schedule": draw(st.sampled_from(["individual", "broadcast"])),
+        "cycle__broadcast_request": draw(st.sampled_from(["isochronous", "priority"])),
         "host": {"transaction_us": draw(st.one_of(st.just(0.0), st.floats(0.0, 60.0)))},
         "node__read_response": draw(st.sampled_from(["split", "concatenated"])),
         "node__write_response": draw(st.sampled_from(["split", "unified"])),
@@ -272,6 +364,12 @@ def exact() -> Callable[[Profile, str, int], Fraction]:
 def safely() -> Callable[[Profile, int], Fraction]:
     """The second implementation of what a slice must give."""
     return exact_safe_required_us
+
+
+@pytest.fixture(scope="session")
+def carries() -> Callable[[Profile, int], bool]:
+    """Whether the broadcast schedule, where a profile has it, carries so many nodes."""
+    return carries_broadcasts
 
 
 @pytest.fixture(scope="session")

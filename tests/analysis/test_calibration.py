@@ -114,7 +114,11 @@ def test_what_the_model_leaves_of_table_1_is_measured_less_equation_13(model: Ti
 def test_latencies_of_a_profile_give_its_own_execution_time(
     any_profile: st.SearchStrategy[Profile], data: st.DataObject
 ) -> None:
-    split: dict[str, object] = {"node.read_response": "split", "node.write_response": "split"}
+    split: dict[str, object] = {
+        "node.read_response": "split",
+        "node.write_response": "split",
+        "cycle.schedule": "individual",
+    }
     profile = override(data.draw(any_profile), split)
     model = data.draw(st.sampled_from(MODELS))
     most = int(MAX_PAYLOAD_BYTES[profile.bus.speed])

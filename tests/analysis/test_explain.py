@@ -124,7 +124,10 @@ def test_the_registry_holds_every_key_of_the_results() -> None:
         *("cheapest_change", "warnings", "text", "sensitivity", "next_bottleneck"),
     }
     assert set(FIGURES["circle-test"]) == set(CircleFigures._fields)
-    assert list(FIGURES["latency"]) == list(latency_records(latency(load("paper-4ms").profile))[0])
+    one, broadcast = (latency_records(latency(load(name).profile))[0] for name in ("paper-4ms", "dvrk"))
+    assert list(FIGURES["latency"]) == [key for key in broadcast if key != "group"]
+    of_broadcasts = ("query_us", "boards_us", "hub_wait_us")
+    assert [key for key in FIGURES["latency"] if key not in of_broadcasts] == list(one)
 
 
 CIRCLES = {

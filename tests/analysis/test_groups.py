@@ -105,6 +105,8 @@ def grouped(draw: st.DrawFn) -> Profile:
                 "period_us": draw(st.floats(300, 20_000)),
                 "slice_ratio": draw(st.floats(0.3, 1.0)),
                 "retries": draw(st.sampled_from([0, 2])),
+                "schedule": draw(st.sampled_from(["individual", "broadcast"])),
+                "broadcast_request": draw(st.sampled_from(["isochronous", "priority"])),
             },
             "group": each,
             "limits": {"reserve": draw(st.sampled_from([0.0, 0.15]))},

@@ -2,8 +2,9 @@
 
 import pytest
 
-from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections, published
+from busplan.analysis.circle.roundness import CircleFigures, circle_test
+from busplan.analysis.evidence import kind_evidence, paper_evidence, published
+from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES
 from busplan.buses.ieee1394 import table_1
 from busplan.buses.published import Comparison
 from busplan.profile.shipped import load
@@ -31,10 +32,21 @@ TABLE_2 = [
 
 
 @pytest.fixture(scope="module")
-def comparisons() -> list[Comparison]:
-    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
-    sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
-    return [one for section in sections for one in section.comparisons]
+def circles() -> list[CircleFigures]:
+    return [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+
+
+@pytest.fixture(scope="module")
+def comparisons(circles: list[CircleFigures]) -> list[Comparison]:
+    return [one for section in paper_evidence(circles=lambda: circles) for one in section.comparisons]
+
+
+@pytest.fixture(scope="module")
+def others(circles: list[CircleFigures]) -> list[Comparison]:
+    """What is known beside the paper."""
+    found = kind_evidence("ieee1394", circles=lambda: circles).sections
+    assert [one.data for one in found] == sorted((one.data for one in found), key=["paper", "dvrk", "ieee1394"].index)
+    return [one for section in found if section.data != "paper" for one in section.comparisons]
 
 
 def chosen(comparisons: list[Comparison], section: str, method: str) -> dict[str, Comparison]:
@@ -43,7 +55,7 @@ def chosen(comparisons: list[Comparison], section: str, method: str) -> dict[str
 
 def test_the_data_hold_the_printed_tables() -> None:
     assert [tuple(row) for row in table_1.TABLE_1] == TABLE_1
-    two = published()["table_2"]
+    two = published("paper")["table_2"]
     columns = ("payload_bytes", "latency_us", "reference_first_us", "reference_second_us")
     assert list(zip(*(two[column] for column in columns), strict=True)) == TABLE_2
 
@@ -92,6 +104,61 @@ def test_can_is_202_times_slower_as_printed(comparisons: list[Comparison]) -> No
     latencies = {one.method: one for one in comparisons if one.quantity == "T_lant, 8 bytes"}
     # 36.8 and 36.7 us at 4 and 16 bytes: a third of the way at 8.
     assert latencies["paper model"].computed == pytest.approx(36.8 - 0.1 / 3 + 2 * (3.1035817 + 64 / 393.216), abs=1e-6)
+
+
+def test_the_can_row_is_135_us_of_wire_and_10_ms_of_host(comparisons: list[Comparison]) -> None:
+    (wire,) = (one for one in comparisons if one.method == "CAN frame on the wire")
+    assert (wire.published, wire.computed) == (10500, 55 + 10 * 8)  # bits at 1 Mbit/s, worst-case stuffing
+    assert wire.residual == -10365
+
+
+def test_every_figure_has_the_grade_of_its_source(comparisons: list[Comparison], others: list[Comparison]) -> None:
+    measured = {one.section for one in (*comparisons, *others) if one.grade == "measured"}
+    assert {one.partition(":")[0] for one in measured} == {
+        *("Table I", "Section IV-A", "Figs. 9 and 10", "dVRK", "IEEE 1394"),
+    }
+    assert {one.grade for one in (*comparisons, *others)} == {"published", "measured", "derived"}
+
+
+def test_the_kit_gains_less_on_the_bus_alone_than_was_measured_with_its_host(others: list[Comparison]) -> None:
+    rows = chosen(others, "dVRK: I/O time, one by one over by broadcasts", "standard model")
+    assert rows["gain, of the bus alone"].published == 4
+    # By hand, 8 hops and gap count 21: 309.555 us one by one, 135.053 us by broadcasts with isochronous requests.
+    assert rows["gain, of the bus alone"].computed == pytest.approx(309.555 / 135.053, rel=1e-5)
+    # 16 calls against 3, each longer than T_reset, 725 / 98.304 us: both cycles are lines in the host's time.
+    reset_us = 725 / 98.304
+    host_us = reset_us + (4 * 135.053 - 309.555) / (16 - 4 * 3)
+    assert rows["host time that makes it 4"].computed == pytest.approx(host_us, abs=0.01)
+
+
+def test_the_kit_runs_at_periods_that_its_cycles_fit(others: list[Comparison]) -> None:
+    rows = chosen(others, "dVRK: the periods that it runs at", "standard model")
+    assert [one.published for one in rows.values()] == pytest.approx([1e6 / 1500, 1e6 / 6000])
+    assert all((one.residual or 0.0) < 0 for one in rows.values())
+
+
+def test_the_hub_and_a_board_of_the_kit(others: list[Comparison]) -> None:
+    (block,) = chosen(others, "dVRK: the block of the hub", "standard model").values()
+    assert block.computed == block.published == 4 * (8 * 33 + 1)
+    boards = chosen(others, "dVRK: the broadcast of one board", "standard model")
+    hop_us = 0.023 + 14 / 98.304
+    by_hand = {f"{hops} hop{'s' * (hops > 1)}": 2 * hops * hop_us + 1.63 + 8 * 92 / 393.216 for hops in (1, 8)}
+    assert {name: one.computed for name, one in boards.items()} == pytest.approx(by_hand)
+
+
+def test_what_is_known_of_the_standard_beside_the_paper(others: list[Comparison]) -> None:
+    delays = [one for one in others if one.section.startswith("IEEE 1394: delays")]
+    assert [(one.quantity, one.published) for one in delays] == [
+        ("PHY", 0.144),
+        ("PHY", 0.144),
+        ("cable of 4.5 m", pytest.approx(4.5 * 5.05e-3)),
+    ]
+    assert [abs(one.relative_residual or 0.0) < 0.02 for one in delays] == [False, True, True]
+    met = [one for one in others if one.section.startswith("IEEE 1394: smallest")]
+    assert [(one.published, one.computed) for one in met] == [(23, 23), (23, 23)]
+    trips = [one for one in others if one.section.startswith("IEEE 1394: a round trip")]
+    assert [one.published for one in trips] == [100, 140]
+    assert all(one.computed < 0.25 * (one.published or 0.0) for one in trips)
 
 
 def test_equation_15_is_the_sum_of_rounded_terms(comparisons: list[Comparison]) -> None:

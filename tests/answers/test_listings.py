@@ -5,8 +5,9 @@ from collections.abc import Callable
 import pytest
 
 from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, paper_sections
-from busplan.answers.paper import paper_document, paper_report
+from busplan.analysis.evidence import kind_evidence, paper_evidence
+from busplan.analysis.paper import CIRCLE_PROFILES
+from busplan.answers.evidence import evidence_document, evidence_report, paper_document, paper_report
 from busplan.answers.profiles import profiles_report
 from busplan.answers.rules import rule_report, rules_report
 from busplan.forms import render
@@ -17,7 +18,7 @@ from busplan.rules.registry import NEVER_SUPPRESSED, all_rules
 
 def test_paper_has_every_comparison_once(values_in_their_places: Callable[[Report], int]) -> None:
     circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
-    sections = paper_sections(load(BENCH_PROFILE).profile, circles=circles)
+    sections = paper_evidence(circles=lambda: circles)
     report = paper_report(sections)
     figures = paper_document(sections)["figures"]
     places = [value.at for value in values_in(tuple(report.blocks()))]
@@ -31,11 +32,22 @@ def test_paper_has_every_comparison_once(values_in_their_places: Callable[[Repor
 
 def test_no_residual_of_the_paper_is_rounding_dust() -> None:
     circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
-    text = render(paper_report(paper_sections(load(BENCH_PROFILE).profile, circles=circles)), "table")
+    text = render(paper_report(paper_evidence(circles=lambda: circles)), "table")
     assert "e-" not in text.replace("time-", "")
     assert "-0.0 " not in text
     assert "-0.0\n" not in text
-    assert "no payload  us         3.11        3.104   -0.0064  -0.2                3.110    0.0000  0.0\n" in text
+    row = "no payload  us         3.11  published        3.104   -0.0064  -0.2                3.110    0.0000  0.0\n"
+    assert row in text
+
+
+def test_evidence_has_every_comparison_once(values_in_their_places: Callable[[Report], int]) -> None:
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    kinds = [kind_evidence("ieee1394", circles=lambda: circles)]
+    report, figures = evidence_report(kinds), evidence_document(kinds)["figures"]
+    places = [value.at for value in values_in(tuple(report.blocks()))]
+    assert len(places) == len(set(places)) == values_in_their_places(report)
+    assert [f"/figures/{number}/computed" in places for number in range(len(figures))] == [True] * len(figures)
+    assert {one["data"] for one in figures} == {"paper", "dvrk", "ieee1394"}
 
 
 def test_each_profile_is_a_section(values_in_their_places: Callable[[Report], int]) -> None:
@@ -44,7 +56,7 @@ def test_each_profile_is_a_section(values_in_their_places: Callable[[Report], in
     text = render(report, "table")
     assert "paper-two-node: 1 node at 4 ms, paper model leads\n" in text
     assert "\n\n\n" not in text
-    assert "### Shipped profiles\n\n#### `gantry-24`" in render(report, "markdown")
+    assert "### Shipped profiles\n\n#### `dvrk`" in render(report, "markdown")
 
 
 def test_the_rules_are_one_table() -> None:

@@ -78,11 +78,12 @@ def test_no_plan_says_what_binds_and_what_would_be_enough(paper: Profile) -> Non
         ": NO PLAN. No change of gap count and slice ratio is enough: the cycle needs a slice of 1237.520 us to be "
         "shown to fit, and at most 900.000 us can be given."
     )
-    assert others[:3] == [
+    assert others[:4] == [
         (
             'Enough would be to free the responses: node.read_response = "concatenated" (if the nodes can), '
             "cycle.slice_ratio = 0.89, bus.gap_count = 21."
         ),
+        'Enough would be to free the schedule: cycle.schedule = "broadcast" (if the firmware of all nodes can).',
         "Enough would be to free the period: cycle.period_us = 1400, cycle.slice_ratio = 0.89, bus.gap_count = 21.",
         "Enough would be to free the nodes: bus.nodes = 6, cycle.slice_ratio = 0.89, bus.gap_count = 16.",
     ]
@@ -185,7 +186,7 @@ def test_data_holds_the_contract(paper: Profile) -> None:
     none = plan_document(plan(paper, wanted={"bus.nodes": 8, "cycle.period_us": 1000.0}))
     to_json(none)
     assert (none["recommended_changes"], none["period_is_kept"], none["binding"]["constraint"]) == (None, None, "time")
-    assert [one["relaxed"] for one in none["relaxations"]] == ["responses", "period", "nodes"]
+    assert [one["relaxed"] for one in none["relaxations"]] == ["responses", "schedule", "period", "nodes"]
     assert to_csv(plan_records(result)).splitlines()[2].startswith("gap count,bus.nodes=4 bus.gap_count=10,true,")
 
 

@@ -30,6 +30,7 @@ QUESTIONS = (
     ("calibrate", "paper-two-node", "table-1.csv"),
     ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
     ("paper",),
+    ("evidence", "ieee1394"),
     ("profiles",),
     ("rule",),
     ("rule", "bp110"),

@@ -470,6 +470,16 @@ def test_its_rule_and_its_limit_are_found_and_listed(run: Run, ring: Path) -> No
 # --- how sure its verdict is ------------------------------------------------------------------------------
 
 
+def test_its_verdict_says_that_no_figure_of_others_tests_it(run: Run, ring: Path) -> None:
+    words = "No figure that others have published or measured tests the model of Token ring (kind ring)."
+    for command in ("capacity", "report"):
+        assert words in run(command, ring.name, cwd=ring.parent).stdout
+    assert run("evidence", "ring", cwd=ring.parent).stdout == f"{words}\n"
+    found = json.loads(run("evidence", "ring", "--format", "json", cwd=ring.parent).stdout)
+    assert (found["without"], found["figures"]) == (["ring"], [])
+    assert "No figure that others" not in run("capacity", "paper-4ms", cwd=ring.parent).stdout
+
+
 def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> None:
     (one,) = busplan.capacity(ring).results
     assert (one.verdict, one.bias_us, one.uncertainty_us) == ("fits", None, 0)

@@ -63,7 +63,7 @@ EVERY = {
     "calibrate": ("mine.toml", "table-1.csv"),
     "check": ("mine.toml", "--no-circle"),
 }
-WITHOUT_PROFILE = {"rule", "schema", "manual", "paper", "profiles", "init"}
+WITHOUT_PROFILE = {"rule", "schema", "manual", "evidence", "paper", "profiles", "init"}
 
 
 @pytest.fixture

@@ -129,12 +129,25 @@ class _Bus:
         self._start_due_us = scene.first_start_us
         self.packets: list[Packet] = []
 
-    def send(self, what: str, sender: int, *, ready_us: float, wire_us: float, priority: bool = False) -> float:
-        """Send a packet with all that follows it without a gap, and whatever goes before it; gives its end."""
-        has_turn = priority or sender not in self._without_turn
+    def send(
+        self,
+        what: str,
+        sender: int,
+        *,
+        ready_us: float,
+        wire_us: float,
+        priority: bool = False,
+        isochronous: bool = False,
+    ) -> float:
+        """Send a packet with all that follows it without a gap, and whatever goes before it; gives its end.
+
+        An isochronous request waits for no gap and takes no turn.
+        """
+        has_turn = priority or isochronous or sender not in self._without_turn
         while True:
             # A sender gets its turn back when the arbitration reset gap ends the interval, and not otherwise.
             gap_us = self._scene.subaction_gap_us if has_turn else self._scene.reset_gap_us
+            gap_us = 0.0 if isochronous else gap_us
             at_us = max(ready_us, self._idle_since_us + gap_us)
             start_at_us = self._cycle_start_us()
             if start_at_us is None or start_at_us > at_us:
@@ -144,7 +157,7 @@ class _Bus:
             self._start_due_us += CYCLE_START_EVERY_US
             has_turn = priority or sender not in self._without_turn
         self._occupy(what, at_us, wire_us)
-        if not priority:
+        if not (priority or isochronous):
             self._without_turn.add(sender)
         return self._idle_since_us
 
@@ -183,6 +196,42 @@ def simulate(scene: Scene, execution: Execution, *, cycles: int = 1) -> Run:
                 bus, scene, answer, kind, number, ready_us=ready_us, execution_us=execution(cycle, place)
             )
             ready_us = done_us + scene.host_us
+    return Run(tuple(starts_us), tuple(bus.packets))
+
+
+def simulate_broadcasts(scene: Scene, *, isochronous: bool, cycles: int = 1) -> Run:
+    """Run cycles of the broadcast schedule: a query, a packet of each node, one read of the hub, one write.
+
+    Node 1 is the hub here, at its own hops. Each node starts when it has heard the one before it, the first one when
+    its clock has counted 150 from the query. The host knows only its own clock: it waits 10 us and 5 us a node behind
+    the acknowledge of its query, and has its own time before each request.
+    """
+    bus, ready_us, starts_us = _Bus(scene), 0.0, []
+    (hub, *_), number = scene.nodes, len(scene.nodes)
+    both_us = scene.arbitration_us(hub.hops) + scene.acknowledge_us(hub.hops)
+    collected = sum(-(-node.read_bytes // 4) * 4 + 4 for node in scene.nodes) + 4
+    commands = sum(-(-node.write_bytes // 4) * 4 + 4 for node in scene.nodes)
+    for cycle in range(cycles + 1):
+        asked_us = bus.send("query", HOST, ready_us=ready_us, wire_us=both_us + scene.data_us(hub.hops, 20))
+        starts_us.append(bus.packets[-1].start_us)
+        if cycle == cycles:
+            break
+        turn_us = asked_us + 150 / 49.152
+        for place, node in enumerate(scene.nodes, start=1):
+            packet = 24 + -(-node.read_bytes // 4) * 4 + 4
+            # All must hear it: the farthest does.
+            arbitration_us = (
+                scene.hops * scene.hop_us + MAX_HOLD_US if isochronous else scene.arbitration_us(scene.hops)
+            )
+            wire_us = arbitration_us + scene.data_us(scene.hops, packet)
+            turn_us = bus.send(f"data {place}", place, ready_us=turn_us, wire_us=wire_us, isochronous=isochronous)
+        # The host's own time follows its wait, or the last broadcast if that is later.
+        ready_us = max(turn_us, asked_us + 10 + 5 * number) + scene.host_us
+        answer_us = scene.data_us(hub.hops, 24 + collected) + scene.acknowledge_us(hub.hops)
+        wire_us = both_us + scene.data_us(hub.hops, 20) + answer_us
+        ready_us = bus.send("hub", HOST, ready_us=ready_us, wire_us=wire_us) + scene.host_us
+        wire_us = both_us + scene.data_us(hub.hops, 24 + commands)
+        ready_us = bus.send("write", HOST, ready_us=ready_us, wire_us=wire_us) + scene.host_us
     return Run(tuple(starts_us), tuple(bus.packets))
 
 

@@ -44,10 +44,11 @@ def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
     """Phases of the transactions in us; one table for each payload."""
     bus = bus_of(profile)
     figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
+    rows = [(figure, 0) for figure in figures if all(figure.key in one.phases for one in result.transactions)]
     caption = Sentence((f"Phases in us, {bus.latency_subject(network_of(profile))}",))
     for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
         owners = [Owner(_column(one), one.phases, f"/transactions/{place}") for _, place, one in group]
-        yield figure_table([(figure, 0) for figure in figures], owners, caption=caption, unit=False)
+        yield figure_table(rows, owners, caption=caption, unit=False)
 
 
 def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:

@@ -63,6 +63,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     at = places.get("verdict", "")
     yield _headline(verdict, profile, at=at)
     yield from not_in_it(profile)
+    yield from evidence_sentence(profile)
     yield from _other_models(verdict, profile, places)
     yield from reset_sentence(verdict.after_reset, profile)
     if not _broken_limits(figures, profile):
@@ -203,6 +204,18 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
     left = bus.cycle(network_of(profile), model=bus.deciding_model).left_out()
     if left:
         yield Sentence((f"Not in it: {', '.join(f'{one.label} ({one.key})' for one in left)}.",))
+
+
+def evidence_sentence(profile: Profile) -> Iterator[Sentence]:
+    """Say that nobody else's figure tests the kind's model; nothing where one does."""
+    bus = bus_of(profile)
+    if not bus.has_evidence:
+        yield no_evidence(bus.title, bus.kind)
+
+
+def no_evidence(title: str, kind: str) -> Sentence:
+    """Say that nothing tests the model of a kind."""
+    return Sentence((f"No figure that others have published or measured tests the model of {title} (kind {kind}).",))
 
 
 def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:

@@ -18,7 +18,7 @@ from busplan.elementwise import Number, total
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.buses.published import PaperSection
+    from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
     from busplan.sourced import Sourced
 
@@ -340,6 +340,11 @@ class Bus(ABC):
     change_words: ClassVar[Mapping[str, str]] = {}
     """How a table of plans writes a key with its value: a format of the value."""
 
+    evidence_data: ClassVar[tuple[str, ...]] = ()
+    """Data files, in busplan/data, with figures of it that others have published or measured."""
+    evidence_profiles: ClassVar[tuple[str, ...]] = ()
+    """Shipped profiles that these figures are compared on."""
+
     @abstractmethod
     def profile_model(self) -> "type[Profile]":
         """The model of its profiles."""
@@ -424,8 +429,25 @@ class Bus(ABC):
         """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
         return []
 
-    def published_sections(self, network: Network, published: Mapping[str, Any]) -> "tuple[PaperSection, ...]":  # noqa: ARG002
-        """Compare published figures with what its equations give."""
+    @property
+    def has_evidence(self) -> bool:
+        """Whether a figure of it is known that others have published or measured; its verdicts say where none is."""
+        return bool(self.evidence_data)
+
+    def evidence(
+        self,
+        networks: Mapping[str, Network],  # noqa: ARG002 - a kind may have none
+        published: Mapping[str, Mapping[str, Any]],  # noqa: ARG002
+    ) -> "tuple[EvidenceSection, ...]":
+        """Compare figures that others have published or measured with what its equations give.
+
+        Parameters
+        ----------
+        networks
+            Those of `evidence_profiles`, by name.
+        published
+            What each of `evidence_data` holds, by name.
+        """
         return ()
 
     def limit(self, key: str) -> Limit | None:

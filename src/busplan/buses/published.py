@@ -2,7 +2,9 @@
 
 from typing import Literal, NamedTuple
 
-Unit = Literal["us", "1", "s", "mm"]
+from busplan.sourced import Grade
+
+Unit = Literal["us", "1", "s", "mm", "bytes"]
 
 
 class Comparison(NamedTuple):
@@ -12,10 +14,12 @@ class Comparison(NamedTuple):
     quantity: str
     unit: Unit
     published: float | None
-    """As printed, or the quotient of two printed figures; None where the paper gives a formula and no figure."""
+    """As printed, or the quotient of two printed figures; None where the source gives a formula and no figure."""
     method: str
     """The equation or timing model behind the computed figure."""
     computed: float
+    grade: Grade = "published"
+    """How well the published figure is known."""
 
     @property
     def residual(self) -> float | None:
@@ -28,9 +32,11 @@ class Comparison(NamedTuple):
         return None if self.published is None else (self.computed - self.published) / self.published
 
 
-class PaperSection(NamedTuple):
-    """One table or passage of the paper."""
+class EvidenceSection(NamedTuple):
+    """One table or passage of a source."""
 
     title: str
     note: str
     comparisons: tuple[Comparison, ...]
+    data: str = "paper"
+    """Data file that the published figures stand in, with their sources."""

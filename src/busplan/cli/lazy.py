@@ -16,7 +16,7 @@ GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "Design": ("init", "plan", "calibrate", "map", "sweep"),
         "Analyse": ("capacity", "latency", "circle-test", "timeline", "explain", "report"),
         "Gate": ("check", "diff", "rule", "schema"),
-        "Learn": ("manual", "profiles", "paper"),
+        "Learn": ("manual", "profiles", "evidence", "paper"),
     }
 )
 """In the order of the help. `circle-test` is in module `circle`: `circle_test` would look like a test module."""

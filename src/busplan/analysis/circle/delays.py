@@ -29,8 +29,10 @@ def loop_delays_us(profile: Profile) -> tuple[float, float]:
     for event in cycle.events():
         now_us += event.us
         is_command = (event.transaction, event.kind) in own.command_events
-        if event.node is not None and is_command and moves[event.node - 1]:
-            arrived_us[event.node] = now_us
+        if is_command:
+            # What belongs to no one node is the command of all.
+            owners = range(1, len(moves) + 1) if event.node is None else (event.node,)
+            arrived_us |= {node: now_us for node in owners if moves[node - 1]}
     first, last = min(arrived_us, default=0), max(arrived_us, default=0)
     # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
     return min(arrived_us.get(first, now_us), period_us), min(arrived_us.get(last, now_us), period_us)

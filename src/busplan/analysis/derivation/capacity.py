@@ -73,6 +73,11 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         named |= {
             key: found(None, _OF_GROUPS, each) for key in known if key not in named and getattr(plain, key) is None
         }
+    named |= {
+        key: found(None, "none for this network", (named["required_us"],))
+        for key, number in cycle.figures().items()
+        if number is None and key not in named
+    }
     if model == bus.deciding_model:
         named |= _certainty(profile, cycle, plain)
     named |= _words(named, plain, cycle.terms, _limits(bus, network))

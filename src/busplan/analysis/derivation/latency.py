@@ -12,8 +12,7 @@ from busplan.sourced import Sourced
 def latency_names(profile: Profile) -> tuple[str, ...]:
     """Names of the transactions in `latency`, or of the cycle."""
     bus = bus_of(profile)
-    model = bus.timing_models[0].name
-    return tuple(one.label for one in bus.cycle(network_of(profile), model=model).latencies())
+    return tuple(one.label for one in bus.cycle(network_of(profile), model=bus.deciding_model).latencies())
 
 
 def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Traced]:
@@ -31,7 +30,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
     Returns
     -------
     dict
-        By key, all figures of `latency`.
+        By key, all figures of `latency`; one that this transaction does not have is None.
     """
     bus, network = bus_of(profile), network_of(traced_profile(profile))
     (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.label == kind)
@@ -42,7 +41,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
         "nodes": network.nodes,
         **one.phases,
     }
-    return {figure.key: remembered(found[figure.key], figure.key, figure.symbol) for figure in bus.latency_figures}
+    return {figure.key: remembered(found.get(figure.key), figure.key, figure.symbol) for figure in bus.latency_figures}
 
 
 def chosen(word: object, key: str, meaning: str) -> Traced:

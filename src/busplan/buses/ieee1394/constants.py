@@ -218,6 +218,61 @@ SYNC_PACKET_BYTES: Final = Sourced(
     meaning="synchronous packet on the wire",
 )
 
+# --- the broadcast schedule --------------------------------------------------------------------------------
+
+_JHU_SOFTWARE = "JHU mechatronics-software, BasePort.cpp and FirewirePort.cpp"
+_JHU_FIRMWARE = "JHU mechatronics-firmware, the broadcast protocol"
+
+MAX_BROADCAST_NODES: Final = Sourced(
+    16,
+    unit="nodes",
+    grade="published",
+    source=f"{_JHU_SOFTWARE}: BoardIO::MAX_BOARDS",
+    meaning="largest number of nodes that the hub collects data of",
+)
+BROADCAST_CLOCK_MHZ: Final = Sourced(
+    49.152,
+    unit="MHz",
+    grade="published",
+    source=f"{_JHU_SOFTWARE}: the system clock of the FPGA",
+    meaning="clock of the nodes",
+)
+FIRST_BROADCAST_CLOCKS: Final = Sourced(
+    150,
+    unit="clocks",
+    grade="published",
+    source=_JHU_FIRMWARE,
+    meaning="how long the first node waits behind the query",
+)
+HUB_WAIT_US: Final = Sourced(
+    10,
+    unit="us",
+    grade="published",
+    source=f"{_JHU_SOFTWARE}: 10 + 5 N",
+    meaning="what the host waits behind the query, whatever the number of nodes",
+)
+HUB_WAIT_PER_NODE_US: Final = Sourced(
+    5,
+    unit="us",
+    grade="published",
+    source=f"{_JHU_SOFTWARE}: 10 + 5 N",
+    meaning="what the host waits behind the query for each node",
+)
+BROADCAST_NODE_BYTES: Final = Sourced(
+    4,
+    unit="bytes",
+    grade="published",
+    source=f"{_JHU_SOFTWARE}: a quadlet of sequence before the data, a header quadlet before the command (Rev 8)",
+    meaning="what each node adds to a broadcast, to the hub's block and to the write, beside its payload",
+)
+HUB_TIMING_BYTES: Final = Sourced(
+    4,
+    unit="bytes",
+    grade="published",
+    source=f"{_JHU_SOFTWARE}: the last quadlet of the hub's block",
+    meaning="timing at the end of the hub's block",
+)
+
 # --- how well the model is known --------------------------------------------------------------------------
 
 PHY_DELAY_HALF_WIDTH_US: Final = Sourced(

@@ -9,7 +9,7 @@ JCGM 100 (GUM), 5.1; paper, Table I.
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import Any
+from typing import Any, Final
 
 from busplan.buses.bus import Doubt
 from busplan.buses.ieee1394.constants import (
@@ -80,7 +80,6 @@ def of_cycle(
     of_packets = total(
         one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) * one.link.hops for one in exchanges
     )
-    half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
         """What one standard uncertainty changes, as the larger of two steps of two: up and down.
@@ -107,23 +106,81 @@ def of_cycle(
     return (
         Doubt(
             "residual",
-            "residual of Table I",
+            _LABELS["residual"],
             total(halves * choose(_is_fitted(node), 0.0, spread_us) for node, halves in split) + others * spread_us,
         ),
-        Doubt("gap_term", "gap term of eq (4)", larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
+        Doubt("gap_term", _LABELS["gap_term"], larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
         Doubt(
             "node.execution" if network.is_uniform else "group.execution",
             "execution time",
             # Times of several groups are measured, or guessed, in one way: they are taken to err together.
             total(one.nodes * swing_us(one, one.execution_uncertainty_us, 0.0) for one in exchanges),
         ),
-        Doubt("bus.phy_delay_us", "PHY delay", (of_packets + hop_delays * link.hops) * half_width_us / _RECTANGULAR),
+        Doubt(
+            "bus.phy_delay_us",
+            _LABELS["bus.phy_delay_us"],
+            _phy_doubt_us(of_packets + hop_delays * link.hops, link),
+        ),
         Doubt(
             "host.transaction_us",
-            "host time",
+            _LABELS["host.transaction_us"],
             total(one.nodes * swing_us(one, 0.0, host.standard_uncertainty_us) for one in exchanges),
         ),
     )
+
+
+def broadcast_bias_us(halves: Number, *, with_gap: Number, gap_count: Number) -> Number:
+    """What a cycle of the broadcast schedule takes beyond the model, on the mean [us].
+
+    Parameters
+    ----------
+    halves
+        Packets of the cycle, each half a transaction; one without an acknowledge counts as one with it [1].
+    with_gap
+        Those of them whose arbitration has the gap term of equation (4) [1].
+    gap_count
+        Gap count in force [1].
+    """
+    return halves * residual().mean_us + with_gap * _gap_term_us(MAX_GAP_COUNT, gap_count, "d")
+
+
+def of_broadcast(
+    halves: Number, *, with_gap: Number, link: Link, hop_delays: Number, host_swing_us: Number
+) -> tuple[Doubt, ...]:
+    """The standard uncertainty of a cycle of the broadcast schedule by each of its inputs.
+
+    Parameters
+    ----------
+    halves, with_gap
+        As in `broadcast_bias_us`.
+    link
+        The way of the packets.
+    hop_delays
+        How often the delay of all hops stands in the cycle [1].
+    host_swing_us
+        What one standard uncertainty of the host's own time changes [us].
+    """
+    gap_term_us = with_gap * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
+    return (
+        Doubt("residual", _LABELS["residual"], halves * residual().uncertainty_us),
+        Doubt("gap_term", _LABELS["gap_term"], larger(gap_term_us, -1 * gap_term_us) / _RECTANGULAR),
+        Doubt("bus.phy_delay_us", _LABELS["bus.phy_delay_us"], _phy_doubt_us(hop_delays * link.hops, link)),
+        Doubt("host.transaction_us", _LABELS["host.transaction_us"], host_swing_us),
+    )
+
+
+_LABELS: Final = {
+    "residual": "residual of Table I",
+    "gap_term": "gap term of eq (4)",
+    "bus.phy_delay_us": "PHY delay",
+    "host.transaction_us": "host time",
+}
+
+
+def _phy_doubt_us(delays: Number, link: Link) -> Number:
+    """What is not known of some PHY delays [us]; nothing where the profile gives them."""
+    half_width_us = alike(PHY_DELAY_HALF_WIDTH_US, link.hops) if link.phy_delay_us is None else 0.0
+    return delays * half_width_us / _RECTANGULAR
 
 
 def _split_halves(exchanges: Sequence[Exchange]) -> tuple[tuple[Any, Number], ...]:

@@ -180,8 +180,15 @@ COMPARED: Final = (
     ),
     WRITE_TRANSACTION,
 )
+_OF_BROADCAST: Final = (
+    Figure("query_us", "T_query", "broadcast", "the query with its acknowledge, of the broadcast schedule", "query"),
+    Figure("boards_us", "T_boards", "broadcast", "all nodes' broadcasts with their gaps", "broadcasts of all nodes"),
+    Figure("hub_wait_us", "T_wait", "broadcast", "from the last broadcast to the read of the hub", "wait for the hub"),
+)
+"""What only a transaction of the broadcast schedule has."""
 LATENCY: Final = (
     *(TIMING_MODEL, TRANSACTION, PAYLOAD_BYTES, NODES, HOPS, GAP_COUNT),
+    *_OF_BROADCAST,
     Figure("request_bytes", "B_req", "packets", "request packet on the wire", "request packet, bytes", sort="count"),
     Figure(
         "response_bytes", "B_resp", "packets", "response packet on the wire", "response packet, bytes", sort="count"
@@ -258,6 +265,9 @@ LATENCY: Final = (
 LATENCY_TABLE: Final = tuple(
     by_key(LATENCY)[key]
     for key in (
+        "query_us",
+        "boards_us",
+        "hub_wait_us",
         "request_bytes",
         "response_bytes",
         "arbitration_us",

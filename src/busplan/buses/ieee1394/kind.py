@@ -17,6 +17,7 @@ from busplan.buses.bus import (
 )
 from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
+from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.constants import (
     CONSTANTS,
     MAX_GAP_COUNT,
@@ -30,9 +31,10 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
+from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
 from busplan.buses.ieee1394.limits import LIMITS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
-from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of
+from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
@@ -41,7 +43,7 @@ from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.ieee1394.section import Ieee1394Profile
-    from busplan.buses.published import PaperSection
+    from busplan.buses.published import EvidenceSection
 
 _PHASES: Final = by_key(figures.LATENCY)
 _HOST_STEP_US: Final = 10.0
@@ -93,6 +95,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         _kind("response_data", "response data", "response_data_us", "<", "response"),
         _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
         _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
+        EventKind("first_wait", "wait of the first node", "broadcast", "f", "gap"),
         EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
         _kind("host", "host", "host_us", "o", "contention"),
         EventKind("retry", "busy retry", "profile", "r", "request"),
@@ -125,6 +128,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "bus.max_hops": "rewired as a tree",
         "bus.nodes": "the others on a second bus",
         "bus.speed": "if all nodes can",
+        "cycle.schedule": "if the firmware of all nodes can",
         "node.read_response": "if the nodes can",
         "node.write_response": "if the nodes can",
     }
@@ -134,10 +138,13 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         {"host.transaction_us": 0.0},
         {"cycle.retries": 0},
     )
+    evidence_data = ("paper", "dvrk", "ieee1394")
+    evidence_profiles = ("paper-two-node", "dvrk")
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
         "bus.speed": "speed {}",
+        "cycle.schedule": "schedule {}",
         "node.read_response": "reads {}",
         "node.write_response": "writes {}",
     }
@@ -148,9 +155,10 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
         return Ieee1394Profile
 
-    def cycle(self, network: Network, *, model: str) -> Ieee1394Cycle:
-        """The cycle of a network under one timing model."""
-        return Ieee1394Cycle(network, model)  # type: ignore[arg-type]
+    def cycle(self, network: Network, *, model: str) -> CycleWithStarts:
+        """The cycle of a network under one timing model, by its schedule."""
+        schedule = BroadcastCycle if is_broadcast(network) else Ieee1394Cycle
+        return schedule(network, model)  # type: ignore[arg-type]
 
     @property
     def latency_figures(self) -> tuple[Figure, ...]:
@@ -164,6 +172,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             "bus.cycle_master": profile.bus.cycle_master,
             "bus.phy_delay_us": profile.bus.phy_delay_us is not None,
             "bus.charge_hops": profile.bus.charge_hops != "farthest",
+            "cycle.schedule": profile.cycle.schedule != "individual",
             "cycle.retries": profile.cycle.retries,
             "host.transaction_us": profile.host.transaction_us,
         }
@@ -175,6 +184,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def latency_subject(self, network: Network) -> str:
         """Say whose latency it is."""
+        if is_broadcast(network):
+            return ", ".join(("the data of all nodes to the host and the commands to them", *self.setup_words(network)))
         nodes = f"{network.nodes} node{'s' * (network.nodes != 1)}"
         farthest = f"farthest of {nodes}" if network.is_uniform else "the farthest node of each group"
         return ", ".join((farthest, *self.setup_words(network)))
@@ -187,6 +198,11 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         BusplanError
             Nodes do not answer such a transaction split: then no execution time is on the bus.
         """
+        if is_broadcast(network):
+            raise BusplanError(
+                'cycle.schedule = "broadcast": no execution time is on the bus, so none can be found from a latency; '
+                'calibrate with cycle.schedule = "individual"'
+            )
         said = next(one for one in network.alike if one.name == group)
         answer, key = getattr(said.node, f"{kind}_response"), said.node_key(f"{kind}_response")
         if answer != "split":
@@ -210,12 +226,14 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
 
     def has_execution(self, network: Network) -> bool:
-        """Whether a transaction is split: other answers keep the execution off the bus."""
-        return any("split" in (one.node.read_response, one.node.write_response) for one in network.groups)
+        """Whether a transaction is split: other answers keep the execution off the bus, and so do broadcasts."""
+        return not is_broadcast(network) and any(
+            "split" in (one.node.read_response, one.node.write_response) for one in network.groups
+        )
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
-        """The gap count, one register in each node, and how the nodes answer. Transactions have no other schedule."""
-        return (_gap_count(network), _responses(network))
+        """The gap count, one register in each node, how the nodes answer, and the other schedule."""
+        return (_gap_count(network), _responses(network), _schedule(network))
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """One hop, one busy retry, and a slower host."""
@@ -242,12 +260,15 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def way_charged(self, network: Network) -> str:
         """Say whose hops each node is charged."""
+        if is_broadcast(network):
+            return "every packet at the hops of the farthest"
         return f"every node at {'its own hops' if charges_own_hops(network) else 'the hops of the farthest'}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
-        """Hops and gap count."""
-        hops = hops_of(network)
-        return (f"{hops} hop{'s' * (hops != 1)}", f"gap count {gap_count_of(network)}")
+        """Hops, gap count, and a schedule that is not the individual one."""
+        hops, cycle = hops_of(network), network.profile.cycle
+        schedule = (f"broadcast schedule by {cycle.broadcast_request} requests",) if is_broadcast(network) else ()
+        return (f"{hops} hop{'s' * (hops != 1)}", f"gap count {gap_count_of(network)}", *schedule)
 
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:
         """An unsafe gap count, and cables that the table does not hold for."""
@@ -269,11 +290,18 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             )
         return found
 
-    def published_sections(self, network: Network, published: Mapping[str, Any]) -> "tuple[PaperSection, ...]":
-        """Compare the published figures of the paper's bench with what the equations give."""
-        from busplan.buses.ieee1394.paper import bus_sections  # one command alone asks for it
+    def evidence(
+        self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]
+    ) -> "tuple[EvidenceSection, ...]":
+        """Compare what is published of the paper's bench, of the dVRK and of the bus with what the equations give."""
+        from busplan.buses.ieee1394.evidence import kit_sections, standard_sections  # one command alone asks for it
+        from busplan.buses.ieee1394.paper import bus_sections
 
-        return bus_sections(network, published)
+        return (
+            *bus_sections(networks["paper-two-node"], published["paper"]),
+            *kit_sections(networks["dvrk"], published["dvrk"]),
+            *standard_sections(published["ieee1394"]),
+        )
 
 
 def _gap_count(network: Network) -> Setting:
@@ -286,17 +314,26 @@ def _gap_count(network: Network) -> Setting:
     return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
 
 
+def _schedule(network: Network) -> Setting:
+    """The other way to read and write all nodes."""
+    other = "individual" if is_broadcast(network) else "broadcast"
+    return Setting("schedule", "schedule", Cost.SCHEDULE, (_SCHEDULE,), ({_SCHEDULE: other},))
+
+
+_SCHEDULE: Final = "cycle.schedule"
 _UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}
 """Answers that need no second arbitration."""
 
 
 def _responses(network: Network) -> Setting:
     """Answers without a second arbitration: of reads, of writes, of both."""
+    keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
+    if is_broadcast(network):
+        return Setting("responses", "responses", Cost.RESPONSES, keys, (), "no node answers a broadcast")
     of_reads, of_writes = (
         {group.key(name): answer for group in network.groups if getattr(group.node, name) == "split"}
         for name, answer in _UNSPLIT.items()
     )
-    keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
     both = {**of_reads, **of_writes} if of_reads and of_writes else {}
     values = tuple(filter(None, (of_reads, of_writes, both)))
     return Setting("responses", "responses", Cost.RESPONSES, keys, values, "" if values else "no node answers split")

@@ -3,9 +3,11 @@
 from typing import Final
 
 from busplan.buses.bus import Limit
+from busplan.buses.ieee1394.broadcast_terms import hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
     CYCLE_US,
     LEAST_ASYNCHRONOUS_US,
+    MAX_BROADCAST_NODES,
     MAX_HOPS,
     MAX_NODES,
     MAX_PAYLOAD_BYTES,
@@ -13,7 +15,7 @@ from busplan.buses.ieee1394.constants import (
     safe_gap_count,
 )
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
-from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
+from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
 from busplan.elementwise import Number
 
@@ -26,6 +28,8 @@ def _cycle_start_us(network: Network) -> Number:
     is_sent = network.profile.bus.cycle_master
     return Ieee1394Cycle(network, "standard").cycle_start_us if is_sent else 0.0
 
+
+_ONE_BY_ONE: Final = 'cycle.schedule = "individual" has no such limit'
 
 LIMITS: Final = (
     Limit(
@@ -52,6 +56,27 @@ LIMITS: Final = (
         lambda _network: MAX_HOPS,
         way_out=f"a tree with bus.max_hops = {MAX_HOPS:g} or less has room for {MAX_NODES:g} nodes",
         has_rule=True,
+    ),
+    Limit(
+        "broadcasting nodes",
+        "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
+        lambda network: network.nodes if is_broadcast(network) else 0,
+        lambda _network: MAX_BROADCAST_NODES,
+        way_out=_ONE_BY_ONE,
+    ),
+    Limit(
+        "hub block",
+        "the hub's block of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
+        lambda network: hub_block_bytes(network) if is_broadcast(network) else 0,
+        _most_payload,
+        way_out=f"less read from each node, or {_ONE_BY_ONE}",
+    ),
+    Limit(
+        "write block",
+        "the write of {value:.0f} bytes is over the {most:.0f} bytes of {bus.speed}",
+        lambda network: write_block_bytes(network) if is_broadcast(network) else 0,
+        _most_payload,
+        way_out=f"less written to each node, or {_ONE_BY_ONE}",
     ),
     Limit(
         "cycle starts",

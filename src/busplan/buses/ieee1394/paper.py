@@ -16,14 +16,14 @@ from busplan.buses.ieee1394.table_1 import TABLE_1, residual
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Phases
 from busplan.buses.ieee1394.transactions import exchange, link_of
 from busplan.buses.network import Network
-from busplan.buses.published import Comparison, PaperSection
+from busplan.buses.published import Comparison, EvidenceSection
 from busplan.elementwise import plain
 
 Published = Mapping[str, Any]
 """The published figures, as the package's data file holds them."""
 
 
-def bus_sections(bench: Network, published: Published) -> tuple[PaperSection, ...]:
+def bus_sections(bench: Network, published: Published) -> tuple[EvidenceSection, ...]:
     """Compare published figures of the bus with what the equations give.
 
     Parameters
@@ -58,9 +58,9 @@ def _write_phases(bench: Network, payload_bytes: int) -> Iterator[tuple[str, Pha
         yield f"{model} model", exchange(bench, changed, "write", model=model, link=link_of(bench)).phases
 
 
-def _theory() -> PaperSection:
+def _theory() -> EvidenceSection:
     title = "Table I: T1+T2, theory"
-    return PaperSection(
+    return EvidenceSection(
         title,
         "Equation (15), not rounded; the table prints two decimals.",
         tuple(
@@ -77,9 +77,9 @@ def _theory() -> PaperSection:
     )
 
 
-def _first_half(bench: Network) -> PaperSection:
+def _first_half(bench: Network) -> EvidenceSection:
     title = "Table I: T1+T2, measured"
-    return PaperSection(
+    return EvidenceSection(
         title,
         "Equation (13) under either timing model; nothing here is fitted.",
         tuple(
@@ -90,6 +90,7 @@ def _first_half(bench: Network) -> PaperSection:
                 row.request_and_acknowledge_us,
                 method,
                 plain(one.request_and_acknowledge_us),
+                "measured",
             )
             for row in TABLE_1
             for method, one in _write_phases(bench, row.payload_bytes)
@@ -97,28 +98,30 @@ def _first_half(bench: Network) -> PaperSection:
     )
 
 
-def _latency(bench: Network) -> PaperSection:
+def _latency(bench: Network) -> EvidenceSection:
     title = "Table I: T_lant, measured"
-    return PaperSection(
+    return EvidenceSection(
         title,
         "Equation (3). T_exec is derived from the same table, T_lant less both halves as measured, the second without "
         "a payload: the residual is that of the halves alone, and no test of T_exec.",
         tuple(
-            Comparison(title, f"{row.payload_bytes} bytes", "us", row.latency_us, method, plain(one.latency_us))
+            Comparison(
+                title, f"{row.payload_bytes} bytes", "us", row.latency_us, method, plain(one.latency_us), "measured"
+            )
             for row in TABLE_1
             for method, one in _write_phases(bench, row.payload_bytes)
         ),
     )
 
 
-def _bias() -> PaperSection:
+def _bias() -> EvidenceSection:
     title = "Table I: what half a transaction takes beyond the model"
-    return PaperSection(
+    return EvidenceSection(
         title,
         "T1+T2 as measured, less equation (13), over the rows of the table. Every verdict takes the mean of the "
         "standard model off its margin, and counts the standard uncertainty of one more row (JCGM 100).",
         tuple(
-            Comparison(title, quantity, "us", None, f"{model} model", float(value))
+            Comparison(title, quantity, "us", None, f"{model} model", float(value), "derived")
             for quantity, key in (("mean", "mean_us"), ("standard uncertainty", "uncertainty_us"))
             for model in TIMING_MODELS
             for value in (getattr(residual(model), key),)
@@ -126,40 +129,46 @@ def _bias() -> PaperSection:
     )
 
 
-def _ratios(bench: Network, published: Published) -> Iterator[PaperSection]:
+def _ratios(bench: Network, published: Published) -> Iterator[EvidenceSection]:
     table = published["table_2"]
     for which in ("first", "second"):
         title = f"Table II: T_lant as a share of reference [48]'s, {which} figure"
         rows = zip(table["payload_bytes"], table["latency_us"], table[f"reference_{which}_us"], strict=True)
-        yield PaperSection(
+        yield EvidenceSection(
             title,
             "The quotient of the two printed columns, and of the computed latency and the printed reference.",
             tuple(
-                Comparison(title, f"{size} bytes", "1", own / other, method, one.latency_us / other)
+                Comparison(title, f"{size} bytes", "1", own / other, method, one.latency_us / other, "derived")
                 for size, own, other in rows
                 for method, one in _write_phases(bench, size)
             ),
         )
 
 
-def _can(bench: Network, published: Published) -> PaperSection:
+def _can(bench: Network, published: Published) -> EvidenceSection:
     can = published["can"]
     title = f"Section IV-A: against CAN at {can['can_rate_mbit_s']} Mbit/s"
     size, can_us = can["payload_bytes"], can["can_latency_us"]
+    wire_us = can["frame_bits"] / can["can_rate_mbit_s"]
 
     def compared(method: str, latency_us: float) -> Iterator[Comparison]:
-        yield Comparison(title, f"T_lant, {size} bytes", "us", can["latency_us"], method, latency_us)
+        yield Comparison(title, f"T_lant, {size} bytes", "us", can["latency_us"], method, latency_us, "measured")
         yield Comparison(title, "CAN / T_lant", "1", can["ratio"], method, can_us / latency_us)
 
-    return PaperSection(
+    return EvidenceSection(
         title,
-        f"{can_us} us by CAN, which over the printed {can['latency_us']} us is {can_us / can['latency_us']:.1f}. "
-        f"T_exec at {size} bytes lies between two rows of Table I.",
-        tuple(one for method, half in _write_phases(bench, size) for one in compared(method, plain(half.latency_us))),
+        f"{can_us} us by CAN, which over the printed {can['latency_us']} us is {can_us / can['latency_us']:.1f}. A CAN "
+        f"frame of {size} bytes takes {wire_us:.0f} us on the wire ({can['frame_source']}); the other "
+        f"{(can_us - wire_us) / 1000:.1f} ms are the host's, and no figure of the bus. T_exec at {size} bytes lies "
+        "between two rows of Table I.",
+        (
+            *(one for method, half in _write_phases(bench, size) for one in compared(method, plain(half.latency_us))),
+            Comparison(title, f"CAN, {size} bytes", "us", can_us, "CAN frame on the wire", wire_us),
+        ),
     )
 
 
-def _equation_15(published: Published) -> PaperSection:
+def _equation_15(published: Published) -> EvidenceSection:
     given = published["equation_15"]
     title = "Equation (15): its constant"
     rate_mbit_s = DATA_RATE_MBIT_S["S400"]
@@ -176,7 +185,7 @@ def _equation_15(published: Published) -> PaperSection:
         "terms rounded first": sum(round(float(term_us), 2) for term_us in terms_us),
     }
     short_ns = (given["constant_us"] - ways["eqs (4)-(6)"]) * 1000
-    return PaperSection(
+    return EvidenceSection(
         title,
         f"The terms add up to {short_ns:.1f} ns less; rounded to two decimals one by one, "
         "they give the printed figure.",
@@ -186,7 +195,7 @@ def _equation_15(published: Published) -> PaperSection:
     )
 
 
-def _equation_10(bench: Network) -> PaperSection:
+def _equation_10(bench: Network) -> EvidenceSection:
     title = "Equation (10): the clock of the gaps"
     link = link_of(bench)
     gaps_us = {
@@ -200,7 +209,7 @@ def _equation_10(bench: Network) -> PaperSection:
         for name in TIMING_MODELS
     }
     size = group.write_bytes
-    return PaperSection(
+    return EvidenceSection(
         title,
         "The paper counts gaps in the data rate, and adds both up behind every transaction. The standard counts them "
         "in the base rate, as thresholds of one idle period (TI TSB12LV01B, p. 7-6): a node's execution counts towards "

@@ -15,7 +15,7 @@ from busplan.buses.ieee1394.constants import (
     SLICE_RATIO,
     Speed,
 )
-from busplan.buses.ieee1394.timing import TimingModelName
+from busplan.buses.ieee1394.timing import BroadcastRequest, TimingModelName
 from busplan.elementwise import Number, choose
 from busplan.sections.base import MAX_COUNT, Bytes, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import (
@@ -78,7 +78,7 @@ class Ieee1394Bus(BusSection):
     charge_hops: Literal["farthest", "own"] = Field(
         default="farthest",
         description="Which way each node is charged: that to the farthest node, or its own; in a tree its own is "
-        "the hops of its group",
+        "the hops of its group. A broadcast goes to the farthest",
         examples=["own"],
     )
     timing_model: TimingModelName = Field(
@@ -154,6 +154,18 @@ class Ieee1394CycleSection(CycleSection):
     """Section [cycle]: the communication period and what of it is for communication."""
 
     slice_ratio: SliceRatio = float(SLICE_RATIO)
+    schedule: Literal["individual", "broadcast"] = Field(
+        default="individual",
+        description="How the host reads and writes: individual, a read and a write of each node; broadcast, one query, "
+        "after which each node broadcasts its data, one read of the hub that collected them, and one write",
+        examples=["broadcast"],
+    )
+    broadcast_request: BroadcastRequest = Field(
+        default="priority",
+        description="How the nodes ask for the bus to broadcast: priority, each after a subaction gap (JHU firmware "
+        "Rev 9), or isochronous, without one (up to Rev 8); read with the schedule broadcast",
+        examples=["isochronous"],
+    )
     retries: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
         default=0,
         description="Busy retries of the longest request that a cycle must have time for (IEEE 1394, ack_busy)",

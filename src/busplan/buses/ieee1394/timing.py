@@ -29,6 +29,8 @@ from busplan.elementwise import Number, alike, choose, named, worded
 from busplan.sections.transactions import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
+BroadcastRequest = Literal["isochronous", "priority"]
+"""How a node asks for the bus to broadcast its data."""
 
 
 class PacketSizes(NamedTuple):

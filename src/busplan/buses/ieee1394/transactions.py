@@ -64,8 +64,13 @@ def link_of(network: Network, hops: Number | None = None) -> Link:
 
 
 def charges_own_hops(network: Network) -> bool:
-    """Whether each node is charged its own way, and not that to the farthest."""
-    found: bool = network.profile.bus.charge_hops == "own"
+    """Whether each node is charged its own way, and not that to the farthest, as a broadcast is: it goes to all."""
+    return network.profile.bus.charge_hops == "own" and not is_broadcast(network)
+
+
+def is_broadcast(network: Network) -> bool:
+    """Whether the nodes broadcast their data, instead of being read one by one."""
+    found: bool = network.profile.cycle.schedule == "broadcast"
     return found
 
 

@@ -104,7 +104,7 @@ def stretches(events: Sequence[Event]) -> tuple[Stretch, ...]:
     found: list[Stretch] = []
     owner: tuple[object, object] | None = None
     for event in events:
-        if event.node is not None and (event.node, event.transaction) == owner:
+        if event.transaction is not None and (event.node, event.transaction) == owner:
             whole = found[-1].event._replace(end_us=event.end_us)
             found[-1] = found[-1]._replace(event=whole)
             continue

@@ -1,12 +1,15 @@
-"""Answer of `busplan paper`."""
+"""Answers of `busplan evidence`, and of `busplan paper`, the paper's part of it."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
+from busplan.analysis.evidence import KindEvidence
 from busplan.answers.documents import document
-from busplan.buses.published import Comparison, PaperSection
+from busplan.answers.verdict import no_evidence
+from busplan.buses.published import Comparison, EvidenceSection
 from busplan.forms.blocks import (
+    Block,
     Cell,
     Chapter,
     JsonDocument,
@@ -21,7 +24,7 @@ from busplan.forms.blocks import (
 
 _DIGITS: Final = 5
 """Significant digits of a published figure or a quotient of two."""
-_DECIMALS: Final = {"mm": 6, "1": 4}
+_DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0}
 """Decimals by unit; contour errors in mm are micrometres, so that they need six."""
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
@@ -30,7 +33,7 @@ _Numbered = tuple[int, Comparison]
 """A comparison with its index in the document's figures."""
 
 
-def paper_report(sections: Sequence[PaperSection]) -> Report:
+def paper_report(sections: Sequence[EvidenceSection]) -> Report:
     """Report of `paper`: one row for each published figure, one group of columns for each method.
 
     Parameters
@@ -46,11 +49,12 @@ def paper_report(sections: Sequence[PaperSection]) -> Report:
     )
 
 
-def paper_records(sections: Sequence[PaperSection]) -> list[Record]:
+def paper_records(sections: Sequence[EvidenceSection]) -> list[Record]:
     """One row for each published figure and method."""
     return [
         {
             **comparison._asdict(),
+            "grade": None if comparison.published is None else comparison.grade,
             "residual": comparison.residual,
             "relative_residual": comparison.relative_residual,
         }
@@ -59,7 +63,7 @@ def paper_records(sections: Sequence[PaperSection]) -> list[Record]:
     ]
 
 
-def paper_document(sections: Sequence[PaperSection]) -> JsonDocument:
+def paper_document(sections: Sequence[EvidenceSection]) -> JsonDocument:
     """Document of `busplan paper --format json`."""
     return document(
         "paper",
@@ -68,8 +72,53 @@ def paper_document(sections: Sequence[PaperSection]) -> JsonDocument:
     )
 
 
-def _sections(sections: Sequence[PaperSection]) -> Iterator[Chapter]:
+def evidence_report(kinds: Sequence[KindEvidence]) -> Report:
+    """Report of `evidence`: kind by kind, and which have none.
+
+    Parameters
+    ----------
+    kinds
+        What is known of each kind.
+    """
+    return Report(
+        Sentence(("What others have published or measured, beside computed figures",)),
+        lambda: tuple(_kinds(kinds)),
+        partial(evidence_document, kinds),
+        lambda: evidence_records(kinds),
+    )
+
+
+def evidence_records(kinds: Sequence[KindEvidence]) -> list[Record]:
+    """One row for each figure and method, with its kind in front."""
+    return [
+        {"kind": one.kind, "data": section.data, **record}
+        for one in kinds
+        for section in one.sections
+        for record in paper_records([section])
+    ]
+
+
+def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
+    """Document of `busplan evidence --format json`."""
+    return document(
+        "evidence",
+        kinds=[one.kind for one in kinds],
+        without=[one.kind for one in kinds if not one.sections],
+        notes={section.title: section.note for one in kinds for section in one.sections},
+        figures=evidence_records(kinds),
+    )
+
+
+def _kinds(kinds: Sequence[KindEvidence]) -> Iterator[Block]:
     start = 0
+    for one in kinds:
+        if not one.sections:
+            yield no_evidence(one.title, one.kind)
+        yield from _sections(one.sections, start=start)
+        start += sum(len(section.comparisons) for section in one.sections)
+
+
+def _sections(sections: Sequence[EvidenceSection], *, start: int = 0) -> Iterator[Chapter]:
     for section in sections:
         numbered = list(enumerate(section.comparisons, start=start))
         yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(numbered)))
@@ -82,7 +131,12 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
     for at, one in comparisons:
         rows.setdefault(one.quantity, {})[one.method] = at, one
     columns = (
-        *(TableColumn("figure", kind="words", wraps=True), TableColumn("unit", kind="words"), TableColumn("published")),
+        *(
+            TableColumn("figure", kind="words", wraps=True),
+            TableColumn("unit", kind="words"),
+            TableColumn("published"),
+            TableColumn("grade", kind="words"),
+        ),
         *(
             column
             for method in methods
@@ -96,7 +150,7 @@ def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> TableRow:
     at, first = next(iter(by_method.values()))
     published = ShownValue(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
     compared = (cell for method in methods for cell in _compared(by_method.get(method)))
-    return TableRow((first.quantity, first.unit, published, *compared))
+    return TableRow((first.quantity, first.unit, published, "" if first.published is None else first.grade, *compared))
 
 
 def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:

@@ -1,0 +1,267 @@
+"""The broadcast schedule: one query, a broadcast of each node, one read of the hub that collected them, one write.
+
+It is that of the da Vinci Research Kit (dVRK). A query is a quadlet write to the hub, which all nodes hear. Each
+broadcasts its data without an acknowledge, in the order of the nodes. The hub has all of them in one block, which the
+host reads; the answer is concatenated. One block write, to the hub too, has the commands of all nodes. What goes on the
+bus goes to the farthest node. No execution time is on the bus.
+
+References
+----------
+Z. Chen, P. Kazanzides, "Multi-Kilohertz Control of Multiple Robots via IEEE-1394 (FireWire)", TePRA 2014; JHU
+mechatronics-firmware and mechatronics-software.
+"""
+
+from functools import cached_property
+from typing import NamedTuple
+
+from busplan.buses.bus import Doubt, Term
+from busplan.buses.ieee1394 import doubts, equations
+from busplan.buses.ieee1394.constants import (
+    BASE_RATE_MBIT_S,
+    BLOCK_READ_REQUEST_BYTES,
+    BLOCK_READ_RESPONSE_OVERHEAD_BYTES,
+    BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
+    BROADCAST_CLOCK_MHZ,
+    BROADCAST_NODE_BYTES,
+    FIRST_BROADCAST_CLOCKS,
+    HUB_TIMING_BYTES,
+    HUB_WAIT_PER_NODE_US,
+    HUB_WAIT_US,
+    QUADLET_WRITE_REQUEST_BYTES,
+    padded_bytes,
+)
+from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
+from busplan.buses.network import Group, Network
+from busplan.elementwise import Number, alike, is_off, larger, named, total
+
+
+def hub_block_bytes(network: Network) -> Number:
+    """Payload of the hub's block: the data of each node behind its quadlet of sequence, and one of timing [bytes].
+
+    Parameters
+    ----------
+    network
+        The network; of any sort.
+    """
+    return total(group.nodes * _with_quadlet(group.read_bytes) for group in network.groups) + HUB_TIMING_BYTES
+
+
+def write_block_bytes(network: Network) -> Number:
+    """Payload of the write: the command to each node behind its header quadlet [bytes].
+
+    Parameters
+    ----------
+    network
+        The network; of any sort.
+    """
+    return total(group.nodes * _with_quadlet(group.write_bytes) for group in network.groups)
+
+
+def _with_quadlet(payload_bytes: Number) -> Number:
+    return padded_bytes(payload_bytes) + BROADCAST_NODE_BYTES
+
+
+class Packets(NamedTuple):
+    """Data phases of the packets that are not the nodes' own [us]."""
+
+    query_us: Number
+    hub_request_us: Number
+    hub_block_us: Number
+    write_us: Number
+
+
+class Idle(NamedTuple):
+    """Idle bus before a request of the host, or behind the last one [us]."""
+
+    gap_us: Number
+    """The arbitration reset gap."""
+    host_us: Number
+    """What the host takes beyond it."""
+
+    @property
+    def us(self) -> Number:
+        """Both."""
+        return self.gap_us + self.host_us
+
+
+class BroadcastTerms(CycleWithStarts):
+    """What the cycle is made of, and what is not known of it.
+
+    References
+    ----------
+    `busplan manual models`, the broadcast schedule.
+    """
+
+    @cached_property
+    def packets(self) -> Packets:
+        """Data phases of query, hub and write [us]."""
+        sizes = (
+            QUADLET_WRITE_REQUEST_BYTES,
+            BLOCK_READ_REQUEST_BYTES,
+            BLOCK_READ_RESPONSE_OVERHEAD_BYTES + hub_block_bytes(self.network),
+            BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + write_block_bytes(self.network),
+        )
+        return Packets(*map(self._data_us, sizes))
+
+    def _data_us(self, packet_bytes: Number) -> Number:
+        return equations.data_phase_us(
+            self.link.hops,
+            hop_us=self.delays.hop_us,
+            packet_bytes=packet_bytes,
+            data_rate_mbit_s=self.link.data_rate_mbit_s,
+        )
+
+    @property
+    def _is_isochronous(self) -> bool:
+        return bool(self.network.profile.cycle.broadcast_request == "isochronous")
+
+    @cached_property
+    def gap_us(self) -> Number:
+        """Idle bus before each broadcast: none for an isochronous request [us]."""
+        return 0.0 if self._is_isochronous else self.delays.gaps.subaction_us
+
+    @cached_property
+    def first_wait_us(self) -> Number:
+        """What the first node waits behind the query, beyond its gap [us]."""
+        wait_us = alike(FIRST_BROADCAST_CLOCKS, self.link.hops) / BROADCAST_CLOCK_MHZ
+        return larger(wait_us - self.gap_us, 0.0)
+
+    @cached_property
+    def arbitration_us(self) -> Number:
+        """Arbitration of a broadcast: an isochronous request waits for no part of the gap count [us]."""
+        if not self._is_isochronous:
+            return self.delays.arbitration_us
+        return equations.arbitration_phase_us(
+            self.link.hops, hop_us=self.delays.hop_us, gap_count=0, gap_clock_mbit_s=BASE_RATE_MBIT_S
+        )
+
+    def broadcast_us(self, group: Group) -> Number:
+        """Data phase of the broadcast of a node [us].
+
+        Parameters
+        ----------
+        group
+            The node's group.
+        """
+        return self._data_us(BLOCK_WRITE_REQUEST_OVERHEAD_BYTES + _with_quadlet(group.read_bytes))
+
+    @cached_property
+    def query_us(self) -> Number:
+        """The query with its acknowledge [us]."""
+        found_us = self.delays.arbitration_us + self.packets.query_us + self.delays.acknowledge_us
+        return named(found_us, "query_us", "T_query")
+
+    @cached_property
+    def boards_us(self) -> Number:
+        """All broadcasts with their gaps [us]."""
+        each_us = self.gap_us + self.arbitration_us
+        sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
+        return named(self.first_wait_us + sent_us, "boards_us", "T_boards")
+
+    @cached_property
+    def hub_us(self) -> Number:
+        """The read of the hub: request, acknowledge, concatenated block and its acknowledge [us]."""
+        own, sent = self.delays, self.packets
+        return own.arbitration_us + sent.hub_request_us + own.acknowledge_us + sent.hub_block_us + own.acknowledge_us
+
+    @cached_property
+    def write_us(self) -> Number:
+        """The write with its acknowledge [us]."""
+        return self.delays.arbitration_us + self.packets.write_us + self.delays.acknowledge_us
+
+    @cached_property
+    def hub_wait(self) -> Idle:
+        """From the last broadcast to the read of the hub.
+
+        The host waits 10 + 5 N us behind the query, and knows nothing of the broadcasts. Its own time follows that, or
+        the last broadcast if it is later.
+        """
+        return self._idle(self.host_us, late_us=self.late_us)
+
+    @cached_property
+    def late_us(self) -> Number:
+        """What is left of the host's wait when the last broadcast ends [us]."""
+        wait_us = alike(HUB_WAIT_US, self.network.nodes) + HUB_WAIT_PER_NODE_US * self.network.nodes
+        return named(larger(wait_us - self.boards_us, 0.0), "late_us", "late")
+
+    @cached_property
+    def idle(self) -> Idle:
+        """Behind the read of the hub, and behind the write."""
+        return self._idle(self.host_us)
+
+    @property
+    def host_us(self) -> Number:
+        """The host's own time before each of its requests [us]."""
+        found: Number = self.network.profile.host.transaction_us
+        return found
+
+    def _idle(self, host_us: Number, *, late_us: Number = 0.0) -> Idle:
+        """Idle bus before a request of the host, whose own time overlaps the gap."""
+        gap_us = self.delays.gaps.arbitration_reset_us
+        if is_off(host_us) and is_off(late_us):
+            return Idle(gap_us, 0.0)
+        return Idle(gap_us, larger(late_us + host_us - gap_us, 0.0))
+
+    @property
+    def longest_request_us(self) -> Number:
+        """Data phase of the write [us]."""
+        return self.packets.write_us
+
+    @cached_property
+    def other_terms(self) -> tuple[Term, ...]:
+        """All terms but the cycle starts; the query is the synchronous packet, at which the nodes sample."""
+        own, sent, nodes = self.delays, self.packets, self.network.nodes
+        broadcasts_us = total(group.nodes * self.broadcast_us(group) for group in self.network.groups)
+        return (
+            Term("sync_us", self.query_us),
+            Term("cycle_arbitration_us", nodes * self.arbitration_us + 2 * own.arbitration_us),
+            Term("cycle_data_us", broadcasts_us + sent.hub_request_us + sent.hub_block_us + sent.write_us),
+            Term("cycle_acknowledge_us", 3 * own.acknowledge_us),
+            *(Term(f"cycle_{name}_us", 0.0) for name in ("hold", "execution", "worst_extra")),
+            Term(
+                "cycle_idle_us", self.first_wait_us + nodes * self.gap_us + self.hub_wait.gap_us + 2 * self.idle.gap_us
+            ),
+            Term("cycle_host_us", self.hub_wait.host_us + 2 * self.idle.host_us),
+            Term("retries_us", self.retries_us),
+            Term("nonperiodic_us", self.network.nonperiodic_us),
+        )
+
+    # --- what is not known ----------------------------------------------------------------------------------
+
+    def bias_us(self) -> Number | None:
+        """What the packets take beyond the model, on the mean [us]."""
+        return doubts.broadcast_bias_us(self.halves, with_gap=self.with_gap, gap_count=self.link.gap_count)
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What is not known exactly."""
+        retries, nodes = self.network.profile.cycle.retries, self.network.nodes
+        return doubts.of_broadcast(
+            self.halves,
+            with_gap=self.with_gap,
+            link=self.link,
+            # Of the query, of arbitration and data of each broadcast, of the hub's packets, and of the write.
+            hop_delays=3 + 2 * nodes + 5 + 3 + 3 * retries + 2 * self.number_of_starts,
+            host_swing_us=self._host_swing_us(),
+        )
+
+    @property
+    def halves(self) -> Number:
+        """Packets: the query, each broadcast, two of the hub, the write, and retries [1]."""
+        return named(self.network.nodes + 4 + self.network.profile.cycle.retries, "halves", "halves")
+
+    @property
+    def with_gap(self) -> Number:
+        """Those with the gap term of equation (4) in their arbitration [1]."""
+        return 4 + self.network.profile.cycle.retries if self._is_isochronous else self.halves
+
+    def _host_swing_us(self) -> Number:
+        """What one standard uncertainty of the host changes, as the larger of two steps of two: up and down [us]."""
+        step_us: Number = self.network.profile.host.standard_uncertainty_us
+        if is_off(step_us):
+            return 0.0
+
+        def waits_us(host_us: Number) -> Number:
+            return self._idle(host_us, late_us=self.late_us).us + 2 * self._idle(host_us).us
+
+        above_us, own_us, below_us = (waits_us(self.host_us + steps * step_us) for steps in (2, 0, -2))
+        return larger(above_us - own_us, own_us - below_us) / 2
