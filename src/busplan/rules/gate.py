@@ -177,7 +177,7 @@ def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Make a finding at the line of the problem's key, or of the table that should have it."""
     document = subject.document
     line, column = document.lines.line_and_column(
-        document.nearest(path_of(document.data() if "group." in problem.key else {}, problem.key))
+        document.nearest(path_of(document.data() if problem.key.count(".") > 1 else {}, problem.key))
     )
     message = f"{problem.key}: {problem.message}{subject.origin}"
     return Finding(rule.code, rule.name, rule.severity, message, problem.key, line, column)
