@@ -80,6 +80,7 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
     key_symbols: ClassVar[Mapping[str, str]] = {
         "bus.bit_rate_kbit_s": "f",
         "bus.identifier_bits": "id_bits",
+        "node.execution.worst_extra_us": "T_extra",
         "message.payload_bytes": "s",
         "message.period_us": "T",
         "message.jitter_us": "J",
