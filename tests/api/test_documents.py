@@ -79,6 +79,8 @@ def printed(line: str) -> Any:
 def test_of_every_shipped_profile(command: str, name: str) -> None:
     if "bus.nodes" in command and load(name).profile.group:
         pytest.skip("the nodes of its groups are keys of their own")
+    if "gap_count" in command and load(name).profile.bus.kind != "ieee1394":
+        pytest.skip("a gap count has IEEE 1394 alone")
     first, *rest = command.split(" ", 1)
     assert EVERY[command](name).to_dict() == printed(" ".join((first, name, *rest)))
 

@@ -224,7 +224,9 @@ def test_a_starter_has_no_name_that_a_profile_cannot_have(name: str) -> None:
 def test_a_starter_comes_from_a_shipped_profile_only(source: str) -> None:
     with pytest.raises(BusplanError) as caught:
         starter_text(source, name="x")
-    assert str(caught.value).startswith(f"--from {source}: no shipped profile; shipped are gantry-24, paper-1ms, ")
+    assert str(caught.value).startswith(
+        f"--from {source}: no shipped profile; shipped are can-servo-8, gantry-24, paper-1ms, "
+    )
 
 
 def test_a_file_called_like_standard_input_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -99,6 +99,10 @@ class Limit(NamedTuple):
     says: Callable[[Network], str] | None = None
     """What is said of a broken one, where more than its value is: instead of `over`."""
 
+    slice_us: Callable[[Network], float] | None = None
+    """The slice from which on plain numbers keep it, the slice ratio as it is, where a longer period is a cure [us];
+    without it no period is."""
+
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it: a truth, or an array of them."""
         return self.value(network) > self.most(network)

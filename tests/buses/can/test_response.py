@@ -1,6 +1,7 @@
 """Response times against published examples, and against a brute-force simulation of the arbiter."""
 
 from collections.abc import Sequence
+from random import Random
 from typing import NamedTuple
 
 import pytest
@@ -88,16 +89,16 @@ def test_it_is_what_a_simulation_of_the_critical_instant_finds(each: list[Source
 
 @SOME
 @given(messages(), st.randoms(use_true_random=False))
-def test_no_simulated_start_takes_longer(each: list[Source], random: "object") -> None:
-    draw = random.randint  # type: ignore[attr-defined]
+def test_no_simulated_start_takes_longer(each: list[Source], random: Random) -> None:
+    draw = random.randint
     queued = []
     for priority, one in enumerate(each):
         start_us = draw(0, int(one.period_us))
         for number in range(12):
             due_us = start_us + number * one.period_us
             queued.append(Queued(priority, due_us, due_us + draw(0, int(one.jitter_us)), one.frames_us))
-    for one, end_us in simulated(queued):
-        assert end_us - one.due_us <= analysed(each, one.priority, bit_us=1.0).us
+    for sent, end_us in simulated(queued):
+        assert end_us - sent.due_us <= analysed(each, sent.priority, bit_us=1.0).us
 
 
 def test_the_worst_instance_is_not_always_the_first() -> None:

@@ -1,5 +1,6 @@
 """What a CAN bus and the CANopen identifiers forbid, the load of the bus, and deadlines."""
 
+from collections.abc import Callable
 from functools import partial
 from math import inf
 from typing import Final
@@ -11,6 +12,7 @@ from busplan.buses.can.streams import Stream, collisions, load_before, response,
 from busplan.buses.can.traffic import Traffic, traffic_of
 from busplan.buses.network import Network
 from busplan.elementwise import Number, larger, plain, pointwise, total
+from busplan.sections.base import MAX_TIME_US
 
 
 def late_messages(traffic: Traffic) -> tuple[str, ...]:
@@ -100,6 +102,35 @@ def _largest_pdo(network: Network) -> Number:
     return largest
 
 
+def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> float:
+    """The slice from which on a limit holds, the slice ratio as it is; infinite where no period is long enough [us]."""
+    broken_us = kept_us = plain(network.period_us)
+    while is_broken(network._replace(period_us=kept_us)):
+        broken_us, kept_us = kept_us, 2 * kept_us
+        if kept_us > MAX_TIME_US:
+            return inf
+    for _ in range(_HALVINGS):
+        middle_us = (broken_us + kept_us) / 2
+        if is_broken(network._replace(period_us=middle_us)):
+            broken_us = middle_us
+        else:
+            kept_us = middle_us
+    return kept_us * plain(network.slice_ratio)
+
+
+_HALVINGS: Final = 20
+"""Halvings of a doubled period: to a millionth, and advice asks the limit again."""
+
+
+def _load(network: Network) -> Number:
+    return CanCycle(network, WORST).load
+
+
+def _is_overloaded(network: Network) -> Number:
+    over: Number = _load(network) > network.profile.limits.max_load
+    return over
+
+
 LIMITS: Final = (
     Limit(
         "nodes",
@@ -135,10 +166,11 @@ LIMITS: Final = (
     Limit(
         "load",
         "the bus load is {value:.1%}, over limits.max_load, {most:.1%}",
-        lambda network: CanCycle(network, WORST).load,
+        _load,
         lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
+        slice_us=partial(_kept_from_us, _is_overloaded),
     ),
     Limit(
         "deadline",
@@ -148,5 +180,6 @@ LIMITS: Final = (
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         has_rule=True,
         says=lambda network: "; ".join(late_messages(traffic_of(network))),
+        slice_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
     ),
 )
