@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import busplan
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.buses import kind_named
+from busplan.buses.can.response import Source, worst_response
 from busplan.buses.can.section import CanProfile
-from busplan.buses.can.streams import streams
+from busplan.buses.can.streams import response, streams
 from busplan.buses.can.traffic import traffic_of_profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -138,6 +141,39 @@ def test_responses_are_those_by_hand_and_their_parts_add_up() -> None:
         assert one.worst_response_us == sum(getattr(one, key) for key in parts)
 
 
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None:
+    sizes = st.integers(1, 24)
+    changes: dict[str, Any] = {
+        "bus.nodes": data.draw(st.integers(1, 5)),
+        "payload.read_bytes": data.draw(sizes),
+        "payload.write_bytes": data.draw(sizes),
+        "message.alarm.identifier": data.draw(st.sampled_from([0x10, 0x190, 0x1F0, 0x210, 0x2A0, 0x7FF])),
+        "message.alarm.period_us": float(data.draw(st.integers(700, 3000))),
+        "cycle.period_us": float(data.draw(st.integers(4000, 9000))),
+    }
+    each = streams(traffic_of_profile(override(profile(), changes)), is_stuffed=True)
+    sent = {
+        identifier: Source(one.frame_us, one.period_us, one.jitter_us)
+        for one in each
+        for identifier in range(one.first, one.last + 1)
+    }
+    for own in each:
+        alone = [
+            worst_response(
+                sent[identifier],
+                [one for other, one in sent.items() if other < identifier],
+                blocking_us=max((one.frames_us for other, one in sent.items() if other > identifier), default=0.0),
+                bit_us=BIT_US,
+            )
+            for identifier in range(own.first, own.last + 1)
+        ]
+        found = response(own, each, bit_rate_kbit_s=500)
+        assert found == alone[-1]
+        assert found is None or all(one is not None and one.us <= found.us for one in alone)
+
+
 def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "press.toml"
     path.write_text(profile_text(profile(cycle__period_us=2000.0, message__alarm__identifier=0x600)), encoding="utf-8")
@@ -190,6 +226,14 @@ def test_the_circle_has_its_set_points_from_sync() -> None:
 def test_what_no_bus_has_is_refused(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(BusplanError, match=words):
         override(profile(), changes)
+
+
+def test_groups_with_one_identifier_are_refused() -> None:
+    node = {**DATA["node"], "read_bytes": 8, "write_bytes": 8, "nodes": 2, "feedback_identifier": 0x190}
+    data = {key: one for key, one in DATA.items() if key not in ("payload", "node")}
+    data["bus"] = {key: one for key, one in DATA["bus"].items() if key != "nodes"}
+    with pytest.raises(ValueError, match="an earlier group has it"):
+        CanProfile.model_validate({**data, "group": [{**node, "name": "a"}, {**node, "name": "b"}]})
 
 
 @pytest.mark.parametrize("name", ["alarm", "SYNC", "feedback"])

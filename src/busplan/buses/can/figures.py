@@ -6,7 +6,7 @@ from busplan.buses.figure import NODES, NONPERIODIC, TIMING_MODEL, TRANSACTION, 
 
 _DAVIS: Final = "Davis 2007"
 
-BIT_RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate of the bus", "bit rate", decimals=None)
+BIT_RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate of the bus", "bit rate, kbit/s", decimals=None)
 BUS_LOAD: Final = Figure(
     "bus_load",
     "load",

@@ -13,8 +13,8 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "load" in subject.deciding.exceeded:
         most: float = getattr(subject.profile.limits, "max_load")  # noqa: B009 - a key of this kind alone
         load = subject.deciding.bus_load
-        why = "no bus carries it, and messages have no worst-case response time" if load >= 1 else subject.cure()
-        yield RuleProblem("limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed; {why}")
+        full = "; from 100% on messages have no worst-case response time" if load >= 1 else ""
+        yield RuleProblem("limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{full}; {subject.cure()}")
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:

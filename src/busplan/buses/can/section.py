@@ -144,6 +144,20 @@ class CanProfile(Profile):
         return self
 
     @model_validator(mode="after")
+    def _groups_have_identifiers_of_their_own(self) -> Self:
+        problems = []
+        for name in (f"{one}_identifier" for one in NAMES.values()):
+            said = [getattr(one, name) for one in self.group]
+            problems += [
+                Problem("an earlier group has it", key=f"group.{place}.{name}", kind="inconsistent")
+                for place, identifier in enumerate(said)
+                if identifier is not None and identifier in said[:place]
+            ]
+        if problems:
+            raise refused(*problems)
+        return self
+
+    @model_validator(mode="after")
     def _identifiers_are_in_range(self) -> Self:
         most = MAX_IDENTIFIER[self.bus.identifier_bits]
         problems = [
