@@ -71,13 +71,19 @@ def _from(first: int, shared: int) -> str:
     return f"{shared} identifiers from {first:#x}" if shared > 1 else f"the identifier {first:#x}"
 
 
+def _without_times(traffic: Traffic) -> Traffic:
+    """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
+    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
+    return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, messages=messages)
+
+
 def _shared(traffic: Traffic, *numbers: float) -> float:
     each = streams(traffic.with_numbers(*numbers), is_stuffed=True)
     return sum(shared for *_, shared in collisions(each))
 
 
 def _collisions(network: Network) -> Number:
-    traffic = traffic_of(network)
+    traffic = _without_times(traffic_of(network))
     return pointwise(partial(_shared, traffic), *traffic.numbers(), words="identifiers that stand twice")
 
 
@@ -86,7 +92,7 @@ def _last(traffic: Traffic, *numbers: float) -> float:
 
 
 def _largest_identifier(network: Network) -> Number:
-    traffic = traffic_of(network)
+    traffic = _without_times(traffic_of(network))
     return pointwise(partial(_last, traffic), *traffic.numbers(), words="the largest identifier")
 
 
