@@ -6,7 +6,7 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 
 from abc import ABC, abstractmethod
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import ceil, floor, sqrt
 from typing import TYPE_CHECKING, Final, TypeAlias
 
@@ -110,6 +110,10 @@ class SpecialNumber(ABC):
     @abstractmethod
     def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> Number:
         """The value at this place, linear between points."""
+
+    @abstractmethod
+    def pointwise(self, function: Callable[..., float], numbers: tuple[Number, ...], *, words: str) -> Number:
+        """What a function of plain numbers gives for some numbers; this one is among them."""
 
     @abstractmethod
     def is_one(self) -> Number:
@@ -340,6 +344,34 @@ def interpolated(places: Sequence[float], values: Sequence[float], place: Number
     xs, ys = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
     x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
     return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
+
+
+def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> Number:
+    """What a function of plain numbers gives, point by point: for what only a search can tell.
+
+    Parameters
+    ----------
+    function
+        The function.
+    numbers
+        Its arguments; arrays broadcast.
+    words
+        What a derivation says of it.
+
+    Examples
+    --------
+    >>> pointwise(lambda one, other: one // other, 7, 2, words="the quotient")
+    3
+    """
+    special = next((one for one in numbers if isinstance(one, SpecialNumber)), None)
+    if special is not None:
+        return special.pointwise(function, numbers, words=words)
+    if all(isinstance(one, _PLAIN) for one in numbers):
+        return function(*numbers)
+    import numpy as np
+
+    points = np.broadcast(*map(np.asarray, numbers))
+    return np.array([function(*(one.item() for one in point)) for point in points], dtype=float).reshape(points.shape)
 
 
 def _between(places: Sequence[float], values: Sequence[float], place: float) -> float:

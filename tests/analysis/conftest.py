@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import strategies as st
 
+from busplan.buses.can.section import CanProfile
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.sections.profile import Profile
 
@@ -387,4 +388,54 @@ def any_profile() -> st.SearchStrategy[Profile]:
 @pytest.fixture(scope="session")
 def profiles_by_kind() -> dict[str, st.SearchStrategy[Profile]]:
     """Random profiles of every kind of bus; a new kind is tried on all that holds of any by a line here."""
-    return {"ieee1394": profiles()}
+    return {"ieee1394": profiles(), "can": can_profiles()}
+
+
+@st.composite
+def can_profiles(draw: st.DrawFn) -> Profile:
+    """Random profiles of a CAN bus, on some of which other messages run, with room for a few dozen nodes at most."""
+    messages = [
+        {
+            "name": f"m{place}",
+            "identifier": draw(st.integers(0, 0x7FF)),
+            "payload_bytes": draw(st.integers(0, 8)),
+            "period_us": float(draw(st.integers(2000, 20_000))),
+            "jitter_us": float(draw(st.integers(0, 2000))),
+            "deadline_us": draw(st.one_of(st.none(), st.floats(500.0, 20_000.0))),
+        }
+        for place in range(draw(st.sampled_from([0, 0, 1, 3])))
+    ]
+    data = {
+        "schema_version": 1,
+        "name": "test",
+        "bus": {
+            "kind": "can",
+            "bit_rate_kbit_s": draw(st.sampled_from([250, 500, 1000])),
+            "identifier_bits": draw(st.sampled_from([11, 29])),
+            "nodes": draw(st.integers(1, 20)),
+            "sync_counter": draw(st.booleans()),
+        },
+        "cycle": {
+            "period_us": draw(st.floats(300.0, 6000.0)),
+            "slice_ratio": draw(st.floats(0.1, 1.0)),
+            "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
+        },
+        "payload": {
+            "pdo_per": draw(st.sampled_from(["node", "axis"])),
+            "read_bytes": draw(st.integers(1, 40)),
+            "write_bytes": draw(st.integers(1, 40)),
+        },
+        "node": {
+            "axes": draw(st.integers(1, 3)),
+            "execution": {
+                "kind": "linear",
+                "grade": draw(st.sampled_from([None, "measured", "derived", "assumed"])),
+                "base_us": draw(st.floats(0.0, 100.0)),
+                "per_byte_us": draw(st.floats(0.0, 1.0)),
+                "worst_extra_us": draw(st.sampled_from([0.0, 30.5])),
+            },
+        },
+        "limits": {"max_load": draw(st.sampled_from([0.5, 0.8, 0.999]))},
+        "message": messages,
+    }
+    return CanProfile.model_validate(data)

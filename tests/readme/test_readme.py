@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from busplan.analysis.derivation.origin import short
 from busplan.analysis.register import figures_of
 from busplan.answers.assumptions import constant_rows, equation_rows
-from busplan.buses import kind_named
+from busplan.buses import kind_named, kind_names
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.cli import app
 from busplan.cli.lazy import COMMANDS
@@ -96,9 +96,13 @@ def reference(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     for name, field in model.model_fields.items():
         key = f"{prefix}{name}"
         inner = sections(field.annotation)
-        if name == "group":
+        if name == "message":
+            (message,) = models_of(field.annotation)
+            yield from (reference_row(message, own, f"message.NAME.{own}") for own in message.model_fields)
+        elif name == "group":
             (group,) = models_of(field.annotation)
-            yield from (reference_row(group, own, f"group.NAME.{own}") for own in ("name", "nodes", "axes", "hops"))
+            owns = [one for one in ("name", "nodes", "axes", "hops") if one in group.model_fields]
+            yield from (reference_row(group, own, f"group.NAME.{own}") for own in owns)
             yield "| `group.NAME` | any other key of `[payload]` and `[node]` | none | What its nodes have |"
         elif inner == [AxisOverride]:
             yield f"| `{key}` | any key of one axis | none | {field.description} |"
@@ -141,6 +145,32 @@ def allowed(schema: dict[str, Any]) -> str:
     return f"{kind}{low} to {schema['maximum']:g}"
 
 
+SHOWN_FIRST = "ieee1394"
+"""The kind whose keys and figures the pages of every kind show; a further kind shows what it has beside them."""
+
+
+def further_tables(kind: str) -> Iterator[list[str]]:
+    """What a further kind of bus has of its own: keys, constants, and figures of `capacity` and `latency`."""
+    known = set(reference(Ieee1394Profile))
+    own = [row for row in dict.fromkeys(reference(kind_named(kind).profile_model())) if row not in known]
+    yield [f"| key of `{kind}` | values | default | meaning |", "|---|---|---|---|", *own]
+    names = ("name", "value", "unit", "grade", "source", "meaning")
+    cells = [
+        [code(row["name"]), short(row["value"]), *(row[key] for key in names[2:])]
+        for row in constant_rows(kind_named(kind))
+    ]
+    yield table([f"constant of `{kind}`", *names[1:]], cells, left=6)
+    first = figures_of(kind_named(SHOWN_FIRST))
+    for command in ("capacity", "latency"):
+        described = (
+            [code(one.key), one.symbol, one.unit, one.meaning, one.reference, one.better.replace("neither", "")]
+            for key, one in figures_of(kind_named(kind))[command].items()
+            if one != first[command].get(key)
+        )
+        head = [f"{code(command)} of `{kind}`", "symbol", "unit", "meaning", "reference", "better"]
+        yield table(head, described, left=6)
+
+
 def tables() -> Iterator[list[str]]:
     """Every table of the program's own data, by its lines; the first of them is in one page alone."""
     yield ["| key | values | default | meaning |", "|---|---|---|---|", *dict.fromkeys(reference(Ieee1394Profile))]
@@ -162,6 +192,9 @@ def tables() -> Iterator[list[str]]:
             for one in figures.values()
         )
         yield table([code(command), "symbol", "unit", "meaning", "reference", "better"], described, left=6)
+    for kind in kind_names():
+        if kind != SHOWN_FIRST:
+            yield from further_tables(kind)
 
 
 def shown_table(head: str, page: str) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from math import isinf
 from typing import Any, NamedTuple
 
 from busplan.analysis.figure_values import FigureValues
@@ -87,9 +88,12 @@ def latency(
     )
 
 
-def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float]:
-    """Phases with the sizes of packets as whole numbers."""
-    return {key: int(value) if key.endswith("_bytes") else plain(value) for key, value in phases.items()}
+def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
+    """Phases with the sizes of packets as whole numbers; None for one that does not exist."""
+    numbers = {key: plain(value) for key, value in phases.items()}
+    return {
+        key: None if isinf(value) else int(value) if key.endswith("_bytes") else value for key, value in numbers.items()
+    }
 
 
 def with_payload(profile: Profile, size_bytes: int) -> Profile:

@@ -96,6 +96,12 @@ class Limit(NamedTuple):
     """A rule of the kind reports a broken one; otherwise the rule of the verdict does."""
     is_safety: bool = False
     """A cycle fits without it, but nothing is advised that breaks it."""
+    says: Callable[[Network], str] | None = None
+    """What is said of a broken one, where more than its value is: instead of `over`."""
+
+    slice_us: Callable[[Network], float] | None = None
+    """The slice from which on plain numbers keep it, the slice ratio as it is, where a longer period is a cure [us];
+    without it no period is."""
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it: a truth, or an array of them."""
@@ -103,6 +109,8 @@ class Limit(NamedTuple):
 
     def words(self, network: Network) -> str:
         """Say by how much a network breaks it."""
+        if self.says is not None:
+            return self.says(network)
         return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
 
 
@@ -188,7 +196,7 @@ class BusLatency(NamedTuple):
     name: str
     payload_bytes: Number | None
     phases: Mapping[str, Number]
-    """Figures by key, which are among the kind's `latency_figures`."""
+    """Figures by key, which are among the kind's `latency_figures`; an infinite one does not exist."""
     group: str = ""
     """Of which group of nodes; empty where all are alike."""
 
@@ -311,6 +319,8 @@ class Bus(ABC):
     """Who sets them, as a message says it."""
     starter: ClassVar[str] = ""
     """Section [bus] of a new profile, as TOML without its nodes."""
+    starter_period: ClassVar[str] = "1ms"
+    """Communication period of a new profile, unless another is asked for."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""

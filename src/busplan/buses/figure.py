@@ -44,6 +44,7 @@ _UNITS: Final = {
     "_deg": "deg",
     "_db": "dB",
     "_hz": "Hz",
+    "_kbit_s": "kbit/s",
     "_s": "s",
 }
 """Unit by the end of a key's name, the longer ends first."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from busplan.buses import kind_named, kind_names
 from busplan.cli.options import complete_profile, time_us
 from busplan.cli.output import say, write_file
 from busplan.errors import BusplanError
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
     from busplan.profile.starter import Machine
 
 _Answer = TypeVar("_Answer")
+_KIND = "ieee1394"
 _NODES = 4
 _AXES_PER_NODE = 4
-_PERIOD = "1ms"
 _BYTES_PER_AXIS = 8
 
 
@@ -26,6 +27,15 @@ def init_command(
         str,
         typer.Argument(help="Name of the new profile, or the path of its file; .toml is added where it is missing."),
     ] = "my-machine",
+    bus: Annotated[
+        str | None,
+        typer.Option(
+            "--bus",
+            metavar="KIND",
+            help=f"Kind of bus: {' or '.join(kind_names())}.  [default: {_KIND}]",
+            autocompletion=lambda incomplete: [one for one in kind_names() if one.startswith(incomplete)],
+        ),
+    ] = None,
     nodes: Annotated[
         int | None,
         typer.Option("--nodes", metavar="N", min=1, help="Nodes of the machine, the host not counted.  [default: 4]"),
@@ -39,7 +49,9 @@ def init_command(
     period: Annotated[
         str | None,
         typer.Option(
-            "--period", metavar="TIME", help="Communication period with its unit, as 1ms or 500us.  [default: 1ms]"
+            "--period",
+            metavar="TIME",
+            help="Communication period with its unit, as 1ms or 500us.  [default: 1ms; 10ms on can]",
         ),
     ] = None,
     bytes_per_axis: Annotated[
@@ -76,12 +88,15 @@ def init_command(
         raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     # A name that begins with a dash would be an option.
     shown = shlex.quote(f"./{path}" if str(path).startswith("-") else str(path))
-    asked = {"--nodes": nodes, "--axes": axes, "--period": period, "--bytes-per-axis": bytes_per_axis}
+    asked = {"--bus": bus, "--nodes": nodes, "--axes": axes, "--period": period, "--bytes-per-axis": bytes_per_axis}
     from busplan.profile.starter import machine_text, starter_text
 
+    if bus not in (None, *kind_names()):
+        raise BusplanError(f"--bus {bus}: no kind of bus; there are {', '.join(kind_names())}")
     if source is None:
-        machine, taken = _machine(nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis)
-        text = machine_text(machine, name=path.stem, file=shown)
+        kind = bus or _KIND
+        machine, taken = _machine(kind, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis)
+        text = machine_text(machine, kind=kind, name=path.stem, file=shown)
     else:
         given = [option for option, value in asked.items() if value is not None]
         if given:
@@ -93,12 +108,13 @@ def init_command(
 
 
 def _machine(
-    *, nodes: int | None, axes: int | None, period: str | None, bytes_per_axis: int | None
+    kind: str, *, nodes: int | None, axes: int | None, period: str | None, bytes_per_axis: int | None
 ) -> "tuple[Machine, list[str]]":
     """Take what is given, ask for the rest in a terminal, and take defaults elsewhere, which come second."""
     from busplan.profile.starter import Machine
     from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
+    usual_period = kind_named(kind).starter_period
     asks = sys.stdin.isatty() and sys.stderr.isatty()
     taken: list[str] = []
 
@@ -116,10 +132,10 @@ def _machine(
     count = number(nodes, "--nodes", "Nodes, the host not counted", _NODES)
     total = number(axes, "--axes", "Axes of all nodes", _AXES_PER_NODE * count)
     if period is None and asks:
-        period = _asked("Communication period, with its unit", _PERIOD)
+        period = _asked("Communication period, with its unit", usual_period)
     if period is None:
-        taken.append(f"--period {_PERIOD}")
-    period_us = time_us(period or _PERIOD, option="--period")
+        taken.append(f"--period {usual_period}")
+    period_us = time_us(period or usual_period, option="--period")
     if not MIN_STEP_US <= period_us <= MAX_TIME_US:
         raise BusplanError(f"--period {period}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
     size = number(bytes_per_axis, "--bytes-per-axis", "Bytes for each axis, in either direction", _BYTES_PER_AXIS)

@@ -58,34 +58,37 @@ def models_of(annotation: Any) -> list[type[BaseModel]]:
     return []
 
 
-def value_keys(model: type[BaseModel], groups: Sequence[str], prefix: str = "") -> Iterator[str]:
+def value_keys(model: type[BaseModel], names: Mapping[str, Sequence[str]], prefix: str = "") -> Iterator[str]:
     """Dotted keys of a model whose value is one number, word or truth, in the order of the schema.
 
     Parameters
     ----------
     model
         The model.
-    groups
-        Names of the groups that a profile has.
+    names
+        Names of the tables that a profile has of a key with several.
     prefix
         What stands before each key.
     """
     for name, field in model.model_fields.items():
         inner = models_of(field.annotation)
-        sections = [f"{name}.{one}" for one in groups] if _are_several(field.annotation) else [name]
+        sections = [f"{name}.{one}" for one in names.get(name, ())] if _are_several(field.annotation) else [name]
         for section, one in product(sections, inner):
-            yield from value_keys(one, (), f"{prefix}{section}.")
+            yield from value_keys(one, {}, f"{prefix}{section}.")
         if not inner and (_is_number(field.annotation) or _words(field.annotation)):
             yield f"{prefix}{name}"
 
 
 def cycle_keys(profile: Profile) -> tuple[str, ...]:
     """Keys of a profile that its cycle, or its verdict, may depend on."""
-    groups = [one.name for one in profile.group]
-    others = {key for key in value_keys(Profile, ()) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
+    model = profile_model(profile.bus.kind)
+    several = [name for name, field in model.model_fields.items() if _are_several(field.annotation)]
+    names = {name: [one.name for one in getattr(profile, name)] for name in several}
+    groups = names["group"]
+    others = {key for key in value_keys(Profile, {}) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
     without = {*others, *_CHANGE_NO_FIGURE, *(f"group.{one}.{key}" for one in groups for key in _OF_GROUP)}
     unused = ("node.", "payload.", "bus.nodes") if groups else ()
-    keys = dict.fromkeys(value_keys(profile_model(profile.bus.kind), groups))
+    keys = dict.fromkeys(value_keys(model, names))
     read = (key for key in keys if "." in key and key not in without and not key.startswith(unused))
     return (*read, *_OF_VERDICT)
 
@@ -107,7 +110,9 @@ def _are_several(annotation: Any) -> bool:
 def _is_number(annotation: Any) -> bool:
     if annotation in (int, float):
         return True
-    # A literal's arguments are values, and a tuple's are elements.
+    if get_origin(annotation) is Literal:
+        return any(type(one) is int for one in get_args(annotation))
+    # A tuple's arguments are elements.
     return get_origin(annotation) in (Union, UnionType, Annotated) and any(map(_is_number, get_args(annotation)))
 
 

@@ -99,7 +99,7 @@ class Machine(NamedTuple):
     """Payload of each axis, in either direction."""
 
 
-def machine_text(machine: Machine, *, name: str, file: str) -> str:
+def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     """Text of a profile of a machine that nobody has measured; every value that rests on nothing says so.
 
     Axes that cannot be shared out evenly make two groups of nodes.
@@ -108,6 +108,8 @@ def machine_text(machine: Machine, *, name: str, file: str) -> str:
     ----------
     machine
         Nodes, axes, period and payload.
+    kind
+        Kind of bus.
     name
         Name of the profile.
     file
@@ -129,7 +131,7 @@ def machine_text(machine: Machine, *, name: str, file: str) -> str:
     step_us = machine.period_us / ceil(machine.period_us / _LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
-        bus=kind_named(STARTER_KIND).starter,
+        bus=kind_named(kind).starter,
         nodes=machine.nodes,
         axes=machine.axes,
         count=count,
@@ -144,10 +146,6 @@ def machine_text(machine: Machine, *, name: str, file: str) -> str:
 def _group(nodes: int, axes: int, *, machine: Machine, file: str) -> str:
     payload = (_PAYLOAD if axes else _PAYLOAD_WITHOUT_AXES).format(bytes=machine.bytes_per_axis)
     return _GROUP.format(nodes=nodes, axes=axes, payload=payload, file=file)
-
-
-STARTER_KIND: Final = "ieee1394"
-"""Kind of bus of a new profile."""
 
 
 def _whole(value: float) -> float:

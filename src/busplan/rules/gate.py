@@ -196,7 +196,7 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
 def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
     """Make a finding at the line of the problem's key, or of the table that should have it."""
     document = subject.document
-    spot = document.spot(path_of(document.data() if "group." in problem.key else {}, problem.key))
+    spot = document.spot(path_of(document.data() if problem.key.count(".") > 1 else {}, problem.key))
     return finding_of(rule, problem, spot, words=f"{problem.key}: {problem.message}{subject.origin}")
 
 

@@ -10,7 +10,7 @@ from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polyn
 from busplan.analysis.network import network_of
 from busplan.buses.bus import Limit
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, larger, total
+from busplan.elementwise import Number, choose, larger, smaller, total
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
 
@@ -93,14 +93,15 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
     closed = [_in_closed_form(limit, network) for limit in limits]
     ceiling = int(min([ceiling, *(_greatest(one) for one in closed if one is not None)]))
     nodes, *others = (
-        _searched(limit, network, ceiling) if found is None else found
+        # One more, so that a limit that keeps the ceiling does not give its name to the answer of another.
+        _searched(limit, network, ceiling + 1) if found is None else found
         for limit, found in zip(limits, closed, strict=True)
     )
     place: Number = 0
     for index, most in enumerate(others, start=1):
         less = most < nodes
         nodes, place = choose(less, most, nodes), choose(less, index, place)
-    return MostNodes(nodes, place)
+    return MostNodes(smaller(nodes, ceiling), place)
 
 
 def _in_closed_form(limit: Limit, network: Network) -> Number | None:

@@ -111,7 +111,7 @@ class Polynomial(SpecialNumber):
         """It is a number of nodes from 2 on."""
         return False
 
-    larger_of = smaller_of = chosen = rounded_up = rounded_down = entry = between = _refuse
+    larger_of = smaller_of = chosen = rounded_up = rounded_down = entry = between = pointwise = _refuse
 
 
 _QUADRATIC: Final = 3

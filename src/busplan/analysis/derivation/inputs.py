@@ -74,12 +74,12 @@ def given(profile: Profile, key: str) -> Input:
     is_no_measurement = (not is_set and not value) or _chooses(profile, key)
     grade = "given" if own_grade is None or is_no_measurement else own_grade
     source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
-    default = bus.key_sources.get(_of_alike_nodes(profile, key)[0])
+    alike_key, group = _of_one_table(profile, key)
+    default = bus.key_sources.get(alike_key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
     # A plain number shows no unit.
     unit = "" if unit == "1" else unit
-    alike_key, group = _of_alike_nodes(profile, key)
     symbol = _SYMBOLS.get(alike_key) or bus.key_symbols.get(alike_key) or SYMBOLS.get(name) or name
     symbol = f"{symbol},{group}" if group else symbol
     return Input(symbol, key, value, unit, grade, source, description)
@@ -118,11 +118,17 @@ def _chooses(profile: Profile, key: str) -> bool:
     return any(key == one.node_key(name) for one in profile.alike_nodes for name in own)
 
 
-def _of_alike_nodes(profile: Profile, key: str) -> tuple[str, str]:
-    """The key as it is where all nodes are alike, and the name of the group that it is of."""
-    if not key.startswith("group."):
+def _of_one_table(profile: Profile, key: str) -> tuple[str, str]:
+    """The key without the name of its table, where a key has several, and that name.
+
+    That of a group is as it is where all nodes are alike.
+    """
+    section, _, rest = key.partition(".")
+    if not isinstance(getattr(profile, section), tuple):
         return key, ""
-    _, group, name = key.split(".", 2)
+    group, _, name = rest.partition(".")
+    if section != "group":
+        return f"{section}.{name}", group
     if name == "nodes":
         return "bus.nodes", group
     (payload,) = models_of(type(profile).model_fields["payload"].annotation)

@@ -1,8 +1,11 @@
 """Derive the figures of `latency` by calling the functions of the bus with traced numbers."""
 
+from math import isinf
+
 from busplan.analysis.derivation.inputs import traced_profile
 from busplan.analysis.derivation.origin import Input, short
 from busplan.analysis.derivation.trace import Traced
+from busplan.analysis.derivation.trace import found as result_of
 from busplan.analysis.network import bus_of, network_of
 from busplan.elementwise import Number
 from busplan.sections.profile import Profile
@@ -39,9 +42,16 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
         "transaction": chosen(kind, "transaction", "transaction asked for"),
         "payload_bytes": one.payload_bytes,
         "nodes": network.nodes,
-        **one.phases,
+        **{key: _if_finite(number) for key, number in one.phases.items()},
     }
     return {figure.key: remembered(found.get(figure.key), figure.key, figure.symbol) for figure in bus.latency_figures}
+
+
+def _if_finite(number: Number) -> Number:
+    """A phase, or None with the inputs of an infinite one, which does not exist."""
+    if isinstance(number, Traced) and isinf(number.value):
+        return result_of(None, "does not exist", (number,))
+    return number
 
 
 def chosen(word: object, key: str, meaning: str) -> Traced:

@@ -189,6 +189,11 @@ class Traced(SpecialNumber):
         found = y0 + (y1 - y0) * (self - x0) / (x1 - x0)
         return Traced(found.value, operation=CHOSEN, parts=(found, *sources))
 
+    def pointwise(self, function: Callable[..., float], numbers: tuple[Number, ...], *, words: str) -> "Traced":
+        """What a function of plain numbers gives: it has no steps."""
+        value = function(*map(value_of, numbers))
+        return Traced(value, formula=words, numbers=short(value), parts=numbers)
+
     def constant(self, number: Number) -> Number:
         """Make an input from a constant."""
         return Traced(float(number), given=constant(number)) if isinstance(number, Sourced) else number

@@ -41,7 +41,8 @@ def shown(network: Network) -> Need:
     for limit in bus.limits:
         if limit.is_broken(network):
             way_out = f" ({limit.way_out})" if limit.way_out else ""
-            return Need(inf, limit.key, f"{limit.words(network)}{way_out}")
+            slice_us = inf if limit.slice_us is None else limit.slice_us(network)
+            return Need(slice_us, limit.key, f"{limit.words(network)}{way_out}")
     return Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
 
 

@@ -1,0 +1,55 @@
+"""Figures of classical CAN and of a CANopen cycle, each with its source and grade."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final, Literal
+
+from busplan.sourced import Sourced, constants
+
+BitRate = Literal[10, 20, 50, 125, 250, 500, 800, 1000]
+"""Bit rates that CiA 301 names [kbit/s]."""
+IdentifierBits = Literal[11, 29]
+
+_DAVIS: Final = "Davis, Burns, Bril, Lukkien 2007; linux-can/can-utils, canframelen"
+_CIA_301: Final = "CiA 301, pre-defined connection set; esd C.3032.21, 8.5"
+
+
+def _bits(value: int, meaning: str, *, symbol: str = "") -> Sourced:
+    return Sourced(value, unit="bits", grade="published", source=_DAVIS, meaning=meaning, symbol=symbol)
+
+
+def _identifier(value: int, meaning: str) -> Sourced:
+    return Sourced(value, unit="1", grade="published", source=_CIA_301, meaning=meaning)
+
+
+BASE_BITS: Final = 11
+"""Identifier bits of the base format, CAN 2.0A; the extended format, 2.0B, has 29."""
+STUFFED_BITS: Final = _bits(34, "bits of a base frame without data that may be stuffed", symbol="g")
+STUFFED_BITS_EXTENDED: Final = _bits(54, "bits of an extended frame without data that may be stuffed", symbol="g")
+FIXED_BITS: Final = _bits(13, "bits that are never stuffed: delimiters, acknowledge, end of frame, space of 3 bits")
+STUFF_STEP_BITS: Final = _bits(4, "bits for each stuff bit in the worst case, behind the first")
+BITS_PER_BYTE: Final = Sourced(8, unit="bits", grade="published", source="definition", meaning="bits of a byte")
+FRAME_BYTES: Final = Sourced(
+    8, unit="bytes", grade="published", source="CAN 2.0, DLC 0..8", meaning="most data of one frame"
+)
+MAX_IDENTIFIER: Final[Mapping[int, int]] = MappingProxyType({11: (1 << 11) - 1, 29: (1 << 29) - 1})
+
+SYNC_IDENTIFIER: Final = _identifier(0x80, "identifier of SYNC")
+FEEDBACK_IDENTIFIER: Final = _identifier(0x181, "identifier of TPDO1 of node 1, 180h + node-ID")
+COMMAND_IDENTIFIER: Final = _identifier(0x201, "identifier of RPDO1 of node 1, 200h + node-ID")
+PDO_STEP: Final = _identifier(0x100, "from the identifier of a PDO to that of the next PDO of the same node")
+MOST_PDOS: Final = _identifier(4, "PDOs of one node in one direction")
+MOST_NODES: Final = _identifier(127, "node-IDs")
+
+MAX_LOAD: Final = Sourced(
+    0.8, unit="1", grade="published", source="Lenze system-bus manual", meaning="largest bus load of a plan"
+)
+SATURATED: Final = Sourced(
+    0.9999,
+    unit="1",
+    grade="assumed",
+    source="chosen: a load so near 1 has a busy period without use",
+    meaning="load from which on no response time is computed",
+)
+
+CONSTANTS: Final = constants(globals())

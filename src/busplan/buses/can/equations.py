@@ -1,0 +1,149 @@
+"""Length of CAN frames, for numbers of any sort.
+
+References
+----------
+R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, Controller Area Network (CAN) schedulability analysis: refuted,
+revisited and revised, Real-Time Systems 35, 2007.
+"""
+
+from busplan.buses.can.constants import (
+    BASE_BITS,
+    BITS_PER_BYTE,
+    FIXED_BITS,
+    FRAME_BYTES,
+    STUFF_STEP_BITS,
+    STUFFED_BITS,
+    STUFFED_BITS_EXTENDED,
+)
+from busplan.elementwise import Number, choose, rounded_down, rounded_up
+
+KBIT_US = 1000
+"""Microseconds of a bit at 1 kbit/s."""
+
+
+def frame_bits(data_bytes: Number, *, identifier_bits: Number, is_stuffed: bool) -> Number:
+    """Length of a data frame, interframe space included.
+
+    Parameters
+    ----------
+    data_bytes
+        Data of the frame s, 0..8 [bytes]; float or array.
+    identifier_bits
+        Bits of the identifier, 11 or 29 [1]; float or array.
+    is_stuffed
+        Whether the stuff bits of the worst case are counted, floor((g + 8 s - 1) / 4), or none.
+
+    Returns
+    -------
+    float
+        g + 8 s + 13 bits and the stuff bits, g = 34 or 54 [bits]; the broadcast shape of the arguments.
+
+    References
+    ----------
+    Davis et al. 2007, equations (1)-(3).
+
+    Examples
+    --------
+    >>> frame_bits(8, identifier_bits=11, is_stuffed=True), frame_bits(8, identifier_bits=29, is_stuffed=True)
+    (135.0, 160.0)
+    >>> frame_bits(8, identifier_bits=11, is_stuffed=False)
+    111.0
+    """
+    stuffable = choose(identifier_bits > BASE_BITS, STUFFED_BITS_EXTENDED, STUFFED_BITS) + BITS_PER_BYTE * data_bytes
+    bits: Number = stuffable + FIXED_BITS
+    return bits + rounded_down((stuffable - 1) / STUFF_STEP_BITS) if is_stuffed else bits
+
+
+def bit_us(bit_rate_kbit_s: Number) -> Number:
+    """Time of one bit [us].
+
+    Parameters
+    ----------
+    bit_rate_kbit_s
+        Bit rate [kbit/s]; float or array.
+
+    Examples
+    --------
+    >>> bit_us(250)
+    4.0
+    """
+    return KBIT_US / bit_rate_kbit_s
+
+
+def frame_us(data_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
+    """Time of a data frame on the wire [us].
+
+    Parameters
+    ----------
+    data_bytes, identifier_bits, is_stuffed
+        As `frame_bits` takes them.
+    bit_rate_kbit_s
+        Bit rate [kbit/s]; float or array.
+
+    Examples
+    --------
+    >>> frame_us(8, identifier_bits=11, bit_rate_kbit_s=500, is_stuffed=True)
+    270.0
+    """
+    bits = frame_bits(data_bytes, identifier_bits=identifier_bits, is_stuffed=is_stuffed)
+    return bits * bit_us(bit_rate_kbit_s)
+
+
+def full_frames(payload_bytes: Number) -> Number:
+    """Frames of 8 bytes that a payload fills [1].
+
+    Parameters
+    ----------
+    payload_bytes
+        Payload [bytes]; float or array.
+
+    Examples
+    --------
+    >>> full_frames(20), full_frames(16)
+    (2, 2)
+    """
+    return rounded_down(payload_bytes / FRAME_BYTES)
+
+
+def payload_us(payload_bytes: Number, *, identifier_bits: Number, bit_rate_kbit_s: Number, is_stuffed: bool) -> Number:
+    """Time of all frames of a payload: as many of 8 bytes as it fills, and one of the rest [us].
+
+    Parameters
+    ----------
+    payload_bytes
+        Payload, 1 or more [bytes]; float or array.
+    identifier_bits, bit_rate_kbit_s, is_stuffed
+        As `frame_us` takes them.
+
+    Examples
+    --------
+    >>> payload_us(10, identifier_bits=11, bit_rate_kbit_s=1000, is_stuffed=True)
+    210.0
+    """
+
+    def of_frame(data_bytes: Number) -> Number:
+        return frame_us(
+            data_bytes, identifier_bits=identifier_bits, bit_rate_kbit_s=bit_rate_kbit_s, is_stuffed=is_stuffed
+        )
+
+    full = full_frames(payload_bytes)
+    rest_bytes = payload_bytes - FRAME_BYTES * full
+    return full * of_frame(float(FRAME_BYTES)) + choose(rest_bytes > 0, of_frame(rest_bytes), 0.0)
+
+
+def share_bytes(payload_bytes: Number, *, pdos: Number) -> Number:
+    """Payload of each of a node's PDOs in one direction, shared out evenly [bytes].
+
+    Parameters
+    ----------
+    payload_bytes
+        Payload of the node [bytes]; float or array.
+    pdos
+        PDOs of the node [1]; float or array.
+
+    Examples
+    --------
+    >>> share_bytes(16, pdos=2), share_bytes(17, pdos=2)
+    (8, 9)
+    """
+    return rounded_up(payload_bytes / pdos)

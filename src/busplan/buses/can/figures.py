@@ -1,0 +1,60 @@
+"""The figures that only a CAN bus has."""
+
+from typing import Final
+
+from busplan.buses.figure import NODES, NONPERIODIC, TIMING_MODEL, TRANSACTION, Figure, capacity_figures
+
+_DAVIS: Final = "Davis 2007"
+
+BIT_RATE: Final = Figure("bit_rate_kbit_s", "f", "profile", "bit rate of the bus", "bit rate, kbit/s", decimals=None)
+BUS_LOAD: Final = Figure(
+    "bus_load",
+    "load",
+    _DAVIS,
+    "share of the bus that all messages take, 0..1",
+    "bus load",
+    "%",
+    decimals=2,
+    better="less",
+)
+TERMS: Final = (
+    Figure("cycle_sync_us", "SYNC", _DAVIS, "the frame that opens a cycle", "SYNC", ink="sync", letter="S"),
+    Figure(
+        "cycle_wait_us",
+        "wait",
+        "profile",
+        "wait for the slowest node, behind SYNC and behind its command",
+        "wait for nodes",
+        ink="work",
+        letter="W",
+    ),
+    Figure("cycle_feedback_us", "feedback", _DAVIS, "PDOs from all nodes", "feedback", ink="in", letter="F"),
+    Figure("cycle_command_us", "command", _DAVIS, "PDOs to all nodes", "command", ink="out", letter="C"),
+    Figure(
+        "cycle_messages_us",
+        "messages",
+        _DAVIS,
+        "other messages that arrive while the cycle lasts",
+        "messages",
+        ink="contention",
+        letter="M",
+    ),
+    NONPERIODIC,
+)
+"""In the order of the wire."""
+CAPACITY: Final = capacity_figures(TERMS, setup=(BIT_RATE,), own=(BUS_LOAD,))
+
+LATENCY_TABLE: Final = (
+    Figure("identifier", "id", "profile", "identifier of the last frame", "identifier", sort="count"),
+    Figure("data_bytes", "s", "profile", "data of the last frame", "data, bytes", sort="count"),
+    Figure("jitter_us", "J", "profile", "how late it may be queued", "jitter J"),
+    Figure("blocking_us", "B", _DAVIS, "longest frame of a lower priority", "blocking B"),
+    Figure("interference_us", "I", _DAVIS, "frames of higher priorities before it", "interference I"),
+    Figure("instance", "q", _DAVIS, "worst instance of the busy period, from 0", "worst instance q", sort="count"),
+    Figure("backlog_us", "q (C - T)", _DAVIS, "instances before it, less their periods", "backlog q (C - T)"),
+    Figure("frame_us", "C", _DAVIS, "the frame itself", "frame C"),
+    Figure("worst_response_us", "R", _DAVIS, "worst-case response time, J + B + I + q (C - T) + C", "response R"),
+    Figure("deadline_us", "D", "profile", "when it must have arrived", "deadline D"),
+)
+"""In the order in which they add up."""
+LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *LATENCY_TABLE)

@@ -1,0 +1,143 @@
+"""CAN 2.0 with a CANopen cycle, as a kind of bus."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from busplan.buses.bus import (
+    Bus,
+    EventKind,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    TimingModel,
+)
+from busplan.buses.can import figures, rules
+from busplan.buses.can.constants import (
+    BASE_BITS,
+    CONSTANTS,
+    FRAME_BYTES,
+    MAX_LOAD,
+    MOST_PDOS,
+    SYNC_IDENTIFIER,
+)
+from busplan.buses.can.cycle import NONE, WORST, CanCycle
+from busplan.buses.can.limits import LIMITS
+from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.network import Network
+from busplan.buses.rule import Rule
+from busplan.elementwise import plain
+from busplan.sourced import Sourced
+
+if TYPE_CHECKING:
+    from busplan.buses.can.section import CanProfile
+
+_DAVIS: Final = figures.BUS_LOAD.reference
+
+
+class Can(Bus):
+    """Classical CAN, whose nodes send at SYNC."""
+
+    kind = "can"
+    title = "CAN"
+    timing_models = (
+        TimingModel(WORST, "as many stuff bits as a frame of its length can have"),
+        TimingModel(NONE, "no stuff bits"),
+    )
+    deciding_model = WORST
+    term_figures = figures.TERMS
+    capacity_figures = figures.CAPACITY
+    setup_figures = (figures.BIT_RATE,)
+    compared_figures = (figures.BUS_LOAD,)
+    table_figures = (figures.BUS_LOAD,)
+    latency_table_figures = figures.LATENCY_TABLE
+    planned_figures = ("bus_load",)
+    facts = ("bit_rate_kbit_s",)
+    limits: ClassVar[tuple[Limit, ...]] = LIMITS
+    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    starter = """\
+[bus]
+kind = "can"
+bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m or so"""
+    starter_period = "10ms"
+    command_events = (("command", "command_frame"),)
+    event_kinds = (
+        EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
+        EventKind("wait", "wait for nodes", "profile", "=", "work"),
+        EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
+        EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
+        EventKind("message", "other message", _DAVIS, "m", "contention"),
+        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+    )
+    stretch_kinds = (
+        EventKind("feedback", "feedback", "", "F", "in"),
+        EventKind("command", "command", "", "C", "out"),
+    )
+    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    key_sources: ClassVar[Mapping[str, Sourced]] = {
+        "bus.sync_identifier": SYNC_IDENTIFIER,
+        "limits.max_load": MAX_LOAD,
+    }
+    key_symbols: ClassVar[Mapping[str, str]] = {
+        "bus.bit_rate_kbit_s": "f",
+        "bus.identifier_bits": "id_bits",
+        "node.execution.worst_extra_us": "T_extra",
+        "message.payload_bytes": "s",
+        "message.period_us": "T",
+        "message.jitter_us": "J",
+        "message.deadline_us": "D",
+        "message.identifier": "id",
+    }
+    change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second bus"}
+
+    def profile_model(self) -> "type[CanProfile]":
+        """The model of its profiles."""
+        from busplan.buses.can.section import CanProfile  # the one module of the bus that loads pydantic
+
+        return CanProfile
+
+    def cycle(self, network: Network, *, model: str) -> CanCycle:
+        """The cycle of a network under one timing model."""
+        return CanCycle(network, model)
+
+    @property
+    def latency_figures(self) -> tuple[Figure, ...]:
+        """Of `latency`, in the order of its document."""
+        return figures.LATENCY
+
+    def latency_subject(self, network: Network) -> str:
+        """Say whose response time it is, and from which load on there is none."""
+        load = plain(CanCycle(network, WORST).load)
+        none = "; from a load of 1 on, messages of low priority have no response time" if load >= 1 else ""
+        words = (f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network))
+        return f"{', '.join(words)}, bus load {load:.1%}{none}"
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """SYNC with its counter, and identifiers of 29 bits."""
+        bus = network.profile.bus
+        counted = "SYNC has its counter already" if bus.sync_counter else ""
+        extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
+        return (
+            Perturbation("SYNC with counter", {"bus.sync_counter": True}, why_not=counted),
+            Perturbation("identifiers of 29 bits", {"bus.identifier_bits": 29}, why_not=extended),
+        )
+
+    def payloads(self, network: Network) -> PayloadRange:
+        """Whole bytes up to four frames."""
+        largest = int(MOST_PDOS * FRAME_BYTES)
+        each = min((plain(one.axes) for one in network.groups if one.said.payload.pdo_per == "axis"), default=1)
+        return PayloadRange(1, largest * max(int(each), 1), "PDOs", carrier="four frames")
+
+    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
+        """Say what each frame is charged."""
+        return "every frame with the stuff bits of its length"
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:
+        """The bit rate."""
+        return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
+
+
+def _all_nodes(network: Network) -> str:
+    return "all nodes" if network.is_uniform else "each group"
+
+
+BUS: Final = Can()

@@ -1,0 +1,191 @@
+"""What a CAN bus and the CANopen identifiers forbid, the load of the bus, and deadlines."""
+
+from collections.abc import Callable
+from functools import partial
+from math import inf
+from typing import Final
+
+from busplan.buses.bus import Limit
+from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS
+from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.streams import Stream, collisions, load_before, response, streams
+from busplan.buses.can.traffic import Traffic, traffic_of
+from busplan.buses.network import Network
+from busplan.elementwise import Number, larger, plain, pointwise, total
+from busplan.sections.base import MAX_TIME_US
+
+
+def late_messages(traffic: Traffic) -> tuple[str, ...]:
+    """Say of each message that misses its deadline by how much, with its name first; of plain numbers."""
+    each = streams(traffic, is_stuffed=True)
+    return tuple(
+        f"{one.name}: {_late(one, share, traffic)}"
+        for one in each
+        if one.is_message and (share := _deadline_share(one, each, traffic)) > 1
+    )
+
+
+def _late(one: Stream, share: float, traffic: Traffic) -> str:
+    if share < inf:
+        return f"its worst-case response time is {share * one.deadline_us:.3f} us, over its {one.deadline_us:.3f} us"
+    load = load_before(one, streams(traffic, is_stuffed=True))
+    return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}"
+
+
+def _deadline_share(one: Stream, each: tuple[Stream, ...], traffic: Traffic) -> float:
+    """Response over deadline; infinite where there is no response time [1]."""
+    found = response(one, each, bit_rate_kbit_s=plain(traffic.bit_rate_kbit_s))
+    return inf if found is None else found.us / one.deadline_us
+
+
+def _slowest(traffic: Traffic, *numbers: float) -> float:
+    """The largest response over deadline of any message [1]."""
+    own = traffic.with_numbers(*numbers)
+    each = streams(own, is_stuffed=True)
+    return max((_deadline_share(one, each, own) for one in each if one.is_message), default=0.0)
+
+
+def _deadline(network: Network) -> Number:
+    if not network.profile.message:
+        return 0.0
+    traffic = traffic_of(network)
+    return pointwise(partial(_slowest, traffic), *traffic.numbers(), words="busy periods of all messages")
+
+
+def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
+    """Say which messages share identifiers, each with the key of one of the two; of plain numbers."""
+    each = streams(traffic, is_stuffed=True)
+    return tuple(
+        (_identifier_key(other), f"{one.label} and {other.label} share {_from(first, shared)}")
+        for one, other, first, shared in collisions(each)
+    )
+
+
+def _identifier_key(one: Stream) -> str:
+    if one.is_message:
+        return f"message.{one.name}.identifier"
+    return f"{f'group.{one.group}' if one.group else 'payload'}.{one.name}_identifier"
+
+
+def _from(first: int, shared: int) -> str:
+    return f"{shared} identifiers from {first:#x}" if shared > 1 else f"the identifier {first:#x}"
+
+
+def _without_times(traffic: Traffic) -> Traffic:
+    """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
+    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
+    return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, messages=messages)
+
+
+def _shared(traffic: Traffic, *numbers: float) -> float:
+    each = streams(traffic.with_numbers(*numbers), is_stuffed=True)
+    return sum(shared for *_, shared in collisions(each))
+
+
+def _collisions(network: Network) -> Number:
+    traffic = _without_times(traffic_of(network))
+    return pointwise(partial(_shared, traffic), *traffic.numbers(), words="identifiers that stand twice")
+
+
+def _last(traffic: Traffic, *numbers: float) -> float:
+    return max(one.last for one in streams(traffic.with_numbers(*numbers), is_stuffed=True))
+
+
+def _largest_identifier(network: Network) -> Number:
+    traffic = _without_times(traffic_of(network))
+    return pointwise(partial(_last, traffic), *traffic.numbers(), words="the largest identifier")
+
+
+def _most_identifier(network: Network) -> Number:
+    bits = network.profile.bus.identifier_bits
+    return pointwise(lambda one: MAX_IDENTIFIER[int(one)], bits, words="the largest identifier of the format")
+
+
+def _largest_pdo(network: Network) -> Number:
+    largest: Number = 0
+    for one in traffic_of(network).pdos:
+        largest = larger(largest, one.payload_bytes)
+    return largest
+
+
+def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> float:
+    """The slice from which on a limit holds, the slice ratio as it is; infinite where no period is long enough [us]."""
+    broken_us = kept_us = plain(network.period_us)
+    while is_broken(network._replace(period_us=kept_us)):
+        broken_us, kept_us = kept_us, 2 * kept_us
+        if kept_us > MAX_TIME_US:
+            return inf
+    for _ in range(_HALVINGS):
+        middle_us = (broken_us + kept_us) / 2
+        if is_broken(network._replace(period_us=middle_us)):
+            broken_us = middle_us
+        else:
+            kept_us = middle_us
+    return kept_us * plain(network.slice_ratio)
+
+
+_HALVINGS: Final = 20
+"""Halvings of a doubled period: to a millionth, and advice asks the limit again."""
+
+
+def _load(network: Network) -> Number:
+    return CanCycle(network, WORST).load
+
+
+def _is_overloaded(network: Network) -> Number:
+    over: Number = _load(network) > network.profile.limits.max_load
+    return over
+
+
+LIMITS: Final = (
+    Limit(
+        "nodes",
+        "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",
+        lambda network: total(one.pdos for one in traffic_of(network).pdos if one.kind == "read"),
+        lambda _network: MOST_NODES,
+        way_out=f"a second bus has {MOST_NODES:g} more",
+    ),
+    Limit(
+        "payload",
+        "a PDO of {value:.0f} bytes is over the {most:.0f} bytes of four frames",
+        _largest_pdo,
+        lambda _network: MOST_PDOS * FRAME_BYTES,
+        way_out="a smaller payload would do",
+        failure="payload_bytes",
+    ),
+    Limit(
+        "range",
+        "identifier {value:.0f} is over {most:.0f}, the largest of {bus.identifier_bits} bits",
+        _largest_identifier,
+        _most_identifier,
+        way_out="smaller identifiers, or those of 29 bits, have room",
+    ),
+    Limit(
+        "identifiers",
+        "{value:.0f} identifiers stand twice",
+        _collisions,
+        lambda _network: 0,
+        way_out="identifiers further apart have room",
+        has_rule=True,
+        says=lambda network: "; ".join(words for _, words in shared_identifiers(traffic_of(network))),
+    ),
+    Limit(
+        "load",
+        "the bus load is {value:.1%}, over limits.max_load, {most:.1%}",
+        _load,
+        lambda network: network.profile.limits.max_load,
+        way_out="a longer period, fewer bytes or a faster bus takes load off",
+        has_rule=True,
+        slice_us=partial(_kept_from_us, _is_overloaded),
+    ),
+    Limit(
+        "deadline",
+        "a message takes {value:.3f} of its deadline",
+        _deadline,
+        lambda _network: 1,
+        way_out="a smaller identifier, or less traffic before it, makes a message earlier",
+        has_rule=True,
+        says=lambda network: "; ".join(late_messages(traffic_of(network))),
+        slice_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
+    ),
+)

@@ -1,0 +1,179 @@
+"""The keys that only profiles of a CAN bus have, in [bus], [payload], [[group]], [[message]] and [limits]."""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from busplan.buses.can.constants import (
+    FRAME_BYTES,
+    MAX_IDENTIFIER,
+    MAX_LOAD,
+    SYNC_IDENTIFIER,
+    BitRate,
+    IdentifierBits,
+)
+from busplan.buses.can.cycle import WORST, TimingModelName
+from busplan.buses.can.traffic import NAMES, SYNC
+from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
+from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, NodeSection, PayloadSection
+from busplan.sections.limits import Limits
+from busplan.sections.profile import Profile
+
+Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
+PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
+
+
+class CanBus(BusSection):
+    """Section [bus]: a CAN 2.0 bus with a SYNC cycle; no CAN FD."""
+
+    kind: Literal["can"] = Field(description="Kind of bus", examples=["can"])
+    bit_rate_kbit_s: BitRate = Field(
+        description="Bit rate of the bus, one of those of CiA 301 [kbit/s]", examples=[1000]
+    )
+    nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[8])
+    identifier_bits: IdentifierBits = Field(
+        default=11, description="Bits of all identifiers: 11 (CAN 2.0A) or 29 (CAN 2.0B)", examples=[11]
+    )
+    sync_identifier: Identifier = Field(
+        default=int(SYNC_IDENTIFIER), description="Identifier of SYNC", examples=[int(SYNC_IDENTIFIER)]
+    )
+    sync_counter: bool = Field(
+        default=False, description="Whether SYNC carries its counter, one byte (CiA 301)", examples=[True]
+    )
+    timing_model: TimingModelName = Field(
+        default=WORST,
+        description="Timing model whose figures lead the tables, worst-stuffing or no-stuffing; the verdict is always "
+        "by worst-stuffing",
+        examples=[WORST],
+    )
+
+
+class CanPayload(PayloadSection):
+    """Section [payload]: what each node sends (read) and receives (write) in a cycle, and in which PDOs."""
+
+    pdo_per: Literal["node", "axis"] = Field(
+        default="node",
+        description="Whether a node has one PDO in each direction, or each of its axes has; they share the payload",
+        examples=["axis"],
+    )
+    feedback_identifier: Identifier | None = Field(
+        default=None,
+        description="Identifier of the first feedback PDO, the next one has the next; a frame beyond the first of a "
+        "PDO has 256 more. Without it 0x181, of a further group the one behind those before",
+        examples=[0x181],
+    )
+    command_identifier: Identifier | None = Field(
+        default=None,
+        description="Identifier of the first command PDO, as that of feedback. Without it 0x201",
+        examples=[0x201],
+    )
+
+
+class CanGroup(CanPayload, GroupSection):
+    """One of the sections [[group]]: nodes that are alike, in the order of their identifiers."""
+
+    axes: GroupAxes = Field(examples=[4])
+
+
+class CanMessage(Section):
+    """One of the sections [[message]]: another message on the bus, as SDO, heartbeat or emergency."""
+
+    name: GroupName = Field(description="Name of the message; its keys are message.NAME.key", examples=["sdo"])
+    identifier: Identifier = Field(description="Its identifier; a smaller one goes first", examples=[0x581])
+    payload_bytes: Annotated[int, Field(ge=0, le=int(FRAME_BYTES))] = Field(
+        description="Its data [bytes]", examples=[8]
+    )
+    period_us: PeriodUs = Field(description="Shortest time from one to the next [us]", examples=[10_000])
+    jitter_us: TimeUs = Field(
+        default=0.0, description="How late it may be queued, no more than its period [us]", examples=[500]
+    )
+    deadline_us: PeriodUs | None = Field(
+        default=None,
+        description="When it must have arrived, from its start; without it its period [us]",
+        examples=[5000],
+    )
+
+    @model_validator(mode="after")
+    def _is_queued_within_its_period(self) -> Self:
+        if self.jitter_us > self.period_us:
+            why = f"is over the period of the message, {self.period_us:g} us"
+            raise refused(Problem(why, key="jitter_us", kind="inconsistent"))
+        return self
+
+
+class CanLimits(Limits):
+    """Section [limits]: what a plan must keep free, and the load of the bus."""
+
+    max_load: Annotated[float, Field(gt=0, le=0.999, allow_inf_nan=False)] = Field(
+        default=float(MAX_LOAD),
+        description="Largest load of the bus by all messages in the worst case, 0..0.999 (Lenze: 0.8)",
+        examples=[0.6],
+    )
+
+
+class CanProfile(Profile):
+    """A whole profile: one motion network and its cycle."""
+
+    bus: CanBus = Field(description="The bus")
+    payload: CanPayload | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    node: NodeSection | None = Field(default=None, description="One distributed node, where nodes are alike")
+    group: Annotated[tuple[CanGroup, ...], Field(strict=False)] = Field(
+        default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
+    )
+    message: Annotated[tuple[CanMessage, ...], Field(strict=False)] = Field(
+        default=(), description="Other messages on the bus"
+    )
+    limits: CanLimits = Field(default_factory=CanLimits, description="What the gate asks for beyond fitting")
+
+    @model_validator(mode="after")
+    def _messages_have_names(self) -> Self:
+        names = [one.name for one in self.message]
+        problems = [
+            Problem("there is a message of this name", key=f"message.{place}.name", kind="inconsistent")
+            for place, name in enumerate(names)
+            if name in names[:place]
+        ]
+        problems += (
+            Problem("is what the frames of the cycle are called", key=f"message.{place}.name", kind="inconsistent")
+            for place, name in enumerate(names)
+            if name in (SYNC, *NAMES.values())
+        )
+        if problems:
+            raise refused(*problems)
+        return self
+
+    @model_validator(mode="after")
+    def _groups_have_identifiers_of_their_own(self) -> Self:
+        problems = []
+        for name in (f"{one}_identifier" for one in NAMES.values()):
+            said = [getattr(one, name) for one in self.group]
+            problems += [
+                Problem("an earlier group has it", key=f"group.{place}.{name}", kind="inconsistent")
+                for place, identifier in enumerate(said)
+                if identifier is not None and identifier in said[:place]
+            ]
+        if problems:
+            raise refused(*problems)
+        return self
+
+    @model_validator(mode="after")
+    def _identifiers_are_in_range(self) -> Self:
+        most = MAX_IDENTIFIER[self.bus.identifier_bits]
+        problems = [
+            Problem(f"is over {most}, the largest of {self.bus.identifier_bits} bits", key, "inconsistent")
+            for key, identifier in self._identifiers()
+            if identifier is not None and identifier > most
+        ]
+        if problems:
+            raise refused(*problems)
+        return self
+
+    def _identifiers(self) -> Iterator[tuple[str, int | None]]:
+        yield "bus.sync_identifier", self.bus.sync_identifier
+        sections = [("payload", self.payload), *((f"group.{place}", one) for place, one in enumerate(self.group))]
+        for section, payload in sections:
+            if payload is not None:
+                yield f"{section}.feedback_identifier", payload.feedback_identifier
+                yield f"{section}.command_identifier", payload.command_identifier
+        yield from ((f"message.{place}.identifier", one.identifier) for place, one in enumerate(self.message))

@@ -1,0 +1,149 @@
+"""What a network sends: SYNC, the PDOs of its nodes, and other messages."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, NamedTuple
+
+from busplan.buses.can.constants import COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER
+from busplan.buses.can.equations import share_bytes
+from busplan.buses.network import Network
+from busplan.elementwise import Number, larger
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
+
+FOLLOWS: Final = -1
+"""In the place of an identifier: the one behind those of the group before."""
+SYNC: Final = "SYNC"
+NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
+"""What a node's read payload and its write payload are called on CAN."""
+_FIRST: Final = {"read": FEEDBACK_IDENTIFIER, "write": COMMAND_IDENTIFIER}
+
+
+class Pdos(NamedTuple):
+    """PDOs of a group of nodes in one direction. The numbers may be of any sort."""
+
+    kind: TransactionKind
+    group: str
+    identifier: Number
+    """Of the first frame of the first PDO; `FOLLOWS` for the one behind those of the group before."""
+    pdos: Number
+    """PDOs of all its nodes [1]."""
+    payload_bytes: Number
+    """Of each PDO [bytes]."""
+
+    @property
+    def name(self) -> str:
+        """What they are called."""
+        return NAMES[self.kind]
+
+
+class Message(NamedTuple):
+    """One other message. The numbers may be of any sort."""
+
+    name: str
+    identifier: Number
+    payload_bytes: Number
+    period_us: Number
+    jitter_us: Number
+    deadline_us: Number
+
+
+class Traffic(NamedTuple):
+    """All that is sent. The numbers may be of any sort."""
+
+    period_us: Number
+    bit_rate_kbit_s: Number
+    identifier_bits: Number
+    sync_identifier: Number
+    sync_bytes: Number
+    pdos: tuple[Pdos, ...]
+    messages: tuple[Message, ...]
+
+    def numbers(self) -> tuple[Number, ...]:
+        """All its numbers in one row, as `with_numbers` takes them."""
+        own = (getattr(self, key) for key in _PLAIN_FIELDS)
+        return (*own, *(number for one in (*self.pdos, *self.messages) for number in _numbers(one)))
+
+    def with_numbers(self, *numbers: float) -> "Traffic":
+        """The same senders with other numbers, in the order of `numbers`."""
+        rest = iter(numbers)
+        own: dict[str, Any] = {key: next(rest) for key in _PLAIN_FIELDS}
+        pdos = tuple(_with_numbers(one, rest) for one in self.pdos)
+        return Traffic(**own, pdos=pdos, messages=tuple(_with_numbers(one, rest) for one in self.messages))
+
+
+_PLAIN_FIELDS: Final = Traffic._fields[:-2]
+"""Its numbers beside PDOs and messages, which stand behind them."""
+_WORDS: Final = ("kind", "group", "name")
+
+
+def _numbers(one: Any) -> Iterator[Number]:
+    return (getattr(one, key) for key in one._fields if key not in _WORDS)
+
+
+def _with_numbers(one: Any, numbers: Iterator[float]) -> Any:
+    return one._replace(**{key: next(numbers) for key in one._fields if key not in _WORDS})
+
+
+class _Senders(NamedTuple):
+    """Nodes that send alike, as a network or a profile has them."""
+
+    name: str
+    said: AlikeNodes
+    nodes: Number
+    axes: Number
+    payloads_bytes: dict[TransactionKind, Number]
+
+
+def traffic_of(network: Network) -> Traffic:
+    """What a network sends."""
+    senders = [
+        _Senders(one.name, one.said, one.nodes, one.axes, {"read": one.read_bytes, "write": one.write_bytes})
+        for one in network.groups
+    ]
+    return _traffic(network.profile, senders, network.period_us)
+
+
+def traffic_of_profile(profile: Any) -> Traffic:
+    """What the network of a profile sends, for who has no network."""
+    senders = [
+        _Senders(one.name, one, one.nodes, one.node.axes, {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS})
+        for one in profile.alike_nodes
+    ]
+    return _traffic(profile, senders, profile.cycle.period_us)
+
+
+def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Traffic:
+    bus = profile.bus
+    return Traffic(
+        period_us=period_us,
+        bit_rate_kbit_s=bus.bit_rate_kbit_s,
+        identifier_bits=bus.identifier_bits,
+        sync_identifier=bus.sync_identifier,
+        sync_bytes=1 if bus.sync_counter else 0,
+        pdos=tuple(_pdos(one, kind, place) for kind in TRANSACTION_KINDS for place, one in enumerate(senders)),
+        messages=tuple(
+            Message(
+                one.name,
+                one.identifier,
+                one.payload_bytes,
+                one.period_us,
+                one.jitter_us,
+                one.period_us if one.deadline_us is None else one.deadline_us,
+            )
+            for one in profile.message
+        ),
+    )
+
+
+def _pdos(one: _Senders, kind: TransactionKind, place: int) -> Pdos:
+    payload = one.said.payload
+    said = getattr(payload, f"{NAMES[kind]}_identifier")
+    first = FOLLOWS if place else int(_FIRST[kind])
+    each = larger(one.axes, 1) if payload.pdo_per == "axis" else 1
+    return Pdos(
+        kind,
+        one.name,
+        first if said is None else said,
+        one.nodes * each,
+        share_bytes(one.payloads_bytes[kind], pdos=each),
+    )

@@ -1,0 +1,293 @@
+"""A CAN bus: its cycle by hand, its identifiers, its limits and rules, and every question in some form."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import busplan
+from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.circle.delays import loop_delays_us
+from busplan.buses import kind_named
+from busplan.buses.can.response import Source, worst_response
+from busplan.buses.can.section import CanProfile
+from busplan.buses.can.streams import response, streams
+from busplan.buses.can.traffic import traffic_of_profile
+from busplan.elementwise import plain
+from busplan.errors import BusplanError
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.profile.write import profile_text
+from busplan.sections.profile import Profile
+
+Run = Callable[..., Any]
+
+DATA: dict[str, Any] = {
+    "schema_version": 1,
+    "name": "press",
+    "bus": {"kind": "can", "bit_rate_kbit_s": 500, "nodes": 3},
+    "cycle": {"period_us": 6000.0},
+    "payload": {"read_bytes": 10, "write_bytes": 6},
+    "node": {"axes": 2, "execution": {"kind": "linear", "grade": "measured", "base_us": 40.0, "per_byte_us": 1.0}},
+    "message": [{"name": "alarm", "identifier": 0x90, "payload_bytes": 2, "period_us": 2000.0, "jitter_us": 100.0}],
+}
+BIT_US = 2
+
+
+def profile(**changes: Any) -> Profile:
+    """That profile with other values by dotted key, __ for the dot."""
+    return override(CanProfile.model_validate(DATA), {key.replace("__", "."): one for key, one in changes.items()})
+
+
+def terms(one: Profile, model: str = "worst-stuffing") -> dict[str, float]:
+    (found,) = busplan.capacity(one, timing_model=[model]).results
+    return {term.name: plain(term.us) for term in found.terms}
+
+
+def test_its_cycle_is_that_by_hand() -> None:
+    pdo_in, pdo_out, alarm = (135 + 75) * BIT_US, 115 * BIT_US, 75 * BIT_US
+    others = 55 * BIT_US + (50 + 46) + 3 * (pdo_in + pdo_out)
+    assert others == 2156  # within 2000 us less the jitter two alarms arrive, and one more meanwhile
+    assert terms(profile()) == {
+        "sync": 110,
+        "wait": 96,
+        "feedback": 3 * pdo_in,
+        "command": 3 * pdo_out,
+        "messages": 2 * alarm,
+        "nonperiodic": 0,
+    }
+    assert terms(profile(), "no-stuffing")["feedback"] == 3 * (47 + 64 + 47 + 16) * BIT_US
+    assert terms(profile(bus__sync_counter=True))["sync"] == 65 * BIT_US
+    assert terms(profile(bus__identifier_bits=29))["command"] == 3 * 140 * BIT_US
+
+
+def test_a_pdo_for_each_axis_shares_the_payload() -> None:
+    one = terms(profile(payload__pdo_per="axis"))
+    assert (one["feedback"], one["command"]) == (6 * 105 * BIT_US, 6 * 85 * BIT_US)
+
+
+def test_its_load_counts_every_message() -> None:
+    (found,) = busplan.capacity(profile(), timing_model=["worst-stuffing"]).results
+    assert found.bus_load == pytest.approx((110 + 3 * 420 + 3 * 230) / 6000 + 150 / 2000)
+    assert (found.verdict, found.bias_us) == (FITS, None)
+    assert found.uncertainty_us == pytest.approx(2 * 2 * 0.1 / 12**0.5)
+
+
+def test_identifiers_follow_those_of_the_pre_defined_connection_set() -> None:
+    each = streams(traffic_of_profile(profile()), is_stuffed=True)
+    assert [(one.name, one.first, one.last, one.data_bytes) for one in each] == [
+        ("SYNC", 0x80, 0x80, 0),
+        ("feedback", 0x181, 0x183, 8),
+        ("feedback", 0x281, 0x283, 2),
+        ("command", 0x201, 0x203, 6),
+        ("alarm", 0x90, 0x90, 2),
+    ]
+
+
+def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> None:
+    node = {**DATA["node"], "axes": 1}
+    groups = [
+        {**node, "name": "drives", "nodes": 2, "read_bytes": 8, "write_bytes": 8},
+        {**node, "name": "io", "nodes": 3, "axes": 0, "read_bytes": 2, "write_bytes": 1, "command_identifier": 0x301},
+    ]
+    data = {key: one for key, one in DATA.items() if key not in ("payload", "node")}
+    data["bus"] = {key: one for key, one in DATA["bus"].items() if key != "nodes"}
+    found = CanProfile.model_validate({**data, "group": groups})
+    each = streams(traffic_of_profile(found), is_stuffed=True)
+    assert [(one.label, one.first, one.last) for one in each[1:-1]] == [
+        ("drives feedback", 0x181, 0x182),
+        ("io feedback", 0x183, 0x185),
+        ("drives command", 0x201, 0x202),
+        ("io command", 0x301, 0x303),
+    ]
+    one, _ = busplan.capacity(found).results
+    assert [group.name for group in one.groups] == ["drives", "io"]
+    assert one.required_us == sum(event.duration_us for event in busplan.timeline(found).cycle_events if event.term)
+
+
+@pytest.mark.parametrize(
+    ("changes", "exceeded"),
+    [
+        ({}, ()),
+        ({"limits.max_load": 0.4}, ("load",)),
+        ({"message.alarm.identifier": 0x80}, ("identifiers",)),
+        ({"message.alarm.deadline_us": 200.0}, ("deadline",)),
+        ({"payload.read_bytes": 33}, ("payload", "load")),
+        ({"cycle.period_us": 2400.0}, ("load", "time")),
+        ({"payload.command_identifier": 0x7FE}, ("range",)),
+        ({"payload.feedback_identifier": 0x202}, ("identifiers",)),
+    ],
+)
+def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[str, ...]) -> None:
+    (found,) = busplan.capacity(override(profile(), changes), timing_model=["worst-stuffing"]).results
+    assert found.exceeded == exceeded
+    assert (found.verdict == "does not fit") == bool(exceeded)
+
+
+def test_responses_are_those_by_hand_and_their_parts_add_up() -> None:
+    found = {one.transaction: one for one in busplan.latency(profile(), timing_model=["worst-stuffing"]).transactions}
+    assert list(found) == ["SYNC", "feedback", "command", "alarm"]
+    # The alarm waits for one full frame and SYNC; the last command for everything, but the second feedback frames.
+    assert found["alarm"].worst_response_us == 100 + 270 + 110 + 150
+    assert found["command"].worst_response_us == 150 + 110 + 3 * 270 + 2 * 230 + 230 + 150
+    for one in found.values():
+        parts = ("jitter_us", "blocking_us", "interference_us", "backlog_us", "frame_us")
+        assert one.worst_response_us == sum(getattr(one, key) for key in parts)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.data())
+def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None:
+    sizes = st.integers(1, 24)
+    changes: dict[str, Any] = {
+        "bus.nodes": data.draw(st.integers(1, 5)),
+        "payload.read_bytes": data.draw(sizes),
+        "payload.write_bytes": data.draw(sizes),
+        "message.alarm.identifier": data.draw(st.sampled_from([0x10, 0x190, 0x1F0, 0x210, 0x2A0, 0x7FF])),
+        "message.alarm.period_us": float(data.draw(st.integers(700, 3000))),
+        "cycle.period_us": float(data.draw(st.integers(4000, 9000))),
+    }
+    each = streams(traffic_of_profile(override(profile(), changes)), is_stuffed=True)
+    sent = {
+        identifier: Source(one.frame_us, one.period_us, one.jitter_us)
+        for one in each
+        for identifier in range(one.first, one.last + 1)
+    }
+    for own in each:
+        alone = [
+            worst_response(
+                sent[identifier],
+                [one for other, one in sent.items() if other < identifier],
+                blocking_us=max((one.frames_us for other, one in sent.items() if other > identifier), default=0.0),
+                bit_us=BIT_US,
+            )
+            for identifier in range(own.first, own.last + 1)
+        ]
+        found = response(own, each, bit_rate_kbit_s=500)
+        assert found == alone[-1]
+        assert found is None or all(one is not None and one.us <= found.us for one in alone)
+
+
+def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "press.toml"
+    path.write_text(profile_text(profile(cycle__period_us=2000.0, message__alarm__identifier=0x600)), encoding="utf-8")
+    done = run("latency", path.name, cwd=tmp_path)
+    assert "from a load of 1 on, messages of low priority have no response time" in done.stdout
+    assert "alarm: it has no worst-case response time, for with it the bus has a load of 110.5%" in done.stdout
+    document = json.loads(run("latency", path.name, "--format", "json", cwd=tmp_path).stdout)
+    by_name = {(one["timing_model"], one["transaction"]): one["worst_response_us"] for one in document["transactions"]}
+    assert by_name["worst-stuffing", "SYNC"] == 110 + 270
+    assert by_name["worst-stuffing", "alarm"] is None
+    for form in ("table", "json", "csv"):
+        explained = run("explain", path.name, "latency.worst_response_us", "--format", form, cwd=tmp_path)
+        assert (explained.returncode, "inf" in explained.stdout) == (0, False)
+
+
+def test_its_verdict_says_that_no_residual_is_known(run: Run) -> None:
+    said = run("capacity", "can-servo-8").stdout
+    assert "how far the bus is from this timing model is not known, so no bias is in it" in said
+
+
+def test_a_cure_of_the_load_is_a_longer_period(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "press.toml"
+    path.write_text(profile_text(profile(limits__max_load=0.4)), encoding="utf-8")
+    said = run("check", path.name, cwd=tmp_path).stdout
+    assert "BP121 limits.max_load: the bus load is 41.8%, 40.0% allowed; the period must change; " in said
+    cured = float(said.rpartition("cheapest cure: cycle.period_us = ")[2].split("\n")[0])
+    assert busplan.capacity(override(profile(limits__max_load=0.4), {"cycle.period_us": cured})).results[0].fits
+    assert cured < 6400
+
+
+def test_the_circle_has_its_set_points_from_sync() -> None:
+    host = override(load("can-servo-8").profile, {"servo.loop": "host"})
+    at_sync, on_arrival = (
+        loop_delays_us(override(host, {"servo.update": update})) for update in ("next_sync", "on_arrival")
+    )
+    # The first and the last command arrive behind SYNC, the wait for feedback and nine, or sixteen, frames.
+    assert at_sync == (4000, 4000)
+    assert on_arrival == (55 + 200 + 9 * 135, 55 + 200 + 16 * 135)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"message.alarm.jitter_us": 2001.0}, "is over the period of the message, 2000 us"),
+        ({"message.alarm.identifier": 0x800}, "is over 2047, the largest of 11 bits"),
+        ({"message.alarm.payload_bytes": 9}, "8 or less"),
+        ({"bus.bit_rate_kbit_s": 400}, "expected"),
+    ],
+)
+def test_what_no_bus_has_is_refused(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(BusplanError, match=words):
+        override(profile(), changes)
+
+
+def test_groups_with_one_identifier_are_refused() -> None:
+    node = {**DATA["node"], "read_bytes": 8, "write_bytes": 8, "nodes": 2, "feedback_identifier": 0x190}
+    data = {key: one for key, one in DATA.items() if key not in ("payload", "node")}
+    data["bus"] = {key: one for key, one in DATA["bus"].items() if key != "nodes"}
+    with pytest.raises(ValueError, match="an earlier group has it"):
+        CanProfile.model_validate({**data, "group": [{**node, "name": "a"}, {**node, "name": "b"}]})
+
+
+@pytest.mark.parametrize("name", ["alarm", "SYNC", "feedback"])
+def test_messages_have_names_of_their_own(name: str) -> None:
+    messages = [*DATA["message"], {**DATA["message"][0], "name": name}]
+    with pytest.raises(ValueError, match=r"of this name|are called"):
+        CanProfile.model_validate({**DATA, "message": messages})
+
+
+FORMS = {
+    "capacity --sensitivity": ("table", "json", "csv"),
+    "latency": ("table", "csv"),
+    "plan": ("table", "json"),
+    "timeline": ("table", "mermaid", "svg"),
+    "map": ("markdown", "svg"),
+    "report": ("html", "markdown"),
+    "check": ("text", "sarif"),
+    "explain": ("table", "json"),
+    "diff paper-4ms --no-circle": ("table", "json"),
+    "sweep --vary bus.bit_rate_kbit_s=500,1000 --vary message.sdo-request.period_us=1000,20000": ("csv", "table"),
+}
+
+
+@pytest.mark.parametrize(("line", "form"), [(one, form) for one, forms in FORMS.items() for form in forms])
+def test_every_question_is_answered(run: Run, tmp_path: Path, line: str, form: str) -> None:
+    command, *options = line.split()
+    done = run(command, "can-servo-8", *options, "--format", form, cwd=tmp_path)
+    assert done.returncode in (0, 1) if command == "check" else done.returncode == 0, done
+    assert "gap count" not in done.stdout or command in ("check", "diff")
+
+
+def test_a_profile_of_it_alone_loads_it() -> None:
+    def loaded(name: str) -> set[str]:
+        program = (
+            f"import sys, busplan; busplan.capacity({name!r});"
+            "print(*(one for one in sys.modules if one.startswith('busplan.buses.')))"
+        )
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+        return {one.split(".")[2] for one in done.stdout.split()}
+
+    assert "can" not in loaded("paper-4ms")
+    assert "ieee1394" not in loaded("can-servo-8")
+
+
+def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None:
+    done = run("init", "press", "--bus", "can", "--axes", "10", cwd=tmp_path)
+    assert done.returncode == 0
+    assert "--period 10ms" in done.stderr
+    assert "press at 10 ms: fits" in done.stderr
+    found = busplan.load_profile(tmp_path / "press.toml")
+    assert (found.bus.kind, len(found.group)) == ("can", 2)
+    done = run("init", "other", "--bus", "sercos", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, "--bus sercos: no kind of bus; there are ieee1394, can\n")
+
+
+def test_constants_have_sources() -> None:
+    assert all(one.source and one.grade for one in kind_named("can").constants.values())
