@@ -313,6 +313,8 @@ class Bus(ABC):
     """Rows of its own in the table of `capacity`."""
     latency_table_figures: ClassVar[tuple[Figure, ...] | None] = None
     """Rows of the table of `latency`; without them its terms."""
+    has_many_transactions: ClassVar[bool] = False
+    """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
     limits_of: ClassVar[str] = "bus"
@@ -354,6 +356,8 @@ class Bus(ABC):
     """Data files, in busplan/data, with figures of it that others have published or measured."""
     evidence_profiles: ClassVar[tuple[str, ...]] = ()
     """Shipped profiles that these figures are compared on."""
+    untested: ClassVar[str] = "the model"
+    """What of it none of these figures tests, as its verdicts say; empty where they test all of it."""
 
     @abstractmethod
     def profile_model(self) -> "type[Profile]":
@@ -438,11 +442,6 @@ class Bus(ABC):
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
         """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
         return []
-
-    @property
-    def has_evidence(self) -> bool:
-        """Whether a figure of it is known that others have published or measured; its verdicts say where none is."""
-        return bool(self.evidence_data)
 
     def evidence(
         self,

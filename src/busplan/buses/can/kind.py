@@ -1,7 +1,7 @@
 """CAN 2.0 with a CANopen cycle, as a kind of bus."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import (
     Bus,
@@ -30,6 +30,7 @@ from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.can.section import CanProfile
+    from busplan.buses.published import EvidenceSection
 
 _DAVIS: Final = figures.BUS_LOAD.reference
 
@@ -50,6 +51,7 @@ class Can(Bus):
     compared_figures = (figures.BUS_LOAD,)
     table_figures = (figures.BUS_LOAD,)
     latency_table_figures = figures.LATENCY_TABLE
+    has_many_transactions = True
     planned_figures = ("bus_load",)
     facts = ("bit_rate_kbit_s",)
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
@@ -88,6 +90,8 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         "message.identifier": "id",
     }
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second bus"}
+    evidence_data = ("can", "paper")
+    untested = "the cycle"
 
     def profile_model(self) -> "type[CanProfile]":
         """The model of its profiles."""
@@ -134,6 +138,16 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The bit rate."""
         return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
+
+    def evidence(
+        self,
+        networks: Mapping[str, Network],  # noqa: ARG002 - it is asked for frames and messages alone
+        published: Mapping[str, Mapping[str, Any]],
+    ) -> "tuple[EvidenceSection, ...]":
+        """Compare published frames, loads and response times with what the equations give."""
+        from busplan.buses.can.evidence import can_sections  # one command alone asks for it
+
+        return can_sections(published["can"], published["paper"])
 
 
 def _all_nodes(network: Network) -> str:
