@@ -68,20 +68,14 @@ def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
 
 
 def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: str) -> Iterator[Table]:
-    """One row for each transaction; one table for each timing model."""
+    """One row for each transaction; one table for each payload and timing model."""
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
-    for model in dict.fromkeys(one.timing_model for one in result.transactions):
-        rows = tuple(
-            TableRow(
-                (
-                    _name(one),
-                    *(attribute_value(figure, one.phases, at=f"/transactions/{place}") for figure in figures),
-                )
-            )
-            for place, one in enumerate(result.transactions)
-            if one.timing_model == model
-        )
-        yield Table(columns, rows, Sentence((f"By the {model} model in us, {subject}",)), heads=1)
+    tables: dict[tuple[int, str], list[TableRow]] = {}
+    for number, place, one in _numbered(result.transactions):
+        values = (attribute_value(figure, one.phases, at=f"/transactions/{place}") for figure in figures)
+        tables.setdefault((number, one.timing_model), []).append(TableRow((_name(one), *values)))
+    for (_, model), rows in tables.items():
+        yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
 
 
 def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:

@@ -114,6 +114,21 @@ class Limit(NamedTuple):
         return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
 
 
+class Starter(NamedTuple):
+    """What of a new profile is a matter of the kind."""
+
+    bus: str
+    """Section [bus], as TOML without its nodes."""
+    period: str = "1ms"
+    """Communication period, unless another is asked for."""
+    slice_ratio: str = "1            # the whole period is for communication"
+    """Value of cycle.slice_ratio, with a comment."""
+    measure: str = "measure it on a node"
+    """How execution times are found, a format of `file`, the profile, and `group`, an option of `calibrate`."""
+    base: str = "what a node does in each cycle"
+    """What execution.base_us is."""
+
+
 class Cost(IntEnum):
     """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
 
@@ -319,10 +334,8 @@ class Bus(ABC):
     """In the order in which they are reported; at least one grows with the nodes."""
     limits_of: ClassVar[str] = "bus"
     """Who sets them, as a message says it."""
-    starter: ClassVar[str] = ""
-    """Section [bus] of a new profile, as TOML without its nodes."""
-    starter_period: ClassVar[str] = "1ms"
-    """Communication period of a new profile, unless another is asked for."""
+    starter: "ClassVar[Starter]"
+    """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""

@@ -9,6 +9,7 @@ from busplan.buses.bus import (
     Limit,
     PayloadRange,
     Perturbation,
+    Starter,
     TimingModel,
 )
 from busplan.buses.can import figures, rules
@@ -56,11 +57,16 @@ class Can(Bus):
     facts = ("bit_rate_kbit_s",)
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
-    starter = """\
+    starter = Starter(
+        """\
 [bus]
 kind = "can"
-bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m or so"""
-    starter_period = "10ms"
+bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m or so""",
+        period="10ms",
+        slice_ratio="1            # assumed: the host computes in the next cycle with what it has received in this one",
+        measure="measure both on a node: SYNC to its frame, command to effect",
+        base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
+    )
     command_events = (("command", "command_frame"),)
     event_kinds = (
         EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
