@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from busplan.buses.can.constants import BASE_BITS
 from busplan.buses.can.equations import bit_us, frame_bits, frame_us
-from busplan.buses.can.response import Response, Source, worst_response
+from busplan.buses.can.response import Response, Sender, worst_response
 from busplan.buses.published import Comparison, EvidenceSection
 from busplan.elementwise import plain
 
@@ -67,7 +67,7 @@ def _example(title: str, given: Published) -> EvidenceSection:
     """Response times of some messages, and their load where the source has it."""
     rate = given["bit_rate_kbit_s"]
     sources = [
-        Source(_frame_us(size, rate), period_us)
+        Sender(_frame_us(size, rate), period_us)
         for size, period_us in zip(given["payload_bytes"], given["period_us"], strict=True)
     ]
     found = [
@@ -80,18 +80,18 @@ def _example(title: str, given: Published) -> EvidenceSection:
     return EvidenceSection(title, f"{given['source']}.", tuple(found), "can")
 
 
-def _response(sources: Sequence[Source], place: int, rate: int) -> Response | None:
+def _response(sources: Sequence[Sender], place: int, rate: int) -> Response | None:
     blocking_us = max((one.frames_us for one in sources[place + 1 :]), default=0.0)
     return worst_response(sources[place], sources[:place], blocking_us=blocking_us, bit_us=plain(bit_us(rate)))
 
 
-def _load(title: str, given: Published, sources: Sequence[Source]) -> Comparison:
+def _load(title: str, given: Published, sources: Sequence[Sender]) -> Comparison:
     return Comparison(title, "bus load", "1", given["load"], _WORST, sum(one.load for one in sources), given["grade"])
 
 
 def _axes(given: Published) -> EvidenceSection:
     title = f"CAN: the load of {given['axes']} axes at {given['period_us']} us"
-    each = Source(_frame_us(given["payload_bytes"], given["bit_rate_kbit_s"]), given["period_us"])
+    each = Sender(_frame_us(given["payload_bytes"], given["bit_rate_kbit_s"]), given["period_us"])
     return EvidenceSection(title, f"{given['source']}.", (_load(title, given, [each] * (2 * given["axes"])),), "can")
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from busplan.buses.can.constants import SATURATED
 
 
-class Source(NamedTuple):
+class Sender(NamedTuple):
     """Frames that one identifier, or several of one kind, put on the bus."""
 
     frames_us: float
@@ -44,7 +44,7 @@ class Response(NamedTuple):
     """R [us]."""
 
 
-def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float, bit_us: float) -> Response | None:
+def worst_response(own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float) -> Response | None:
     """Find the worst-case response time of one message.
 
     Parameters
@@ -72,7 +72,7 @@ def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float,
     --------
     The second instance is the worst one:
 
-    >>> worst_response(Source(1000, 3500), [Source(1000, 2500), Source(1000, 3500)], blocking_us=0, bit_us=8)
+    >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
     """
     if sum(one.load for one in (own, *higher)) >= SATURATED:
@@ -99,7 +99,7 @@ def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float,
     return worst
 
 
-def settled_us(others_us: float, sources: Sequence[Source]) -> float:
+def settled_us(others_us: float, sources: Sequence[Sender]) -> float:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
@@ -117,7 +117,7 @@ def settled_us(others_us: float, sources: Sequence[Source]) -> float:
 
     Examples
     --------
-    >>> settled_us(900.0, [Source(100, 500)])
+    >>> settled_us(900.0, [Sender(100, 500)])
     1200.0
     """
     load = sum(one.load for one in sources)
