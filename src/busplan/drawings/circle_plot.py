@@ -1,12 +1,10 @@
 """The circle test as a matplotlib figure, as in ballbar reports. Needs the extra `plot`."""
 
-from importlib import import_module
-from importlib.util import find_spec
 from io import BytesIO
 from textwrap import fill
 from typing import TYPE_CHECKING, Final
 
-from busplan.errors import BusplanError
+from busplan.extras import require_extra
 from busplan.forms.numbers import period
 
 if TYPE_CHECKING:
@@ -34,15 +32,7 @@ def require_matplotlib(option: str = "--plot") -> None:
     BusplanError
         The extra `plot` is not installed, or does not load.
     """
-    if find_spec("matplotlib") is None:
-        raise BusplanError(f"{option} needs matplotlib: install it with the extra, as in pip install 'busplan[plot]'")
-    try:
-        import_module("matplotlib.figure")
-    except Exception as error:  # noqa: BLE001 - a broken installation fails in many ways
-        raise BusplanError(
-            f"{option} needs matplotlib, and the installed one does not load ({type(error).__name__}: {error}); "
-            "install it again, as in pip install --force-reinstall matplotlib"
-        ) from None
+    require_extra("matplotlib", extra="plot", option=option, module="matplotlib.figure")
 
 
 def circle_figure(test: "CircleTest", *, file_format: str, note: str = "") -> bytes:

@@ -1,25 +1,29 @@
 """Rows of a sweep as CSV, JSON lines and one JSON document, block by block.
 
-For speed, a value is written once for all rows that share it, and each row is a single join.
+For speed, whole columns are written at a time, and a value once for all rows that share it. A row is a record of texts
+with padding, which is left out at the end.
 """
 
-from collections.abc import Callable, Iterable, Sequence
-from math import isnan
-from typing import Any, Final, Literal
+from collections.abc import Sequence
+from itertools import groupby
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.sweep.blocks import Column, SweepBlock
+from busplan.analysis.sweep.blocks import Column, SweepBlock, Word
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.answers.documents import changed_document, document
 from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
+from busplan.forms.float_texts import Texts, float_texts, unpadded
 from busplan.printable import json_text
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 Style = Literal["csv", "jsonl"]
 TEXT_POINTS: Final = 4096
 """Points of a block written as text: all its cells are in memory at once."""
+_RANGE: Final = 4
+"""Whole numbers within this many times their count are written by their range."""
 
 
 def csv_header(columns: Sequence[str]) -> str:
@@ -39,10 +43,10 @@ def json_header(profile: str, grid: Grid, timing_models: Sequence[str], *, chang
     return facts.removesuffix("}") + ', "rows": [\n'
 
 
-def json_rows(block: SweepBlock, columns: Sequence[str]) -> str:
+def json_rows(block: SweepBlock, columns: Sequence[str]) -> bytes:
     """Write a block's rows for the JSON document, one per line, separated by commas."""
-    rows = block_text(block, columns, style="jsonl").removesuffix("\n").replace("\n", ",\n")
-    return rows if block.chunk.start == 0 else ",\n" + rows
+    rows = block_rows(block, columns, style="jsonl").removesuffix(b"\n").replace(b"\n", b",\n")
+    return rows if block.chunk.start == 0 else b",\n" + rows
 
 
 def json_footer(*, complete: bool) -> str:
@@ -62,8 +66,8 @@ def _facts(profile: str, grid: Grid, timing_models: Sequence[str], changes: KeyC
     return changed_document(facts, changes)
 
 
-def block_text(block: SweepBlock, columns: Sequence[str], *, style: Style) -> str:
-    """Write a block's rows, each with its line end.
+def block_rows(block: SweepBlock, columns: Sequence[str], *, style: Style) -> bytes:
+    """Write a block's rows in UTF-8, each with its line end.
 
     Parameters
     ----------
@@ -74,50 +78,103 @@ def block_text(block: SweepBlock, columns: Sequence[str], *, style: Style) -> st
     style
         "csv" or "jsonl"; values are written as in `capacity --format csv` and `json`.
     """
-    models = [_rows(block, model, columns, style) for model in range(len(block.models))]
-    rows = [""] * (len(models) * block.chunk.points)
+    texts = [_texts_by_model(block.columns(name), style) for name in columns]
+    models = [_rows(own, columns, style, shape=block.chunk.shape) for own in zip(*texts, strict=True)]
+    rows = np.empty((block.chunk.points, len(models)), dtype=max(own.dtype for own in models))
     for number, own in enumerate(models):
-        rows[number :: len(models)] = own
-    return "".join(rows)
+        rows[:, number] = own
+    return unpadded(rows.tobytes())
 
 
-def _rows(block: SweepBlock, model: int, columns: Sequence[str], style: Style) -> Iterable[str]:
-    """Rows of one timing model."""
+class _Cells(NamedTuple):
+    """A column's values as text, each with the same text in front."""
+
+    front: bytes
+    texts: Texts
+    """In the column's own shape."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.texts.shape
+
+
+def _rows(texts: Sequence[Texts], columns: Sequence[str], style: Style, *, shape: tuple[int, ...]) -> Texts:
+    """Rows of one timing model, shape (points,)."""
     separator, opening, closing = (", ", "{", "}\n") if style == "jsonl" else (",", "", "\n")
-    cells: list[Array] = []
-    for name in columns:
-        own = _texts(block.columns(name)[model], style)
-        if style == "jsonl":
-            own = f"{json_text(name)}: " + own
-        # Neighbouring cells of the same shape, smaller than the block, are joined once.
-        if cells and cells[-1].shape == own.shape and own.size < block.chunk.points:
-            cells[-1] = cells[-1] + separator + own
-        else:
-            cells.append(own)
-    cells[0] = opening + cells[0]
-    cells[-1] = cells[-1] + closing
-    flat = (np.broadcast_to(own, block.chunk.shape).ravel().tolist() for own in cells)
-    return map(separator.join, zip(*flat, strict=True))
+    cells = []
+    for number, (name, own) in enumerate(zip(columns, texts, strict=True)):
+        key = f"{json_text(name)}: " if style == "jsonl" else ""
+        cells.append(_Cells(_encoded((separator if number else opening) + key), own))
+    # Neighbouring cells of the same shape, smaller than the block, are joined once.
+    joined: list[_Cells] = []
+    for own_shape, group in groupby(cells, key=lambda one: one.shape):
+        joined += group if own_shape == shape else [_Cells(b"", _trimmed(_joined(list(group))))]
+    end = _Cells(_encoded(closing), np.full((1,) * len(shape), b""))
+    return _joined([*joined, end], shape=shape).ravel()
 
 
-def _texts(column: Column, style: Style) -> Array:
-    """A column's values as text, in the column's own shape."""
-    write = _writer(column, style)
-    texts = np.empty(column.values.size, dtype=object)
-    texts[:] = list(map(write, column.values.ravel().tolist()))
-    return texts.reshape(column.values.shape)
-
-
-def _writer(column: Column, style: Style) -> Callable[[Any], str]:
-    if column.words is not None:
-        words = [
-            json_text(word) if style == "jsonl" else "" if word is None else str(csv_cell(word))
-            for word in column.words
+def _joined(cells: Sequence[_Cells], *, shape: tuple[int, ...] | None = None) -> Texts:
+    """Join cells, one behind the other, in their own or a larger shape."""
+    layout = np.dtype(
+        [
+            (f"{part}_{number}", f"S{max(1, width)}")
+            for number, one in enumerate(cells)
+            for part, width in (("front", len(one.front)), ("text", one.texts.itemsize))
         ]
-        return words.__getitem__
-    if column.values.dtype == bool:
-        return ("false", "true").__getitem__
-    if column.values.dtype.kind == "f" and np.isnan(column.values).any():
-        missing = "null" if style == "jsonl" else ""
-        return lambda value: missing if isnan(value) else repr(value)
-    return repr
+    )
+    records = np.empty(shape or cells[0].shape, dtype=layout)
+    for number, one in enumerate(cells):
+        records[f"front_{number}"] = one.front
+        records[f"text_{number}"] = one.texts
+    texts: Texts = records.view(f"S{layout.itemsize}")
+    return texts
+
+
+def _trimmed(texts: Texts) -> Texts:
+    """Leave out the padding inside of texts."""
+    return np.array([unpadded(one) for one in texts.ravel().tolist()], dtype=bytes).reshape(texts.shape)
+
+
+def _texts_by_model(columns: Sequence[Column], style: Style) -> list[Texts]:
+    """Texts of one column under each timing model; what is the same under several is written once."""
+    found: list[Texts] = []
+    for number, column in enumerate(columns):
+        same = (place for place in range(number) if _is_same(column, columns[place]))
+        place = next(same, None)
+        found.append(_texts(column, style) if place is None else found[place])
+    return found
+
+
+def _is_same(one: Column, other: Column) -> bool:
+    return one.words == other.words and np.array_equal(one.values, other.values)
+
+
+def _texts(column: Column, style: Style) -> Texts:
+    """A column's values as text, in the column's own shape."""
+    values = column.values
+    if column.words is not None:
+        # Words that do not occur would make every cell as long as themselves.
+        counts = np.bincount(values.ravel(), minlength=len(column.words))
+        words = (_word(word, style) if count else "" for word, count in zip(column.words, counts, strict=True))
+        return np.array([_encoded(word) for word in words])[values]
+    if values.dtype == bool:
+        return np.array([b"false", b"true"])[values.astype(np.uint8)]
+    if values.dtype.kind == "f":
+        return float_texts(values.ravel(), missing=b"null" if style == "jsonl" else b"").reshape(values.shape)
+    return _whole_texts(values)
+
+
+def _whole_texts(values: Array) -> Texts:
+    """Write whole numbers."""
+    least, most = int(values.min()), int(values.max())
+    if most - least > _RANGE * values.size:
+        return values.astype(bytes)
+    return np.arange(least, most + 1).astype(bytes)[values - least]
+
+
+def _word(word: Word, style: Style) -> str:
+    return json_text(word) if style == "jsonl" else str(csv_cell(word))
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode("utf-8", "backslashreplace")
