@@ -3,7 +3,7 @@
 import csv
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -12,10 +12,11 @@ from busplan.analysis.capacity.figures import capacity
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
 from busplan.answers.capacity import capacity_records
-from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows, jsonl_header
+from busplan.answers.sweep.rows import SweepTable
 from busplan.answers.sweep.top import Tally, TopRows, sweep_report
+from busplan.answers.sweep.writers import rows_writer
 from busplan.buses.ieee1394.timing import TimingModelName
-from busplan.forms import html, markdown, terminal
+from busplan.forms import RowsForm, html, markdown, terminal
 from busplan.forms.blocks import Report, ShownValue, Table, values_in
 from busplan.forms.columns import sentence_text
 from busplan.forms.csv_rows import to_csv
@@ -39,6 +40,19 @@ def blocks(chunk_points: int = 5) -> list[SweepBlock]:
     return list(sweep(profile, grid, timing_models=BOTH, chunk_points=chunk_points))
 
 
+def written(form: RowsForm, parts: list[SweepBlock], columns: Sequence[str], *, complete: bool = True) -> str:
+    """What a sweep writes of some of its blocks."""
+    profile = load("paper-4ms").profile
+    found: list[bytes] = []
+    table = SweepTable(profile, checked_grid(profile, AXES, with_circle=False), BOTH, tuple(columns))
+    writer = rows_writer(form, table, found.append)
+    writer.begin()
+    for part in parts:
+        writer.join(writer.encode(part))
+    writer.end(complete=complete)
+    return b"".join(found).decode()
+
+
 def points() -> list[tuple[dict[str, object], Profile]]:
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, AXES, with_circle=False)
@@ -49,7 +63,7 @@ def points() -> list[tuple[dict[str, object], Profile]]:
 @pytest.mark.parametrize("chunk_points", [1, 4, 7, 100])
 def test_csv_is_what_capacity_writes_for_each_point(chunk_points: int) -> None:
     columns = (*AXES, *FIGURES)
-    found = csv_header(columns) + "".join(block_text(block, columns, style="csv") for block in blocks(chunk_points))
+    found = written("csv", blocks(chunk_points), columns)
     expected = []
     for changes, profile in points():
         rows = csv.reader(io.StringIO(to_csv(capacity_records(capacity(profile, timing_models=BOTH)))))
@@ -60,7 +74,7 @@ def test_csv_is_what_capacity_writes_for_each_point(chunk_points: int) -> None:
 
 def test_jsonl_is_what_capacity_writes_for_each_point() -> None:
     columns = (*AXES, *FIGURES)
-    lines = "".join(block_text(block, columns, style="jsonl") for block in blocks()).splitlines()
+    _, *lines = written("jsonl", blocks(), columns).splitlines()
     expected = [
         {**changes, **json.loads(to_json(row))}
         for changes, profile in points()
@@ -72,8 +86,7 @@ def test_jsonl_is_what_capacity_writes_for_each_point() -> None:
 
 
 def test_jsonl_begins_with_what_a_reader_must_know() -> None:
-    profile = load("paper-4ms").profile
-    header = json.loads(jsonl_header(profile.name, checked_grid(profile, AXES, with_circle=False), BOTH))
+    header = json.loads(written("jsonl", [], FIGURES))
     assert (header["schema"], header["command"], header["profile"]) == (1, "sweep", "paper-4ms")
     assert (header["points"], header["rows"], header["varied"]["bus.gap_count"]) == (18, 36, 2)
 
@@ -81,32 +94,27 @@ def test_jsonl_begins_with_what_a_reader_must_know() -> None:
 @pytest.mark.parametrize("chunk_points", [1, 5, 100])
 @pytest.mark.parametrize("complete", [True, False])
 def test_the_json_document_holds_the_rows_of_json_lines(chunk_points: int, complete: bool) -> None:
-    profile, columns = load("paper-4ms").profile, (*AXES, *FIGURES)
-    grid, parts = checked_grid(profile, AXES, with_circle=False), blocks(chunk_points)
+    columns, parts = (*AXES, *FIGURES), blocks(chunk_points)
     # A sweep that was stopped has written some of its blocks.
-    written = parts if complete else parts[:1]
-    rows = "".join(json_rows(block, columns) for block in written)
-    document = json.loads(json_header(profile.name, grid, BOTH) + rows + json_footer(complete=complete))
-    lines = "".join(block_text(block, columns, style="jsonl") for block in written).splitlines()
-    assert document.pop("rows") == [json.loads(line) for line in lines]
+    parts = parts if complete else parts[:1]
+    document = json.loads(written("json", parts, columns, complete=complete))
+    header, *lines = map(json.loads, written("jsonl", parts, columns).splitlines())
+    assert document.pop("rows") == lines
     assert document.pop("complete") is complete
-    header = json.loads(jsonl_header(profile.name, grid, BOTH))
     assert header.pop("rows") == 36
     assert document == header
 
 
 def test_a_json_document_without_rows_is_one() -> None:
-    profile = load("paper-4ms").profile
-    grid = checked_grid(profile, AXES, with_circle=False)
-    assert json.loads(json_header(profile.name, grid, BOTH) + json_footer(complete=False))["rows"] == []
+    assert json.loads(written("json", [], FIGURES, complete=False))["rows"] == []
 
 
 def test_what_does_not_exist_is_null_and_empty() -> None:
     (block,) = blocks(100)
     missing = Column(np.full(block.chunk.shape, np.nan))
     holed = block._replace(models=tuple({**one, "phase_margin_deg": missing} for one in block.models))
-    assert '"phase_margin_deg": null}' in block_text(holed, ("fits", "phase_margin_deg"), style="jsonl")
-    assert block_text(holed, ("fits", "phase_margin_deg"), style="csv").splitlines()[0] == "true,"
+    assert '"phase_margin_deg": null}' in written("jsonl", [holed], ("fits", "phase_margin_deg"))
+    assert written("csv", [holed], ("fits", "phase_margin_deg")).splitlines()[1] == "true,"
     top = TopRows(("bus.nodes", "phase_margin_deg"), sort_by="phase_margin_deg", ascending=True, top=3)
     top.add(holed)
     assert top.kept == []
@@ -196,8 +204,7 @@ def reported(*, sort_by: str | None = None, top: int = 7) -> Report:
         parts.append(block._replace(models=tuple({**one, "phase_margin_deg": missing} for one in block.models)))
         tally.add(parts[-1])
         rows.add(parts[-1])
-    text = "".join(json_rows(part, COLUMNS) for part in parts)
-    text = json_header(profile.name, grid, BOTH) + text + json_footer(complete=True)
+    text = written("json", parts, COLUMNS)
     return sweep_report(rows, tally, document=lambda: json.loads(text))
 
 

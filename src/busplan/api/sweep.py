@@ -20,13 +20,14 @@ from busplan.analysis.sweep.circles import (
     with_circles,
 )
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
-from busplan.answers.sweep.rows import block_text, csv_header, json_footer, json_header, json_rows
+from busplan.answers.sweep.rows import SweepTable
 from busplan.answers.sweep.top import CIRCLE_COLUMNS, Tally, TopRows, default_columns, sweep_report
+from busplan.answers.sweep.writers import rows_writer
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
 from busplan.api.renamed import renamed
 from busplan.errors import BusplanError
-from busplan.forms import Form
+from busplan.forms import Form, RowsForm
 from busplan.forms.blocks import Report
 from busplan.forms.csv_rows import spelled
 from busplan.profile.kinds import words_of
@@ -82,14 +83,24 @@ class SweepAnswer(Answer):
 
     def to_json(self) -> str:
         """Write the document of `busplan sweep --format json`."""
-        header = json_header(self.profile.name, self.grid, self.timing_models)
-        rows = "".join(json_rows(block, self.columns) for block in self.blocks)
-        return header + rows + json_footer(complete=True)
+        return self._rows_in("json").decode()
 
     def _text(self, form: Form) -> str:
         if form == "csv":
-            return csv_header(self.columns) + "".join(block_text(one, self.columns, style="csv") for one in self.blocks)
+            return self._rows_in("csv").decode()
         return Answer._text(self, form)  # noqa: SLF001 - super() knows no class with slots made anew
+
+    def _rows_in(self, form: RowsForm) -> bytes:
+        """Every row in a form."""
+        written: list[bytes] = []
+        writer = rows_writer(
+            form, SweepTable(self.profile, self.grid, self.timing_models, self.columns), written.append
+        )
+        writer.begin()
+        for block in self.blocks:
+            writer.join(writer.encode(block))
+        writer.end(complete=True)
+        return b"".join(written)
 
     def _report(self) -> Report:
         circle = [name for name in CIRCLE_COLUMNS if name in self.columns]

@@ -18,10 +18,11 @@ from busplan.cli.options import (
     output_option,
     plot_format,
 )
-from busplan.cli.output import partial_path
+from busplan.cli.output import partial_path, refuse_terminal
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
+from busplan.extras import require_extra
 from busplan.forms import ENDINGS
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl"})
+_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl", ".parquet": "parquet"})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "safe_axes"
 _FIGURE_OF_GROUPS: Final = "margin_corrected_us"
@@ -55,8 +56,8 @@ def sweep_command(
         typer.Option(
             "--format",
             help="Form of the answer: the top rows as a table (text in lines), markdown or html, or every row as csv, "
-            "json (one document) or jsonl (a JSON object a line, the first describes the sweep).  [default: by the "
-            "ending of --output, else table]",
+            "json (one document), jsonl (a JSON object a line, the first describes the sweep) or parquet (typed "
+            "columns; needs the extra table, pyarrow).  [default: by the ending of --output, else table]",
             show_default=False,
         ),
     ] = None,
@@ -126,11 +127,13 @@ def sweep_command(
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
     points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
-    FILE.partial.csv (or .json, .jsonl) and leave FILE as it was. A report: it exits 0 whatever fits.
+    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. A report: it exits 0 whatever fits.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
     form = format_ or _form_of(output)
+    if form == "parquet":
+        _require_parquet(output, typed=format_)
     _require_sense(form, sort=sort, top=top)
     _require_needed("--plot FILE", plot is not None, {"--figure": figure})
     _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None})
@@ -183,9 +186,21 @@ def _form_of(output: Path | None) -> SweepForm:
     if ending == ".npz":
         raise BusplanError(
             f"--output {output}: a sweep writes no NumPy file; in Python, busplan.sweep(...) gives arrays, "
-            "and FILE.csv or FILE.jsonl holds every row"
+            "and FILE.csv, FILE.jsonl or FILE.parquet holds every row"
         )
     return form_of_file(None, output, forms=_ENDINGS, default="table")
+
+
+def _require_parquet(output: Path | None, *, typed: str | None) -> None:
+    """Refuse a table that cannot be written, or that nobody can read."""
+    if output is None:
+        refuse_terminal("parquet")
+    require_extra(
+        "pyarrow",
+        extra="table",
+        option="--format parquet" if typed else f"--output {output}",
+        module="pyarrow.parquet",
+    )
 
 
 def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:

@@ -3,15 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
-from busplan.forms import Form
+from busplan.forms import Form, RowsForm
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-RowsForm = Literal["csv", "json", "jsonl"]
-"""Forms with every row, written during the sweep."""
 SweepForm = Literal[Form, RowsForm]
 ROWS_FORMS: Final = get_args(RowsForm)
 TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in ROWS_FORMS)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
 from busplan.cli.output import CANNOT, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
-from busplan.cli.sweep_job import ROWS_FORMS, TOP_FORMS
+from busplan.cli.sweep_job import TOP_FORMS
 from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import BusplanError, WorkerLostError
 
@@ -53,7 +53,13 @@ def run_sweep(job: "SweepJob") -> None:
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
             sink = sink_for(job, file, tally)
             takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-            lost = _work(job, takers, progress=lambda: (tally.points, expected), stopped=lambda: noted() is not None)
+            lost = _work(
+                job,
+                takers,
+                points=sink.points,
+                progress=lambda: (tally.points, expected),
+                stopped=lambda: noted() is not None,
+            )
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.form not in TOP_FORMS or file is not None:
@@ -78,12 +84,13 @@ def _work(
     job: "SweepJob",
     takers: "Sequence[Callable[[SweepBlock], None]]",
     *,
+    points: int,
     progress: Callable[[], tuple[int, int]],
     stopped: Callable[[], bool],
 ) -> WorkerLostError | None:
     """Pass each block to all takers, until the end or a stop; return the error of a lost worker."""
     try:
-        with progress_bar("sweep") as report, _blocks(job) as blocks:
+        with progress_bar("sweep") as report, _blocks(job, points) as blocks:
             for block in blocks:
                 for take in takers:
                     take(block)
@@ -116,14 +123,12 @@ def _require_circles(job: "SweepJob") -> None:
 
 
 @contextmanager
-def _blocks(job: "SweepJob") -> "Iterator[Iterable[SweepBlock]]":
-    """Blocks of a suitable size."""
-    from busplan.analysis.sweep.blocks import CHUNK_POINTS, sweep
-    from busplan.answers.sweep.rows import TEXT_POINTS
+def _blocks(job: "SweepJob", points: int) -> "Iterator[Iterable[SweepBlock]]":
+    """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
+    from busplan.analysis.sweep.blocks import sweep
 
     if job.jobs is None:
-        chunk_points = TEXT_POINTS if job.form in ROWS_FORMS else CHUNK_POINTS
-        yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=chunk_points)
+        yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=points)
         return
     from busplan.analysis.sweep.circles import run_task, with_circles
 

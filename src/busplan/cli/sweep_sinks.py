@@ -1,23 +1,25 @@
-"""Destinations for the blocks of a sweep: the top rows, rows as text, or one JSON document."""
+"""Destinations for the blocks of a sweep: the top rows, or every row."""
 
-from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol
 
 from busplan.cli.answering import give, report_with
 from busplan.cli.output import document_bytes, emit_document
 from busplan.errors import BusplanError
-from busplan.forms import Form, render
+from busplan.forms import Form, RowsForm, render
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from busplan.analysis.sweep.blocks import SweepBlock
-    from busplan.answers.sweep.rows import Style
     from busplan.answers.sweep.top import Tally
     from busplan.cli.sweep_job import SweepJob
 
 
 class Sink(Protocol):
     """Destination for blocks."""
+
+    points: int
+    """Good size of a block."""
 
     def add(self, block: "SweepBlock") -> None:
         """Add a block."""
@@ -28,26 +30,21 @@ class Sink(Protocol):
 
 def sink_for(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Sink:
     """Make the destination of a sweep."""
-    write = emit_document if file is None else partial(_write, file)
     match job.form:
-        case "csv" | "jsonl":
-            return _LinesSink(job, job.form, write)
-        case "json":
-            return _JsonSink(job, write)
+        case "csv" | "json" | "jsonl" | "parquet":
+            return _RowsSink(job, job.form, emit_document if file is None else file.write)
         case _:
             return _TopSink(job, job.form, file, tally)
-
-
-def _write(file: BinaryIO, text: str) -> None:
-    file.write(document_bytes(text))
 
 
 class _TopSink:
     """Keeps the top rows for an answer at the end."""
 
     def __init__(self, job: "SweepJob", form: Form, file: BinaryIO | None, tally: "Tally") -> None:
+        from busplan.analysis.sweep.blocks import CHUNK_POINTS
         from busplan.answers.sweep.top import TopRows
 
+        self.points = CHUNK_POINTS
         self._job, self._form, self._file, self._tally = job, form, file, tally
         self._rows = TopRows(job.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
         self.add = self._rows.add
@@ -60,52 +57,29 @@ class _TopSink:
         if self._file is None:
             give(report._replace(is_whole=self._job.is_whole), self._form)
         else:
-            _write(self._file, render(report, self._form))
+            self._file.write(document_bytes(render(report, self._form)))
 
 
 def _not_kept() -> NoReturn:
     raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")
 
 
-class _LinesSink:
-    """Writes every row as a line."""
+class _RowsSink:
+    """Writes every row as it comes."""
 
-    def __init__(self, job: "SweepJob", form: "Style", write: Callable[[str], None]) -> None:
-        from busplan.answers.sweep.rows import csv_header, jsonl_header
+    def __init__(self, job: "SweepJob", form: RowsForm, write: "Callable[[bytes], object]") -> None:
+        from busplan.answers.sweep.rows import SweepTable
+        from busplan.answers.sweep.writers import rows_writer
 
-        self._columns, self._form, self._write = job.columns, form, write
-        if form == "csv":
-            write(csv_header(job.columns))
-        else:
-            write(jsonl_header(job.profile.name, job.grid, job.timing_models, changes=job.changes))
-
-    def add(self, block: "SweepBlock") -> None:
-        """Write a block."""
-        from busplan.answers.sweep.rows import block_text
-
-        self._write(block_text(block, self._columns, style=self._form))
-
-    def finish(self, *, complete: bool) -> None:
-        """Do nothing: lines need no end."""
-
-
-class _JsonSink:
-    """Writes one JSON document, block by block."""
-
-    def __init__(self, job: "SweepJob", write: Callable[[str], None]) -> None:
-        from busplan.answers.sweep.rows import json_header
-
-        self._columns, self._write = job.columns, write
-        write(json_header(job.profile.name, job.grid, job.timing_models, changes=job.changes))
+        table = SweepTable(job.profile, job.grid, job.timing_models, job.columns, job.changes)
+        self._writer = rows_writer(form, table, write)
+        self.points = self._writer.points
+        self._writer.begin()
 
     def add(self, block: "SweepBlock") -> None:
         """Write a block."""
-        from busplan.answers.sweep.rows import json_rows
-
-        self._write(json_rows(block, self._columns))
+        self._writer.join(self._writer.encode(block))
 
     def finish(self, *, complete: bool) -> None:
-        """Close the document; a partial one is valid JSON that says so."""
-        from busplan.answers.sweep.rows import json_footer
-
-        self._write(json_footer(complete=complete))
+        """Write what stands behind the rows."""
+        self._writer.end(complete=complete)

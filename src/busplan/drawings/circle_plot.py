@@ -4,6 +4,7 @@ from io import BytesIO
 from textwrap import fill
 from typing import TYPE_CHECKING, Final
 
+from busplan.errors import BusplanError
 from busplan.extras import require_extra
 from busplan.forms.numbers import period
 

@@ -4,10 +4,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of
+from busplan.analysis.sweep.circles import column_figures
 from busplan.analysis.sweep.grid import Array, Values
-from busplan.buses.figure import NODES, PERIOD, Figure, by_key, unit_of
+from busplan.buses.figure import NODES, PERIOD, Figure, unit_of
 from busplan.forms.blocks import figure_value
 from busplan.forms.numbers import SILENT_UNITS, factor_of
 from busplan.profile.kinds import words_of
@@ -16,8 +16,8 @@ from busplan.sections.profile import Profile
 
 _MOST_LABELS: Final = 16
 """Most labels along an axis of choices."""
-_NO_UNITS: Final = ("_per_s", "_mbit_s")
-"""Ends of keys that are no seconds."""
+_NO_UNITS: Final = ("_per_s", "_mbit_s", "_mm_s")
+"""Ends of keys that a label keeps as they are."""
 
 
 class PlotScale(NamedTuple):
@@ -116,13 +116,9 @@ def plotted_figure(profile: Profile, name: str) -> tuple[Figure, float]:
     name
         Name of the column: a figure, or one of a group.
     """
-    figures = by_key((*CIRCLE_FIGURES, *bus_of(profile).capacity_figures))
-    *group, key = name.rsplit(".", 1)
-    figure = figures.get(key)
+    figure = column_figures(profile).get(name)
     if figure is None:
         return Figure(name, name, "", "", key_label(profile, name)), 1.0
-    if group:
-        figure = figure._replace(label=f"{figure.label} of {group[0].removeprefix('group.')}")
     return figure, factor_of(figure_value(figure, 0.0))
 
 

@@ -8,6 +8,8 @@ if TYPE_CHECKING:
     from busplan.forms.blocks import Report
 
 Form = Literal["table", "markdown", "html", "csv", "json"]
+RowsForm = Literal["csv", "json", "jsonl", "parquet"]
+"""Forms with every row of a sweep, written during it."""
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )

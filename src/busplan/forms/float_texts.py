@@ -6,7 +6,7 @@ small numbers, powers of two, what is no number) goes through `repr` itself.
 
 References
 ----------
-Steele and White, How to print floating-point numbers accurately, 1990: the shortest digits inside the rounding interval.
+Steele and White, How to print floating-point numbers accurately, 1990: the shortest digits in the rounding interval.
 """
 
 from math import isnan
@@ -33,6 +33,7 @@ _POWERS_OF_TEN: Final = 10 ** np.arange(19, dtype=np.int64)
 _FLOATS_OF_TEN: Final = _POWERS_OF_TEN.astype(float)
 _POWERS_OF_FIVE: Final = 5 ** np.arange(19, dtype=np.int64)
 _FOUR: Final = 10_000
+_HALF: Final = 5
 
 
 def _words(texts: list[str]) -> NDArray[np.uint32]:
@@ -153,7 +154,7 @@ def _rounded(digits: Any, rest: Any, below: Any, above: Any, *, half: Any) -> An
     off = digits - hundreds * 100
     tens = off // 10
     one = off - tens * 10
-    up = (one > 5) | (one == 5) & ((rest > 0) | (tens & 1 == 1))
+    up = (one > _HALF) | (one == _HALF) & ((rest > 0) | (tens & 1 == 1))
     sixteen = digits - one + 10 * up
     seventeen = digits + ((rest > half) | (rest == half) & (digits & 1 == 1))
     found = np.where(np.where(up, 10 - one <= above, one <= below), sixteen, seventeen)

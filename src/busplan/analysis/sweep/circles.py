@@ -5,12 +5,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from busplan.analysis.capacity.figures import COUNTS
 from busplan.analysis.circle.estimate import NOTHING, announce, estimate
-from busplan.analysis.circle.figures import CIRCLE_BY_KEY
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY, CIRCLE_FIGURES
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
+from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
 from busplan.analysis.sweep.grid import Grid
+from busplan.buses.figure import Figure, by_key
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -36,6 +39,17 @@ Figures = tuple[float | bool | None, ...]
 def all_columns(profile: Profile, grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
     """All columns of a sweep: the varied keys, the figures of `capacity`, and those of circle tests."""
     return (*grid.axes, *figure_names(profile), *(CIRCLE_COLUMNS if with_circle else ()))
+
+
+def column_figures(profile: Profile) -> dict[str, Figure]:
+    """The registered figures of a sweep's columns, those of groups with the name of the group."""
+    found = by_key((*CIRCLE_FIGURES, *bus_of(profile).capacity_figures))
+    groups = {
+        f"group.{one.name}.{key}": found[key]._replace(label=f"{found[key].label} of {one.name}")
+        for one in profile.group
+        for key in COUNTS
+    }
+    return {**found, **groups}
 
 
 class CircleTask(NamedTuple):

@@ -18,6 +18,7 @@ from busplan.forms.csv_rows import csv_cell
 from busplan.forms.float_texts import Texts, float_texts, unpadded
 from busplan.printable import json_text
 from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.sections.profile import Profile
 
 Style = Literal["csv", "jsonl"]
 TEXT_POINTS: Final = 4096
@@ -26,21 +27,44 @@ _RANGE: Final = 4
 """Whole numbers within this many times their count are written by their range."""
 
 
-def csv_header(columns: Sequence[str]) -> str:
+class SweepTable(NamedTuple):
+    """What the rows of a sweep are of."""
+
+    profile: Profile
+    """The network, with its changes."""
+    grid: Grid
+    timing_models: tuple[str, ...]
+    columns: tuple[str, ...]
+    changes: KeyChanges = NO_CHANGES
+
+    @property
+    def facts(self) -> JsonDocument:
+        """What a reader must know besides the rows, and how many there are."""
+        facts = document(
+            "sweep",
+            profile=self.profile.name,
+            varied={key: axis.size for key, axis in self.grid.axes.items()},
+            timing_models=list(self.timing_models),
+            points=self.grid.points,
+            rows=self.grid.points * len(self.timing_models),
+        )
+        return changed_document(facts, self.changes)
+
+
+def csv_header(columns: Sequence[str]) -> bytes:
     """First line of a sweep's CSV."""
-    return ",".join(columns) + "\n"
+    return _encoded(",".join(columns) + "\n")
 
 
-def jsonl_header(profile: str, grid: Grid, timing_models: Sequence[str], *, changes: KeyChanges = NO_CHANGES) -> str:
+def jsonl_header(table: SweepTable) -> bytes:
     """First line of a sweep's JSON lines: what the rows are, and how many a complete sweep has."""
-    facts = {**_facts(profile, grid, timing_models, changes), "rows": grid.points * len(timing_models)}
-    return json_text(facts) + "\n"
+    return _encoded(json_text(table.facts) + "\n")
 
 
-def json_header(profile: str, grid: Grid, timing_models: Sequence[str], *, changes: KeyChanges = NO_CHANGES) -> str:
+def json_header(table: SweepTable) -> bytes:
     """Start of a sweep's JSON document, up to its first row."""
-    facts = json_text(_facts(profile, grid, timing_models, changes))
-    return facts.removesuffix("}") + ', "rows": [\n'
+    facts = {key: value for key, value in table.facts.items() if key != "rows"}
+    return _encoded(json_text(facts).removesuffix("}") + ', "rows": [\n')
 
 
 def json_rows(block: SweepBlock, columns: Sequence[str]) -> bytes:
@@ -49,21 +73,9 @@ def json_rows(block: SweepBlock, columns: Sequence[str]) -> bytes:
     return rows if block.chunk.start == 0 else b",\n" + rows
 
 
-def json_footer(*, complete: bool) -> str:
+def json_footer(*, complete: bool) -> bytes:
     """End of a sweep's JSON document, also of a stopped sweep: valid JSON that says whether it is complete."""
-    return f'\n], "complete": {json_text(complete)}}}\n'
-
-
-def _facts(profile: str, grid: Grid, timing_models: Sequence[str], changes: KeyChanges) -> JsonDocument:
-    """Common beginning of the JSON forms of a sweep."""
-    facts = document(
-        "sweep",
-        profile=profile,
-        varied={key: axis.size for key, axis in grid.axes.items()},
-        timing_models=list(timing_models),
-        points=grid.points,
-    )
-    return changed_document(facts, changes)
+    return _encoded(f'\n], "complete": {json_text(complete)}}}\n')
 
 
 def block_rows(block: SweepBlock, columns: Sequence[str], *, style: Style) -> bytes:
@@ -108,7 +120,8 @@ def _rows(texts: Sequence[Texts], columns: Sequence[str], style: Style, *, shape
     # Neighbouring cells of the same shape, smaller than the block, are joined once.
     joined: list[_Cells] = []
     for own_shape, group in groupby(cells, key=lambda one: one.shape):
-        joined += group if own_shape == shape else [_Cells(b"", _trimmed(_joined(list(group))))]
+        own = list(group)
+        joined += own if own_shape == shape else [_Cells(b"", _trimmed(_joined(own)))]
     end = _Cells(_encoded(closing), np.full((1,) * len(shape), b""))
     return _joined([*joined, end], shape=shape).ravel()
 

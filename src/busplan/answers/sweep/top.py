@@ -9,12 +9,11 @@ import numpy as np
 
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.capacity.figures import COUNTS
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
+from busplan.analysis.sweep.circles import column_figures
 from busplan.analysis.sweep.grid import Array, Grid
-from busplan.buses.bus import Bus
-from busplan.buses.figure import TIMING_MODEL, Figure, by_key
+from busplan.buses.figure import TIMING_MODEL, Figure
 from busplan.forms.blocks import (
     Code,
     JsonDocument,
@@ -248,7 +247,7 @@ def sweep_report(top: TopRows, tally: Tally, *, document: Callable[[], JsonDocum
     """
     return Report(
         Sentence(("Sweep of ", Code(tally.profile.name))),
-        lambda: (*tally.sentences(), _shown(top, tally), top_table(top, tally.bus)),
+        lambda: (*tally.sentences(), _shown(top, tally), top_table(top, tally.profile)),
         document,
         lambda: document()["rows"],
     )
@@ -262,9 +261,9 @@ def _shown(top: TopRows, tally: Tally) -> Sentence:
     return sentence(f"{{}} {words}", total)
 
 
-def top_table(top: TopRows, bus: Bus) -> Table:
+def top_table(top: TopRows, profile: Profile) -> Table:
     """The top rows; headings are the names that --columns and --sort take."""
-    figures = by_key((*CIRCLE_FIGURES, *bus.capacity_figures))
+    figures = column_figures(profile)
     # Columns that were asked for by name stay.
     ranks = _RANKS if all(name in top.columns for name in _RANKS if name not in COUNTS) else {}
     return Table(
