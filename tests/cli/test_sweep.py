@@ -90,7 +90,10 @@ def test_the_top_rows_have_the_forms_for_people(busplan: Run, tmp_path: Path) ->
     assert [row.split(" | ")[0] for row in rows[2:]] == ["| 1", "| 1", "| 2"]
     refused = busplan("sweep", "paper-4ms", *grid, "-o", "rows.out", cwd=tmp_path)
     assert refused.returncode == 2
-    assert "--output rows.out: expected a name ending in .txt, .md, .html, .csv, .json, .jsonl, or" in refused.stderr
+    assert (
+        "--output rows.out: expected a name ending in .txt, .md, .html, .csv, .json, .jsonl, .parquet, "
+        in refused.stderr
+    )
     # The places of the page are those of the JSON, which has all rows in the order of the grid.
     document = json.loads(busplan("sweep", "paper-4ms", *grid[:4], "--format", "json", cwd=tmp_path).stdout)
     page = (tmp_path / "rows.html").read_text(encoding="utf-8")
@@ -200,7 +203,7 @@ REFUSALS = {
     "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",
     "--vary cycle.period_us=1000,1050 --circle": "at cycle.period_us = 1050: step_us = 100.0",
     "--vary bus.nodes=1:9 -o no/such/folder.csv": "there is no folder",
-    "--vary bus.nodes=1:9 -o rows.npz": "in Python, busplan.sweep(...) gives arrays, and FILE.csv or FILE.jsonl holds",
+    "--vary bus.nodes=1:9 -o rows.npz": "in Python, busplan.sweep(...) gives arrays, and FILE.csv, FILE.jsonl or FILE.parquet",
     "--vary bus.nodes=1:9 --format npz": "'npz' is not one of",
     "--vary bus.nodes=0:9": "bus.nodes 0: must be 1 or more",
     "--vary bus.nodes=99999999999999999999999": "bus.nodes 99999999999999999999999: must be 1,000,000 or less",

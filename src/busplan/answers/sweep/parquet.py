@@ -137,7 +137,7 @@ class ParquetWriter:
 
     def __init__(self, table: SweepTable, write: Callable[[bytes], object]) -> None:
         self._schema = table_schema(table)
-        self.encode = partial(encoded, schema=self._schema)
+        self.encode: Callable[[SweepBlock], bytes] = partial(encoded, schema=self._schema)
         self._stream = _Stream(write)
         self._pending: list[pa.Table] = []
 

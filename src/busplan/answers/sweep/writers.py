@@ -6,7 +6,7 @@ and in any order. `join` takes these bytes in the order of the grid and writes t
 
 from collections.abc import Callable
 from functools import partial
-from typing import Literal, Protocol, assert_never
+from typing import Protocol, assert_never
 
 from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.answers.sweep.rows import (
@@ -19,9 +19,8 @@ from busplan.answers.sweep.rows import (
     json_rows,
     jsonl_header,
 )
+from busplan.forms import RowsForm
 
-RowsForm = Literal["csv", "json", "jsonl", "parquet"]
-"""Forms with every row."""
 Write = Callable[[bytes], object]
 Encode = Callable[[SweepBlock], bytes]
 
@@ -29,10 +28,12 @@ Encode = Callable[[SweepBlock], bytes]
 class RowsWriter(Protocol):
     """Writes the rows of a sweep."""
 
-    encode: Encode
-    """Make bytes of a block: it can be pickled, and be called anywhere."""
     points: int
     """Good size of a block."""
+
+    @property
+    def encode(self) -> Encode:
+        """Make bytes of a block: a function that can be pickled, and called anywhere."""
 
     def begin(self) -> None:
         """Write what stands before the rows."""
@@ -82,11 +83,18 @@ class _TextWriter:
 
     points = TEXT_POINTS
 
-    def __init__(self, write: Write, encode: Encode, header: bytes, footer: "Callable[..., bytes]" = _nothing) -> None:
-        self.join, self.encode, self._header, self._footer = write, encode, header, footer
+    def __init__(self, write: Write, encode: Encode, header: bytes, footer: Callable[..., bytes] = _nothing) -> None:
+        self.encode: Encode = encode
+        self._write, self._header, self._footer = write, header, footer
 
     def begin(self) -> None:
-        self.join(self._header)
+        """Write the header."""
+        self._write(self._header)
+
+    def join(self, encoded: bytes) -> None:
+        """Write a block."""
+        self._write(encoded)
 
     def end(self, *, complete: bool) -> None:
-        self.join(self._footer(complete=complete))
+        """Write the footer."""
+        self._write(self._footer(complete=complete))
