@@ -45,7 +45,7 @@ def swept(profile: Profile) -> Report:
         with_circle=False,
     )
     models = model_names(profile)
-    columns = (*grid.axes, "timing_model", *default_columns(profile))
+    columns = (*grid.axes, "timing_model", *default_columns(profile, ()))
     rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(profile, grid, models)
     for block in sweep(profile, grid, timing_models=models):
         rows.add(block)

@@ -203,7 +203,7 @@ REFUSALS = {
     "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",
     "--vary cycle.period_us=1000,1050 --circle": "at cycle.period_us = 1050: step_us = 100.0",
     "--vary bus.nodes=1:9 -o no/such/folder.csv": "there is no folder",
-    "--vary bus.nodes=1:9 -o rows.npz": "in Python, busplan.sweep(...) gives arrays, and FILE.csv, FILE.jsonl or FILE.parquet",
+    "--vary bus.nodes=1:9 -o rows.npz": "gives arrays, and FILE.csv, FILE.jsonl or FILE.parquet holds",
     "--vary bus.nodes=1:9 --format npz": "'npz' is not one of",
     "--vary bus.nodes=0:9": "bus.nodes 0: must be 1 or more",
     "--vary bus.nodes=99999999999999999999999": "bus.nodes 99999999999999999999999: must be 1,000,000 or less",

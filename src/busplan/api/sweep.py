@@ -11,17 +11,19 @@ from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.circles import (
-    MOST_CIRCLES_UNASKED,
     CircleTask,
     Figures,
     all_columns,
     require_circles,
+    require_few,
     run_task,
     with_circles,
 )
+from busplan.analysis.sweep.columns import circle_columns
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
+from busplan.analysis.sweep.seeds import with_seeds, without_seed
 from busplan.answers.sweep.rows import SweepTable
-from busplan.answers.sweep.top import CIRCLE_COLUMNS, Tally, TopRows, default_columns, sweep_report
+from busplan.answers.sweep.top import Tally, TopRows, default_columns, sweep_report
 from busplan.answers.sweep.writers import rows_writer
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
@@ -65,6 +67,8 @@ class SweepAnswer(Answer):
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]
     blocks: tuple[SweepBlock, ...]
+    seeds: int | None = None
+    """Circle tests that a row of a summary is over."""
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
@@ -93,9 +97,8 @@ class SweepAnswer(Answer):
     def _rows_in(self, form: RowsForm) -> bytes:
         """Every row in a form."""
         written: list[bytes] = []
-        writer = rows_writer(
-            form, SweepTable(self.profile, self.grid, self.timing_models, self.columns), written.append
-        )
+        table = SweepTable(self.profile, self.grid, self.timing_models, self.columns, seeds=self.seeds)
+        writer = rows_writer(form, table, written.append)
         writer.begin()
         for block in self.blocks:
             writer.join(writer.encode(block))
@@ -103,10 +106,9 @@ class SweepAnswer(Answer):
         return b"".join(written)
 
     def _report(self) -> Report:
-        circle = [name for name in CIRCLE_COLUMNS if name in self.columns]
-        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.profile), *circle))
+        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.profile, self.columns)))
         top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
-        tally = Tally(self.profile, self.grid, self.timing_models)
+        tally = Tally(self.profile, self.grid, self.timing_models, seeds=self.seeds)
         for block in self.blocks:
             top.add(block)
             tally.add(block)
@@ -135,6 +137,7 @@ def sweep(
     vary: Mapping[str, str | Iterable[object]],
     timing_model: Models | None = None,
     circle: bool = False,
+    summary: bool = False,
     force: bool = False,
 ) -> SweepAnswer:
     """Compute capacity over a grid: any keys of the profile, every combination.
@@ -151,6 +154,9 @@ def sweep(
         the paper's equations as published, and "standard" for the standard's clock and packets.
     circle
         Also run the circle test of every point, and add its columns (errors in mm, margins).
+    summary
+        With `circle` and values of delivery.seed: a row for each point of the other keys, with mean, sample standard
+        deviation, 95 % quantile and worst of each figure of the circle over the seeds, and the share that failed.
     force
         Allow more than 1,000 circle tests.
 
@@ -191,6 +197,11 @@ def sweep(
         option="vary",
         circle_option="circle=True",
     )
+    seeds = None
+    if summary:
+        if not circle:
+            raise BusplanError("summary=True: goes with circle=True")
+        grid, seeds = without_seed(grid, option="summary=True")
     if grid.points > MOST_POINTS:
         raise BusplanError(
             f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
@@ -198,10 +209,17 @@ def sweep(
         )
     models = grid_models(network, grid, asked, name="timing_model")
     blocks = analysis.sweep(network, grid, timing_models=models)
+    count = 1 if seeds is None else seeds.size
     if circle:
-        _require_circles(network, grid, force=force)
+        if not force:
+            require_few(grid, seeds=count, option="circle", consent="force=True")
+        require_circles(network, grid, seeds=count)
+    if seeds is not None:
+        blocks = (with_seeds(network, block, seeds, run=_run_here) for block in blocks)
+    elif circle:
         blocks = (with_circles(network, block, run=_run_here) for block in blocks)
-    return SweepAnswer(network, grid, models, all_columns(network, grid, with_circle=circle), tuple(blocks))
+    columns = all_columns(network, grid, circle=circle_columns(circle=circle, summary=summary))
+    return SweepAnswer(network, grid, models, columns, tuple(blocks), None if seeds is None else count)
 
 
 def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
@@ -232,15 +250,6 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
         if isinstance(given, range)
         else listed(items(given, name=name), name=name, words=words)
     )
-
-
-def _require_circles(profile: Profile, grid: Grid, *, force: bool) -> None:
-    if grid.points > MOST_CIRCLES_UNASKED and not force:
-        raise BusplanError(
-            f"circle: {grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run "
-            "without force=True; vary less, or give it"
-        )
-    require_circles(profile, grid)
 
 
 def _run_here(tasks: Iterable[CircleTask]) -> Iterable[Figures]:

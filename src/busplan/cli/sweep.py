@@ -110,6 +110,14 @@ def sweep_command(
             "--circle", help="Also run the circle test of every point, and add its columns (errors in mm, margins)."
         ),
     ] = False,
+    summary: Annotated[
+        bool,
+        typer.Option(
+            "--summary",
+            help="With --circle and --vary delivery.seed=1:1000: one row for all seeds, with mean, standard deviation, "
+            "95 % and worst of each figure of the circle, and the share of seeds that fail.",
+        ),
+    ] = False,
     jobs: Annotated[
         int | None,
         typer.Option(
@@ -136,7 +144,7 @@ def sweep_command(
         _require_parquet(output, typed=format_)
     _require_sense(form, sort=sort, top=top)
     _require_needed("--plot FILE", plot is not None, {"--figure": figure})
-    _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None})
+    _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None, "--summary": summary or None})
     for option, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{option} {number}: must be 1 or more")
@@ -144,7 +152,9 @@ def sweep_command(
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
     file_format = None if plot is None else plot_format(plot)
+    from busplan.analysis.sweep.columns import circle_columns
     from busplan.analysis.sweep.grid import checked_grid, grid_models
+    from busplan.analysis.sweep.seeds import without_seed
     from busplan.cli.sweep_run import available_processors, run_sweep
 
     loaded = load_changed(profile, changes)
@@ -153,18 +163,21 @@ def sweep_command(
         for key in axes:
             require_separate(one, key, typed=f"--vary {key}")
     grid = checked_grid(loaded, axes, with_circle=circle)
+    grid, seeds = without_seed(grid, option="--summary") if summary else (grid, None)
+    of_circle = circle_columns(circle=circle, summary=summary)
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
     drawn = figure or (_FIGURE_OF_GROUPS if loaded.group else _DEFAULT_FIGURE)
-    _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=circle)
+    _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=of_circle)
     run_sweep(
         SweepJob(
             profile=loaded,
             changes=changes,
             grid=grid,
+            seeds=seeds,
             timing_models=grid_models(loaded, grid, None if timing == ALL_MODELS else [timing], name="--timing"),
-            columns=_columns(loaded, columns, grid, circle=circle, short=form in TOP_FORMS, sort_by=sort_by),
+            columns=_columns(loaded, columns, grid, circle=of_circle, short=form in TOP_FORMS, sort_by=sort_by),
             form=form,
             output=output,
             top=top or _DEFAULT_TOP,
@@ -218,25 +231,25 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
             raise BusplanError(f"{option}: goes with {needed}")
 
 
-def _require_number(profile: "Profile", grid: "Grid", asked: dict[str, str | None], *, circle: bool) -> None:
+def _require_number(profile: "Profile", grid: "Grid", asked: dict[str, str | None], *, circle: tuple[str, ...]) -> None:
     """Refuse a column that does not exist or is not numeric."""
     from busplan.analysis.sweep.blocks import word_figures
     from busplan.analysis.sweep.circles import all_columns
 
     words = {*word_figures(profile), *(key for key, axis in grid.axes.items() if axis.has_words)}
-    numbers = [name for name in all_columns(profile, grid, with_circle=circle) if name not in words]
+    numbers = [name for name in all_columns(profile, grid, circle=circle) if name not in words]
     for option, name in asked.items():
         if name is not None and name not in numbers:
             raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
 
 
 def _columns(
-    profile: "Profile", asked: str | None, grid: "Grid", *, circle: bool, short: bool, sort_by: str
+    profile: "Profile", asked: str | None, grid: "Grid", *, circle: tuple[str, ...], short: bool, sort_by: str
 ) -> tuple[str, ...]:
     """Columns to write: the varied keys and timing_model, then those asked for, or all, or the main ones."""
     from busplan.analysis.sweep.circles import all_columns
 
-    known = all_columns(profile, grid, with_circle=circle)
+    known = all_columns(profile, grid, circle=circle)
     front = (*grid.axes, "timing_model")
     if asked is not None:
         chosen = tuple(name.strip() for name in asked.split(","))
@@ -244,9 +257,9 @@ def _columns(
             if name not in known:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
     elif short:
-        from busplan.answers.sweep.top import CIRCLE_COLUMNS, default_columns
+        from busplan.answers.sweep.top import default_columns
 
-        chosen = default_columns(profile) + (CIRCLE_COLUMNS if circle else ())
+        chosen = default_columns(profile, circle)
     else:
         chosen = known
     return tuple(dict.fromkeys((*front, *chosen, *([sort_by] if sort_by else []))))

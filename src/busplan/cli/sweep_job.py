@@ -7,7 +7,7 @@ from busplan.forms import Form, RowsForm
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.grid import Grid
+    from busplan.analysis.sweep.grid import Grid, Values
     from busplan.sections.profile import Profile
 
 SweepForm = Literal[Form, RowsForm]
@@ -23,6 +23,9 @@ class SweepJob(NamedTuple):
     changes: KeyChanges
     """KeyChanges of the profile, applied."""
     grid: "Grid"
+    """Of the points of the rows."""
+    seeds: "Values | None"
+    """Seeds that each row is over; None without --summary."""
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]
     form: SweepForm
@@ -39,3 +42,8 @@ class SweepJob(NamedTuple):
     """Processes for circle tests; None without circle tests."""
     force: bool
     """If True, allow any number of circle tests."""
+
+    @property
+    def tests(self) -> int | None:
+        """Seeds of each row; None without --summary."""
+        return None if self.seeds is None else self.seeds.size

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import islice
 from typing import TYPE_CHECKING, Final
 
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
@@ -10,16 +11,21 @@ from busplan.cli.output import CANNOT, new_file, partial_path, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.sweep_job import TOP_FORMS
 from busplan.cli.sweep_sinks import sink_for
-from busplan.errors import BusplanError, WorkerLostError
+from busplan.errors import WorkerLostError
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.blocks import SweepBlock
+    from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.cli.sweep_job import SweepJob
     from busplan.cli.workers import Map
     from busplan.drawings.sweep_plot import FigureData
 
 _CIRCLES_AT_ONCE: Final = 4
 """Points that each process tests between two checks for signals."""
+
+
+class _BetweenTestsError(Exception):
+    """A signal came between the circle tests of one point, which is left out."""
 
 
 def available_processors() -> int:
@@ -44,7 +50,7 @@ def run_sweep(job: "SweepJob") -> None:
     drawing = _drawing(job)
     if job.jobs is not None:
         _require_circles(job)
-    tally = Tally(job.profile, job.grid, job.timing_models)
+    tally = Tally(job.profile, job.grid, job.timing_models, seeds=job.tests)
     expected = tally.expected
     with ExitStack() as stack:
         with signals_noted() as noted:
@@ -57,7 +63,7 @@ def run_sweep(job: "SweepJob") -> None:
                 job,
                 takers,
                 points=sink.points,
-                progress=lambda: (tally.points, expected),
+                progress=lambda: (tally.points * (job.tests or 1), expected * (job.tests or 1)),
                 stopped=lambda: noted() is not None,
             )
         complete = tally.points == expected
@@ -89,14 +95,22 @@ def _work(
     stopped: Callable[[], bool],
 ) -> WorkerLostError | None:
     """Pass each block to all takers, until the end or a stop; return the error of a lost worker."""
+
+    def before_tests(done: int) -> None:
+        report(done, progress()[1])
+        if stopped():
+            raise _BetweenTestsError
+
     try:
-        with progress_bar("sweep") as report, _blocks(job, points) as blocks:
+        with progress_bar("sweep") as report, _blocks(job, points, before_tests) as blocks:
             for block in blocks:
                 for take in takers:
                     take(block)
                 report(*progress())
                 if stopped():
                     break
+    except _BetweenTestsError:
+        return None
     except WorkerLostError as error:
         return error
     return None
@@ -112,18 +126,15 @@ def _drawing(job: "SweepJob") -> "FigureData | None":
 
 
 def _require_circles(job: "SweepJob") -> None:
-    from busplan.analysis.sweep.circles import MOST_CIRCLES_UNASKED, require_circles
+    from busplan.analysis.sweep.circles import require_circles, require_few
 
-    if job.grid.points > MOST_CIRCLES_UNASKED and not job.force:
-        raise BusplanError(
-            f"--circle: {job.grid.points:,} points are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are "
-            "run without --force; vary less, or give it"
-        )
-    require_circles(job.profile, job.grid)
+    if not job.force:
+        require_few(job.grid, seeds=job.tests or 1, option="--circle", consent="--force")
+    require_circles(job.profile, job.grid, seeds=job.tests or 1)
 
 
 @contextmanager
-def _blocks(job: "SweepJob", points: int) -> "Iterator[Iterable[SweepBlock]]":
+def _blocks(job: "SweepJob", points: int, before_tests: Callable[[int], None]) -> "Iterator[Iterable[SweepBlock]]":
     """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
     from busplan.analysis.sweep.blocks import sweep
 
@@ -131,10 +142,28 @@ def _blocks(job: "SweepJob", points: int) -> "Iterator[Iterable[SweepBlock]]":
         yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=points)
         return
     from busplan.analysis.sweep.circles import run_task, with_circles
+    from busplan.analysis.sweep.seeds import with_seeds
 
-    few = sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=_CIRCLES_AT_ONCE * job.jobs)
-    with mapper(min(job.jobs, job.grid.points)) as map_:
-        yield (with_circles(job.profile, block, run=lambda tasks: map_(run_task, tasks)) for block in few)
+    at_once = _CIRCLES_AT_ONCE * job.jobs
+    seeds = job.seeds
+    few = sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=at_once if seeds is None else 1)
+    with mapper(min(job.jobs, job.grid.points * (job.tests or 1))) as map_:
+        done = 0
+
+        def run(tasks: "Iterable[CircleTask]") -> "Iterator[Figures]":
+            nonlocal done
+            left = iter(tasks)
+            while batch := list(islice(left, at_once)):
+                before_tests(done)
+                yield from map_(run_task, batch)
+                done += len(batch)
+
+        yield (
+            with_circles(job.profile, block, run=run)
+            if seeds is None
+            else with_seeds(job.profile, block, seeds, run=run)
+            for block in few
+        )
 
 
 @contextmanager

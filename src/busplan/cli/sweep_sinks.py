@@ -71,7 +71,7 @@ class _RowsSink:
         from busplan.answers.sweep.rows import SweepTable
         from busplan.answers.sweep.writers import rows_writer
 
-        table = SweepTable(job.profile, job.grid, job.timing_models, job.columns, job.changes)
+        table = SweepTable(job.profile, job.grid, job.timing_models, job.columns, job.changes, job.tests)
         self._writer = rows_writer(form, table, write)
         self.points = self._writer.points
         self._writer.begin()

@@ -32,6 +32,8 @@ def require_drawable(grid: Grid) -> None:
         More than two keys vary, there are too many points, or matplotlib is not installed.
     """
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
+    if not grid.axes:
+        raise BusplanError("--plot: draws figures over one or two keys, and none varies but the seed; vary another")
     if len(varied) > _MAX_KEYS:
         raise BusplanError(f"--plot: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
     if grid.points > MAX_DRAWN:

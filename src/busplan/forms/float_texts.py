@@ -49,9 +49,11 @@ _BEHIND: Final = _words([text.rstrip("0") for text in _FULL] + _FULL)
 """Four digits of a fraction: the last, without trailing zeros, and before others."""
 _TENTHS: Final = np.concatenate((_words(["0"]), _BEHIND[1:]))
 """The first four, where a single zero stays."""
+_FRACTION: Final = tuple(f"fraction_{place}" for place in range(4))
+"""Fields of a fraction's first sixteen digits."""
 _LAYOUT: Final = np.dtype(
     [("sign", "S1"), ("thousands", "u4"), ("units", "u4"), ("point", "S1")]
-    + [(f"fraction_{place}", "u4") for place in range(4)]
+    + [(name, "u4") for name in _FRACTION]
     + [("last", "u4")]
 )
 
@@ -114,7 +116,7 @@ def _written(values: NDArray[np.float64], size: NDArray[np.float64]) -> Texts:
     texts["thousands"] = _BEFORE[thousands]
     texts["units"] = _UNITS[whole - thousands * _FOUR + _FOUR * (thousands > 0)]
     table, scale = _TENTHS, 10**14
-    for name in _LAYOUT.names[4:-1]:
+    for name in _FRACTION:
         four = fraction // scale
         fraction = fraction - four * scale
         texts[name] = table[four + _FOUR * (fraction > 0)]

@@ -5,15 +5,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.capacity.figures import COUNTS
 from busplan.analysis.circle.estimate import NOTHING, announce, estimate
-from busplan.analysis.circle.figures import CIRCLE_BY_KEY, CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
-from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
 from busplan.analysis.sweep.grid import Grid
-from busplan.buses.figure import Figure, by_key
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -36,20 +33,9 @@ _TRUTHS: Final = (None, False, True)
 Figures = tuple[float | bool | None, ...]
 
 
-def all_columns(profile: Profile, grid: Grid, *, with_circle: bool) -> tuple[str, ...]:
-    """All columns of a sweep: the varied keys, the figures of `capacity`, and those of circle tests."""
-    return (*grid.axes, *figure_names(profile), *(CIRCLE_COLUMNS if with_circle else ()))
-
-
-def column_figures(profile: Profile) -> dict[str, Figure]:
-    """The registered figures of a sweep's columns, those of groups with the name of the group."""
-    found = by_key((*CIRCLE_FIGURES, *bus_of(profile).capacity_figures))
-    groups = {
-        f"group.{one.name}.{key}": found[key]._replace(label=f"{found[key].label} of {one.name}")
-        for one in profile.group
-        for key in COUNTS
-    }
-    return {**found, **groups}
+def all_columns(profile: Profile, grid: Grid, *, circle: Sequence[str]) -> tuple[str, ...]:
+    """All columns of a sweep: the varied keys, the figures of `capacity`, and `circle`, those of circle tests."""
+    return (*grid.axes, *figure_names(profile), *circle)
 
 
 class CircleTask(NamedTuple):
@@ -65,8 +51,42 @@ def run_task(task: CircleTask) -> Figures:
     return tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
 
 
-def require_circles(profile: Profile, grid: Grid) -> None:
+def require_few(grid: Grid, *, seeds: int = 1, option: str, consent: str) -> None:
+    """Refuse more circle tests than anyone runs by mistake.
+
+    Parameters
+    ----------
+    grid
+        The points.
+    seeds
+        Circle tests of each point.
+    option, consent
+        What requests circle tests, and what allows any number, for messages.
+
+    Raises
+    ------
+    BusplanError
+        There are too many.
+    """
+    if grid.points * seeds > MOST_CIRCLES_UNASKED:
+        many = f"{grid.points:,} points" if seeds == 1 else f"{grid.points:,} points with {seeds:,} seeds each"
+        raise BusplanError(
+            f"{option}: {many} are more circle tests than the {MOST_CIRCLES_UNASKED:,} that are run without {consent}; "
+            "vary less, or give it"
+        )
+
+
+def require_circles(profile: Profile, grid: Grid, *, seeds: int = 1) -> None:
     """Refuse a grid with a point whose circle test cannot be run, before any is run; say what a long sweep costs.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    grid
+        The points.
+    seeds
+        Circle tests of each point.
 
     Raises
     ------
@@ -86,7 +106,7 @@ def require_circles(profile: Profile, grid: Grid) -> None:
         except BusplanError as error:
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
             raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None
-    announce(cost)
+    announce(cost._replace(steps=seeds * cost.steps, time_s=seeds * cost.time_s))
 
 
 def with_circles(

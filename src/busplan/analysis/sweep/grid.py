@@ -129,6 +129,9 @@ class Grid(NamedTuple):
             In row-major order.
         """
         sizes = [axis.size for axis in self.axes.values()]
+        if not sizes:
+            yield self._chunk(0, [])
+            return
         # Find the axis to cut: a chunk has all values of the axes after it and one value of each axis before it.
         cut, behind = len(sizes) - 1, 1
         while cut and behind * sizes[cut] <= most:

@@ -18,7 +18,7 @@ from pyarrow.parquet import ParquetWriter as FileWriter
 
 from busplan import __version__
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.circles import column_figures
+from busplan.analysis.sweep.columns import column_figures
 from busplan.analysis.sweep.grid import Array, Values
 from busplan.answers.sweep.rows import SweepTable
 from busplan.buses.figure import Figure, Sort, unit_of

@@ -36,6 +36,8 @@ class SweepTable(NamedTuple):
     timing_models: tuple[str, ...]
     columns: tuple[str, ...]
     changes: KeyChanges = NO_CHANGES
+    seeds: int | None = None
+    """Circle tests that a point's row summarises; None where there is no summary."""
 
     @property
     def facts(self) -> JsonDocument:
@@ -46,6 +48,7 @@ class SweepTable(NamedTuple):
             varied={key: axis.size for key, axis in self.grid.axes.items()},
             timing_models=list(self.timing_models),
             points=self.grid.points,
+            **({} if self.seeds is None else {"seeds": self.seeds}),
             rows=self.grid.points * len(self.timing_models),
         )
         return changed_document(facts, self.changes)
@@ -120,8 +123,8 @@ def _rows(texts: Sequence[Texts], columns: Sequence[str], style: Style, *, shape
     # Neighbouring cells of the same shape, smaller than the block, are joined once.
     joined: list[_Cells] = []
     for own_shape, group in groupby(cells, key=lambda one: one.shape):
-        own = list(group)
-        joined += own if own_shape == shape else [_Cells(b"", _trimmed(_joined(own)))]
+        alike = list(group)
+        joined += alike if own_shape == shape else [_Cells(b"", _trimmed(_joined(alike)))]
     end = _Cells(_encoded(closing), np.full((1,) * len(shape), b""))
     return _joined([*joined, end], shape=shape).ravel()
 
@@ -181,8 +184,10 @@ def _whole_texts(values: Array) -> Texts:
     """Write whole numbers."""
     least, most = int(values.min()), int(values.max())
     if most - least > _RANGE * values.size:
-        return values.astype(bytes)
-    return np.arange(least, most + 1).astype(bytes)[values - least]
+        found: Texts = values.astype(bytes)
+    else:
+        found = np.arange(least, most + 1).astype(bytes)[values - least]
+    return found
 
 
 def _word(word: Word, style: Style) -> str:

@@ -11,8 +11,9 @@ from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.capacity.figures import COUNTS
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
-from busplan.analysis.sweep.circles import column_figures
+from busplan.analysis.sweep.columns import column_figures
 from busplan.analysis.sweep.grid import Array, Grid
+from busplan.answers.sweep.seeds import SeedTally
 from busplan.buses.figure import TIMING_MODEL, Figure
 from busplan.forms.blocks import (
     Code,
@@ -48,14 +49,28 @@ _RANKS: Final[Mapping[str, int]] = MappingProxyType(
 """Default figures of a table, each with its `TableColumn.rank`."""
 CIRCLE_COLUMNS: Final = ("mean_contour_error_mm", "max_contour_error_mm", "phase_margin_deg", "passed")
 """Default figures of circle tests."""
+SUMMARY_COLUMNS: Final = (
+    *("failed_share", "failed_share_high", "max_contour_error_mean_mm"),
+    *("max_contour_error_std_mm", "max_contour_error_p95_mm", "max_contour_error_worst_mm"),
+)
+"""Default figures of a summary over seeds."""
 
 
-def default_columns(profile: Profile) -> tuple[str, ...]:
-    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole."""
+def default_columns(profile: Profile, circle: Collection[str]) -> tuple[str, ...]:
+    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    circle
+        All columns of circle tests.
+    """
+    of_circle = (key for key in (*CIRCLE_COLUMNS, *SUMMARY_COLUMNS) if key in circle)
     if not profile.group:
-        return tuple(_RANKS)
+        return (*_RANKS, *of_circle)
     whole = (key for key in _RANKS if key not in COUNTS)
-    return (*whole, *(f"group.{one.name}.safe_nodes" for one in profile.group))
+    return (*whole, *(f"group.{one.name}.safe_nodes" for one in profile.group), *of_circle)
 
 
 class Tally:
@@ -69,9 +84,11 @@ class Tally:
         Values of its keys.
     timing_models
         The timing models, in the order of the rows of a point.
+    seeds
+        Circle tests that a point's row summarises; None where there is no summary.
     """
 
-    def __init__(self, profile: Profile, grid: Grid, timing_models: Sequence[str]) -> None:
+    def __init__(self, profile: Profile, grid: Grid, timing_models: Sequence[str], *, seeds: int | None = None) -> None:
         self.points = 0
         self.profile = profile
         self.expected = grid.points
@@ -82,6 +99,7 @@ class Tally:
         self._unsafe = 0
         self._passed: list[int] | None = None
         self._unjudged = 0
+        self._seeds = None if seeds is None else SeedTally(seeds)
 
     @property
     def rows(self) -> int:
@@ -106,6 +124,8 @@ class Tally:
             self._passed = [old + new for old, new in zip(before, passed, strict=True)]
             # A circle is the same under every model.
             self._unjudged += _share(block.models[0]["passed"].are_missing, points)
+        if self._seeds is not None:
+            self._seeds.add(block)
 
     def sentences(self) -> Iterator[Sentence]:
         """Summary of the counts."""
@@ -125,6 +145,8 @@ class Tally:
                 Sentence((".",)),
                 by="",
             )
+        if self._seeds is not None:
+            yield from self._seeds.sentences()
         yield from payload_sentences(self.profile, self._varied)
         safety = self.bus.safety_figure
         if self._unsafe and safety is not None:
