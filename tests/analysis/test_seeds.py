@@ -84,7 +84,7 @@ def test_the_seed_leaves_the_grid_wherever_it_stands() -> None:
         {"delivery.seed": seeds, "cycle.period_us": periods},
         {"cycle.period_us": periods, "delivery.seed": seeds},
     ):
-        assert without_seed(Grid(dict(axes)), option="--summary") == (Grid({"cycle.period_us": periods}), seeds)
+        assert without_seed(Grid(axes), option="--summary") == (Grid({"cycle.period_us": periods}), seeds)
     alone, _ = without_seed(Grid({"delivery.seed": seeds}), option="--summary")
     assert (alone.points, [chunk.points for chunk in alone.chunks(7)]) == (1, [1])
     with pytest.raises(BusplanError, match=r"--summary: is over seeds, and none vary"):
