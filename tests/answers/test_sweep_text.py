@@ -113,7 +113,7 @@ def test_blocks_may_be_encoded_elsewhere_and_in_any_order(form: str) -> None:
         writer.begin()
         # What another process gets and gives back is pickled.
         encode = pickle.loads(pickle.dumps(writer.encode)) if elsewhere else writer.encode
-        encoded = {index: encode(parts[index]) for index in (reversed if elsewhere else iter)(range(len(parts)))}  # type: ignore[operator]
+        encoded = {index: encode(parts[index]) for index in (reversed if elsewhere else iter)(range(len(parts)))}
         for index in range(len(parts)):
             writer.join(encoded[index])
         writer.end(complete=True)
