@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, Figures
 from busplan.analysis.sweep.columns import circle_columns, column_figures
-from busplan.analysis.sweep.grid import Grid, Listed, Steps
+from busplan.analysis.sweep.grid import Grid, Listed, Steps, Values
 from busplan.analysis.sweep.seeds import SUMMARY_COLUMNS, summary, without_seed
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
@@ -80,10 +80,11 @@ def test_what_any_seed_lacks_is_missing() -> None:
 
 def test_the_seed_leaves_the_grid_wherever_it_stands() -> None:
     seeds, periods = Steps(1, 1, 1, 9), Listed((1000, 4000))
-    for axes in (
+    orders: list[dict[str, Values]] = [
         {"delivery.seed": seeds, "cycle.period_us": periods},
         {"cycle.period_us": periods, "delivery.seed": seeds},
-    ):
+    ]
+    for axes in orders:
         assert without_seed(Grid(axes), option="--summary") == (Grid({"cycle.period_us": periods}), seeds)
     alone, _ = without_seed(Grid({"delivery.seed": seeds}), option="--summary")
     assert (alone.points, [chunk.points for chunk in alone.chunks(7)]) == (1, [1])
