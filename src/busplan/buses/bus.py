@@ -245,6 +245,11 @@ class BusCycle(ABC):
         """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
         return total(term.us for term in self.terms)
 
+    @property
+    def most_required_us(self) -> Number:
+        """No less than it needs with any number of nodes up to its own, where one more can make it shorter [us]."""
+        return self.required_us
+
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
         """What the whole cycle grows by if what it transmits takes longer [us].
 

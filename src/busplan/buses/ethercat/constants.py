@@ -8,9 +8,9 @@ from typing import Final, Literal
 from busplan.sourced import Grade, Sourced, constants
 
 Port = Literal["100BASE-TX", "E-bus"]
-Command = Literal["LRW", "LRD+LWR"]
+Command = Literal["LRW", "LRD-LWR"]
 LRW: Final[Command] = "LRW"
-SPLIT: Final[Command] = "LRD+LWR"
+SPLIT: Final[Command] = "LRD-LWR"
 
 _ETHERNET: Final = "IEEE 802.3"
 _ETG: Final = "ETG.1000; SOEM, ethercattype.h"

@@ -47,7 +47,7 @@ class Ethercat(Bus):
     starter = """\
 [bus]
 kind = "ethercat"
-command = "LRW"            # assumed: inputs and outputs share their bytes; "LRD+LWR" where a device cannot
+command = "LRW"            # assumed: inputs and outputs share their bytes; "LRD-LWR" where a device cannot
 distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
 master_us = 50             # assumed: the master's own time, from its task to the wire and back"""
     event_kinds = (
@@ -112,7 +112,7 @@ master_us = 50             # assumed: the master's own time, from its task to th
         bus = network.profile.bus
         clocks = f"SYNC0 at {bus.sync_shift:.0%} of the period" if bus.distributed_clocks else "no distributed clocks"
         cycles = f"{bus.pipeline_cycles} cycle{'s' * (bus.pipeline_cycles != 1)} in the master"
-        return ", ".join(("worst case of a command, of feedback and of a loop over both", cycles, clocks))
+        return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
 
     def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - never
         """No device keeps a frame waiting: their own time is in latencies alone."""

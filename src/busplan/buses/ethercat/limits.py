@@ -16,7 +16,8 @@ def _largest_device(network: Network) -> Number:
 
 
 def _longest_cable(network: Network) -> Number:
-    return reduce(larger, (one.node.cable_m for one in network.groups))
+    lengths_m: list[Number] = [one.node.cable_m for one in network.groups]
+    return reduce(larger, lengths_m)
 
 
 LIMITS: Final = (

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from busplan.buses.ethercat.constants import DATAGRAM_BYTES
 from busplan.buses.ethercat.equations import padding_bytes, room_bytes
-from busplan.elementwise import Number, choose, larger, rounded_down, rounded_up, smaller
+from busplan.elementwise import Number, choose, larger, plain, rounded_down, rounded_up, smaller
 
 
 class Devices(NamedTuple):
@@ -28,6 +28,8 @@ class Packing(NamedTuple):
     """What fills short frames [bytes]."""
     last_bytes: Number
     """Datagrams of the last frame [bytes]."""
+    before_bytes: Number
+    """Datagrams of the frame before it; 0 where there is none [bytes]."""
 
 
 def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Packing:
@@ -50,7 +52,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> P
     Examples
     --------
     >>> pack([Devices(1000, 4)], datagrams=1, first_bytes=0.0)
-    Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1048.0)
+    Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1044.0, before_bytes=1496.0)
     """
     room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
     free: Number = 0.0
@@ -58,6 +60,7 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> P
     present: Number = 0.0
     total: Number = first_bytes
     padding: Number = 0.0
+    before: Number = 0.0
     if first_bytes:
         # The first device may have no room beside it, and then it goes alone.
         has_room = devices[0].data_bytes <= room - first_bytes
@@ -73,10 +76,11 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> P
         new = rounded_up(behind / each)
         in_last = (behind - (larger(new, 1) - 1) * each) * one.data_bytes
         opens = behind > 0
+        before = choose(opens, choose(new > 1, headers + each * one.data_bytes, present), before)
         padding = padding + choose(opens, padding_bytes(present), 0.0)
         present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
         frames, total = frames + new, total + new * headers + one.number * one.data_bytes
-    return Packing(frames, total, padding + padding_bytes(present), present)
+    return Packing(frames, total, padding + padding_bytes(present), present, before)
 
 
 class Frame(NamedTuple):
@@ -98,7 +102,7 @@ def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float)
     room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
     held: list[int] = []
     opened, filled = first_bytes, 0.0
-    sizes = [float(one.data_bytes) for one in devices for _ in range(int(one.number))]  # type: ignore[arg-type]
+    sizes = [plain(one.data_bytes) for one in devices for _ in range(int(plain(one.number)))]
     for device, size in enumerate(sizes, start=1):
         if filled + size > room - opened and (held or opened):
             yield Frame(tuple(held), opened + bool(held) * headers + filled)

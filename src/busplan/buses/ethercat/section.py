@@ -24,7 +24,7 @@ class EthercatBus(BusSection):
     nodes: Count | None = Field(default=None, description="Devices N, the master not counted", examples=[8])
     command: Command = Field(
         default=LRW,
-        description="Commands of the process data: LRW, inputs and outputs of a device share their bytes; LRD+LWR, "
+        description="Commands of the process data: LRW, inputs and outputs of a device share their bytes; LRD-LWR, "
         "they do not",
         examples=[LRW],
     )

@@ -97,7 +97,8 @@ def process_us(network: Network) -> Number:
 def mailbox_us(network: Network) -> Number:
     """Frames of all mailbox polls, each with a frame of its own [us]."""
     bus = network.profile.bus
-    return bus.mailbox_polls * mailbox_frame_us(network)
+    polls: Number = bus.mailbox_polls
+    return polls * mailbox_frame_us(network)
 
 
 def mailbox_frame_us(network: Network) -> Number:
