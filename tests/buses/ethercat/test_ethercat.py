@@ -22,6 +22,7 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.profile.write import profile_text
 from busplan.sections.profile import Profile
 
 Run = Callable[..., Any]
@@ -223,12 +224,12 @@ def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[st
 
 
 def test_a_plan_may_let_inputs_and_outputs_share_their_bytes(run: Run, tmp_path: Path) -> None:
-    done = run(
-        "plan", "ethercat-servo-8", "--set", "bus.command=LRD-LWR", "--nodes", "300", "--free", "command",
-        "--format", "json", "--no-circle", cwd=tmp_path,
-    )  # fmt: skip
+    path = tmp_path / "press.toml"
+    path.write_text(profile_text(override(load("ethercat-servo-8").profile, {"bus.command": "LRD-LWR"})))
+    options = ("--nodes", "300", "--free", "command", "--no-circle", "--format", "json")
+    done = run("plan", path.name, *options, cwd=tmp_path)
     assert done.returncode == 0, done
-    assert '"bus.command": "LRW"' in done.stdout
+    assert json.loads(done.stdout)["recommended_changes"]["bus.command"] == "LRW"
 
 
 @pytest.mark.parametrize(

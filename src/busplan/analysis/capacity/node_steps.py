@@ -66,9 +66,10 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     network = network_of(profile).asking(group)
     counts = np.arange(1, most + 1)
     cycle = bus.cycle(network.with_nodes(counts), model=model)
-    needed_us = np.broadcast_to(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us, counts.shape)
+    needed_us = np.asarray(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us)
     said, ratio = network.asked_nodes, profile.cycle.slice_ratio
-    return NodeSteps(model, said.node.axes, tuple((needed_us / ratio).tolist()), limit, is_safe, int(said.nodes))
+    from_us = np.broadcast_to(needed_us / ratio, counts.shape).tolist()
+    return NodeSteps(model, said.node.axes, tuple(from_us), limit, is_safe, int(said.nodes))
 
 
 def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:

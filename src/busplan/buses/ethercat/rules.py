@@ -12,7 +12,7 @@ def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
     if profile.asks_for_circle and not profile.bus.distributed_clocks:
         yield RuleProblem(
             "bus.distributed_clocks",
-            "without them each drive takes its set-point when its frame passes: the axes of a circle are apart",
+            "without them each drive acts when its frame passes, one after the other",
             "set bus.distributed_clocks = true if the drives have them",
             ("bus.distributed_clocks = true",),
         )
@@ -26,8 +26,8 @@ def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
         taken, sync0 = told_apart(one.command_us, one.sync0_us)
         yield RuleProblem(
             "bus.sync_shift",
-            f"the last command is taken at {taken} us, behind SYNC0 at {sync0} us: it takes effect a cycle later",
-            "a larger share moves SYNC0 back; or fewer bytes, or a faster master",
+            f"the last command is taken at {taken} us, behind SYNC0 at {sync0} us",
+            "it takes effect a cycle later; a larger share moves SYNC0 back",
         )
 
 
