@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, TimingModel
+from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.ethercat import figures, rules
 from busplan.buses.ethercat.constants import CONSTANTS, LRW, MAILBOX_BYTES, PIPELINE_CYCLES, SPLIT, SYNC_SHIFT
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
@@ -41,15 +41,21 @@ class Ethercat(Bus):
     compared_figures = figures.OWN
     table_figures = figures.OWN
     latency_table_figures = figures.LATENCY_TABLE
+    has_many_transactions = True
     planned_figures = ("frames",)
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
-    starter = """\
+    starter = Starter(
+        """\
 [bus]
 kind = "ethercat"
 command = "LRW"            # assumed: inputs and outputs share their bytes; "LRD-LWR" where a device cannot
 distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
-master_us = 50             # assumed: the master's own time, from its task to the wire and back"""
+master_us = 50             # assumed: the master's own time, from its task to the wire and back""",
+        slice_ratio="1            # assumed: the master computes in the next cycle with what it has received in this one",
+        measure="measure both on a drive: SYNC0 to its feedback, frame to command taken; no frame waits for them",
+        base="from SYNC0 to feedback, and from the frame to a command that is taken",
+    )
     event_kinds = (
         EventKind("master", "master", "profile", "M", "contention"),
         EventKind("overhead", "frame overhead", figures.FRAME, "f", "gap"),
@@ -91,6 +97,7 @@ master_us = 50             # assumed: the master's own time, from its task to th
     )
     evidence_data = ("ethercat",)
     evidence_profiles = ("ethercat-servo-8",)
+    untested = "the cycle"
 
     def profile_model(self) -> "type[EthercatProfile]":
         """The model of its profiles."""
