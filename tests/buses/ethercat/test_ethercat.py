@@ -236,7 +236,7 @@ def test_a_plan_may_let_inputs_and_outputs_share_their_bytes(run: Run, tmp_path:
     ("changes", "words"),
     [
         ({"bus.command": "APRW"}, "LRW"),
-        ({"bus.sync_shift": 1.0}, "below 1|less than 1"),
+        ({"bus.sync_shift": 1.0}, "0.999 or less"),
         ({"bus.mailbox_bytes": 1487}, "1,486 or less"),
         ({"node.port": "fibre"}, "E-bus"),
     ],

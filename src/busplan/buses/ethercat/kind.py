@@ -52,7 +52,7 @@ kind = "ethercat"
 command = "LRW"            # assumed: inputs and outputs share their bytes; "LRD-LWR" where a device cannot
 distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
 master_us = 50             # assumed: the master's own time, from its task to the wire and back""",
-        slice_ratio="1            # assumed: the master computes in the next cycle with what it has received in this one",
+        slice_ratio="1            # assumed: the master computes in the next cycle with what it received in this one",
         measure="measure both on a drive: SYNC0 to its feedback, frame to command taken; no frame waits for them",
         base="from SYNC0 to feedback, and from the frame to a command that is taken",
     )

@@ -34,9 +34,9 @@ class EthercatBus(BusSection):
         "act at SYNC0",
         examples=[True],
     )
-    sync_shift: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] = Field(
+    sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(SYNC_SHIFT),
-        description="Where SYNC0 lies in the cycle, a share of the period behind the start of the frames, 0..1; read "
+        description="Where SYNC0 lies in the cycle, a share of the period behind the start of the frames, 0..0.999; read "
         "with distributed clocks",
         examples=[0.5],
     )
