@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
-from busplan.buses.ethercat.equations import FRAME_BYTES, frame_bytes, sending_us
+from busplan.buses.ethercat.equations import frame_bytes, overhead_bytes, sending_us
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Packing
 from busplan.buses.ethercat.traffic import (
@@ -49,7 +49,7 @@ class EthercatCycle(BusCycle):
     def _overhead_bytes(self) -> Number:
         found = self.packing
         headers = found.datagrams_bytes - self.process_bytes
-        return named(found.frames, "frames", "F") * FRAME_BYTES + headers + found.padding_bytes
+        return named(found.frames, "frames", "F") * overhead_bytes(found.frames) + headers + found.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:

@@ -14,10 +14,8 @@ from busplan.buses.ethercat.constants import (
     MOST_FRAME_BYTES,
     PREAMBLE_BYTES,
 )
-from busplan.elementwise import Number, choose, larger
+from busplan.elementwise import Number, alike, choose, larger, plain
 
-FRAME_BYTES: Final = float(PREAMBLE_BYTES + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES)
-"""Bytes of a frame on the wire beside its datagrams: 40."""
 _BOTH_WAYS: Final = 2
 
 
@@ -37,6 +35,22 @@ def datagram_bytes(data_bytes: Number) -> Number:
     return data_bytes + DATAGRAM_BYTES
 
 
+def overhead_bytes(like: Number) -> Number:
+    """Bytes of a frame on the wire beside its datagrams and padding: preamble, headers, check and gap [bytes].
+
+    Parameters
+    ----------
+    like
+        A number that they are computed with, which says of what sort they are.
+
+    Examples
+    --------
+    >>> overhead_bytes(1)
+    40.0
+    """
+    return alike(PREAMBLE_BYTES, like) + ETHERNET_BYTES + HEADER_BYTES + CHECK_BYTES + GAP_BYTES
+
+
 def padding_bytes(datagrams_bytes: Number) -> Number:
     """Bytes that fill a frame up to the shortest one; 0 of a frame that holds nothing [bytes].
 
@@ -50,7 +64,7 @@ def padding_bytes(datagrams_bytes: Number) -> Number:
     >>> padding_bytes(20), padding_bytes(100), padding_bytes(0)
     (24.0, 0.0, 0.0)
     """
-    short: Number = larger(LEAST_FRAME_BYTES - (datagrams_bytes + FRAME_BYTES), 0.0)
+    short: Number = larger(LEAST_FRAME_BYTES - (datagrams_bytes + overhead_bytes(datagrams_bytes)), 0.0)
     return choose(datagrams_bytes > 0, short, 0.0)
 
 
@@ -67,7 +81,7 @@ def frame_bytes(datagrams_bytes: Number) -> Number:
     >>> frame_bytes(datagram_bytes(125)), frame_bytes(datagram_bytes(1)), frame_bytes(datagram_bytes(1486))
     (177.0, 84.0, 1538.0)
     """
-    return datagrams_bytes + FRAME_BYTES + padding_bytes(datagrams_bytes)
+    return datagrams_bytes + overhead_bytes(datagrams_bytes) + padding_bytes(datagrams_bytes)
 
 
 def room_bytes(datagrams: int) -> float:
@@ -83,7 +97,7 @@ def room_bytes(datagrams: int) -> float:
     >>> room_bytes(1), room_bytes(2)
     (1486.0, 1474.0)
     """
-    return float(MOST_FRAME_BYTES - FRAME_BYTES - datagrams * DATAGRAM_BYTES)
+    return plain(MOST_FRAME_BYTES - plain(overhead_bytes(1)) - datagrams * DATAGRAM_BYTES)
 
 
 def sending_us(wire_bytes: Number) -> Number:

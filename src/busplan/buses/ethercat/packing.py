@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from busplan.buses.ethercat.constants import DATAGRAM_BYTES
 from busplan.buses.ethercat.equations import padding_bytes, room_bytes
-from busplan.elementwise import Number, choose, larger, plain, rounded_down, rounded_up, smaller
+from busplan.elementwise import Number, alike, choose, is_off, larger, plain, rounded_down, rounded_up, smaller, total
 
 
 class Devices(NamedTuple):
@@ -32,7 +32,7 @@ class Packing(NamedTuple):
     """Datagrams of the frame before it; 0 where there is none [bytes]."""
 
 
-def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Packing:
+def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> Packing:
     """Share out devices among frames.
 
     Parameters
@@ -54,19 +54,20 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> P
     >>> pack([Devices(1000, 4)], datagrams=1, first_bytes=0.0)
     Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1044.0, before_bytes=1496.0)
     """
-    room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
+    room = room_bytes(datagrams)
+    headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
     free: Number = 0.0
     frames: Number = 0
     present: Number = 0.0
-    total: Number = first_bytes
+    whole: Number = first_bytes
     padding: Number = 0.0
     before: Number = 0.0
-    if first_bytes:
+    if not is_off(first_bytes):
         # The first device may have no room beside it, and then it goes alone.
-        has_room = devices[0].data_bytes <= room - first_bytes
+        has_room = room - first_bytes - devices[0].data_bytes >= 0
         free = choose(has_room, room - first_bytes, 0.0)
         present = first_bytes + choose(has_room, headers, 0.0)
-        total = present
+        whole = present
         frames = 1
     for one in devices:
         beside = smaller(one.number, rounded_down(free / one.data_bytes))
@@ -79,8 +80,8 @@ def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> P
         before = choose(opens, choose(new > 1, headers + each * one.data_bytes, present), before)
         padding = padding + choose(opens, padding_bytes(present), 0.0)
         present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
-        frames, total = frames + new, total + new * headers + one.number * one.data_bytes
-    return Packing(frames, total, padding + padding_bytes(present), present, before)
+        frames, whole = frames + new, whole + new * headers + one.number * one.data_bytes
+    return Packing(frames, whole, padding + padding_bytes(present), present, before)
 
 
 class Frame(NamedTuple):

@@ -36,7 +36,7 @@ class EthercatBus(BusSection):
     )
     sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(SYNC_SHIFT),
-        description="Where SYNC0 lies in the cycle, a share of the period behind the start of the frames, 0..0.999; read "
+        description="Where SYNC0 lies in the cycle, a share of the period from the start of the frames, 0..0.999; read "
         "with distributed clocks",
         examples=[0.5],
     )

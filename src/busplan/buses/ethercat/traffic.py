@@ -4,16 +4,16 @@ from typing import NamedTuple
 
 from busplan.buses.ethercat.constants import CLOCK_BYTES, DELAY_UNCERTAINTY_US, DELAY_US, LRW
 from busplan.buses.ethercat.equations import (
-    FRAME_BYTES,
     cable_us,
     datagram_bytes,
     device_us,
     frame_bytes,
+    overhead_bytes,
     sending_us,
 )
 from busplan.buses.ethercat.packing import Devices, Frame, Packing, frames_of, pack
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, larger, plain, total
+from busplan.elementwise import Number, alike, larger, named, plain, total
 
 
 class Hop(NamedTuple):
@@ -37,9 +37,9 @@ def datagrams(network: Network) -> int:
 
 def data_bytes(group: Group, network: Network) -> Number:
     """Bytes of one device in a frame: the larger of input and output, or both [bytes]."""
-    if is_shared(network):
-        return larger(group.read_bytes, group.write_bytes)
-    return group.read_bytes + group.write_bytes
+    both = group.read_bytes, group.write_bytes
+    found = larger(*both) if is_shared(network) else total(both)
+    return named(found, "device_bytes", f"d{group.name and f',{group.name}'}")
 
 
 def devices(network: Network) -> tuple[Devices, ...]:
@@ -47,9 +47,9 @@ def devices(network: Network) -> tuple[Devices, ...]:
     return tuple(Devices(one.nodes, data_bytes(one, network)) for one in network.groups)
 
 
-def clock_bytes(network: Network) -> float:
+def clock_bytes(network: Network) -> Number:
     """The datagram of the distributed clocks, which opens the first frame; 0 without them [bytes]."""
-    return plain(datagram_bytes(CLOCK_BYTES)) if network.profile.bus.distributed_clocks else 0.0
+    return datagram_bytes(alike(CLOCK_BYTES, network.nodes)) if network.profile.bus.distributed_clocks else 0.0
 
 
 def packing(network: Network) -> Packing:
@@ -59,13 +59,13 @@ def packing(network: Network) -> Packing:
 
 def frames(network: Network) -> tuple[Frame, ...]:
     """The same frames one by one, of plain numbers."""
-    return tuple(frames_of(devices(network), datagrams=datagrams(network), first_bytes=clock_bytes(network)))
+    return tuple(frames_of(devices(network), datagrams=datagrams(network), first_bytes=plain(clock_bytes(network))))
 
 
 def hop(group: Group) -> Hop:
     """What each device of a group adds to the way."""
     node = group.node
-    delay_us = DELAY_US[node.port] if node.delay_us is None else node.delay_us
+    delay_us = alike(DELAY_US[node.port], group.nodes) if node.delay_us is None else node.delay_us
     return Hop(group.nodes, device_us(delay_us), cable_us(node.cable_m))
 
 
@@ -91,7 +91,7 @@ def cables_us(network: Network) -> Number:
 def process_us(network: Network) -> Number:
     """All frames of process data on the wire [us]."""
     found = packing(network)
-    return sending_us(found.frames * FRAME_BYTES + found.datagrams_bytes + found.padding_bytes)
+    return sending_us(found.frames * overhead_bytes(found.frames) + found.datagrams_bytes + found.padding_bytes)
 
 
 def mailbox_us(network: Network) -> Number:
