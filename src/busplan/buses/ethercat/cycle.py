@@ -7,7 +7,7 @@ from typing import Final, Literal
 from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.ethercat.equations import frame_bytes, overhead_bytes, sending_us
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
-from busplan.buses.ethercat.packing import Packing
+from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
     cables_us,
     data_bytes,
@@ -36,20 +36,24 @@ class EthercatCycle(BusCycle):
         self.counts_reception = model == VENDORS
 
     @cached_property
+    def _devices(self) -> tuple[Devices, ...]:
+        return devices(self.network)
+
+    @cached_property
     def packing(self) -> Packing:
         """All frames of process data."""
-        return packing(self.network)
+        return packing(self.network, self._devices)
 
     @cached_property
     def process_bytes(self) -> Number:
         """Process data of all devices [bytes]."""
-        return total(one.number * one.data_bytes for one in devices(self.network))
+        return named(total(one.number * one.data_bytes for one in self._devices), "process_bytes", "D")
 
     @cached_property
     def _overhead_bytes(self) -> Number:
         found = self.packing
         headers = found.datagrams_bytes - self.process_bytes
-        return named(found.frames, "frames", "F") * overhead_bytes(found.frames) + headers + found.padding_bytes
+        return found.frames * overhead_bytes(found.frames) + headers + found.padding_bytes
 
     @cached_property
     def _receive_us(self) -> Number:

@@ -29,9 +29,10 @@ def latencies(network: Network) -> tuple[BusLatency, ...]:
     network
         The network; its numbers may be of any sort.
     """
+    sent_us, way_us = process_us(network), _way_us(network)
     found = []
     for one in network.groups:
-        there, back = _command(one, network), _feedback(one, network)
+        there, back = _command(one, network, sent_us, way_us), _feedback(one, network, sent_us, way_us)
         # The master's pipeline begins with the cycle that brings the feedback.
         both = {**there, "drive_us": back["drive_us"] + there["drive_us"], "frame_wait_us": back["frame_wait_us"]}
         for name, phases in (("command", there), ("feedback", back), ("loop", both)):
@@ -39,39 +40,43 @@ def latencies(network: Network) -> tuple[BusLatency, ...]:
     return tuple(found)
 
 
-def command_us(group: Group, network: Network) -> Number:
-    """When the last device of a group may have taken its command, from the start of the cycle [us]."""
-    on_wire_us = process_us(network) + (devices_us(network) + cables_us(network)) / 2
-    taken_us: Number = network.profile.bus.master_us + on_wire_us + group.write_execution_us + group.worst_extra_us
-    return taken_us
-
-
 def last_command_us(network: Network) -> Number:
     """When the last device has taken its command, from the start of the cycle [us]."""
-    return reduce(larger, (command_us(one, network) for one in network.groups))
+    sent_us, way_us = process_us(network), _way_us(network)
+    return reduce(larger, (_taken_us(one, network, sent_us, way_us) for one in network.groups))
 
 
-def _command(group: Group, network: Network) -> dict[str, Number]:
+def _way_us(network: Network) -> Number:
+    """Delay of devices and cables to the last device and back [us]."""
+    return named(devices_us(network) + cables_us(network), "way_us", "way")
+
+
+def _taken_us(group: Group, network: Network, sent_us: Number, way_us: Number) -> Number:
+    """When the last device of a group may have taken its command, from the start of the cycle [us]."""
+    taken_us = network.profile.bus.master_us + sent_us + way_us / 2 + group.write_execution_us + group.worst_extra_us
+    return named(taken_us, "command_us", "t_cmd")
+
+
+def _command(group: Group, network: Network, sent_us: Number, way_us: Number) -> dict[str, Number]:
     """From the cycle whose feedback it rests on to its effect."""
     bus = network.profile.bus
-    sent_us, way_us = process_us(network), (devices_us(network) + cables_us(network)) / 2
-    arrived_us = command_us(group, network)
+    taken_us = _taken_us(group, network, sent_us, way_us)
     wait_us: Number = 0.0
     if bus.distributed_clocks:
-        late = larger(rounded_up((arrived_us - sync0_us(network)) / network.period_us), 0)
-        wait_us = sync0_us(network) + late * network.period_us - arrived_us
+        late = larger(rounded_up((taken_us - sync0_us(network)) / network.period_us), 0)
+        wait_us = sync0_us(network) + late * network.period_us - taken_us
     return {
         "drive_us": group.write_execution_us + group.worst_extra_us,
         "frame_wait_us": 0.0,
         "pipeline_us": named(bus.pipeline_cycles * network.period_us, "pipeline_us", "n T_s"),
         "master_us": bus.master_us,
         "sending_us": sent_us,
-        "path_us": way_us,
+        "path_us": way_us / 2,
         "sync_wait_us": wait_us,
     }
 
 
-def _feedback(group: Group, network: Network) -> dict[str, Number]:
+def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -> dict[str, Number]:
     """From the sample to the start of the cycle whose frame takes it, and until the master has all frames."""
     ready_us = group.read_execution_us + group.worst_extra_us
     behind_us = sync0_us(network) + ready_us
@@ -81,8 +86,8 @@ def _feedback(group: Group, network: Network) -> dict[str, Number]:
         "frame_wait_us": wait_us,
         "pipeline_us": 0.0,
         "master_us": network.profile.bus.master_us,
-        "sending_us": process_us(network) + mailbox_us(network),
-        "path_us": devices_us(network) + cables_us(network),
+        "sending_us": sent_us + mailbox_us(network),
+        "path_us": way_us,
         "sync_wait_us": 0.0,
     }
 

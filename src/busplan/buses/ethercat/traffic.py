@@ -1,5 +1,6 @@
 """What a network sends in a cycle, and how long it takes on its way."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from busplan.buses.ethercat.constants import CLOCK_BYTES, DELAY_UNCERTAINTY_US, DELAY_US, LRW
@@ -52,9 +53,14 @@ def clock_bytes(network: Network) -> Number:
     return datagram_bytes(alike(CLOCK_BYTES, network.nodes)) if network.profile.bus.distributed_clocks else 0.0
 
 
-def packing(network: Network) -> Packing:
-    """All frames of its process data."""
-    return pack(devices(network), datagrams=datagrams(network), first_bytes=clock_bytes(network))
+def packing(network: Network, each: Sequence[Devices]) -> Packing:
+    """All frames of its process data, of all its devices."""
+    found = pack(each, datagrams=datagrams(network), first_bytes=clock_bytes(network))
+    return found._replace(
+        frames=named(found.frames, "frames", "F"),
+        datagrams_bytes=named(found.datagrams_bytes, "datagrams_bytes", "G"),
+        padding_bytes=named(found.padding_bytes, "padding_bytes", "pad"),
+    )
 
 
 def frames(network: Network) -> tuple[Frame, ...]:
@@ -90,8 +96,9 @@ def cables_us(network: Network) -> Number:
 
 def process_us(network: Network) -> Number:
     """All frames of process data on the wire [us]."""
-    found = packing(network)
-    return sending_us(found.frames * overhead_bytes(found.frames) + found.datagrams_bytes + found.padding_bytes)
+    found = packing(network, devices(network))
+    wire_bytes = found.frames * overhead_bytes(found.frames) + found.datagrams_bytes + found.padding_bytes
+    return named(sending_us(wire_bytes), "sending_us", "sending")
 
 
 def mailbox_us(network: Network) -> Number:
