@@ -59,14 +59,16 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     >>> steps.max_axes(1000.0)
     16
     """
-    longest, bus = override(profile, {"cycle.period_us": MAX_TIME_US}), bus_of(profile)
+    bus = bus_of(profile)
+    longest = override(profile, {"cycle.period_us": min(MAX_TIME_US, bus.periods.longest_us)})
     is_safe = model == bus.deciding_model
     most, limit = safe_nodes(longest, group=group) if is_safe else largest_nodes(longest, model=model, group=group)
     network = network_of(profile).asking(group)
     cycles = (bus.cycle(network.with_nodes(nodes), model=model) for nodes in range(1, most + 1))
     needed_us = (plain(certainty(one).safe_required_us if is_safe else one.required_us) for one in cycles)
     said, ratio = network.asked_nodes, profile.cycle.slice_ratio
-    return NodeSteps(model, said.node.axes, tuple(us / ratio for us in needed_us), limit, is_safe, int(said.nodes))
+    from_us = tuple(plain(bus.periods.from_us(us / ratio)) for us in needed_us)
+    return NodeSteps(model, said.node.axes, from_us, limit, is_safe, int(said.nodes))
 
 
 def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:

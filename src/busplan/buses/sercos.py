@@ -1,0 +1,59 @@
+"""What SERCOS I, II and III share: how long feedback and a command are on their way."""
+
+from collections.abc import Callable
+from functools import reduce
+from typing import Final
+
+from busplan.buses.bus import BusLatency
+from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
+from busplan.buses.network import Group, Network
+from busplan.elementwise import Number, larger, total
+
+_CYCLE: Final = "cycle"
+DELAYS: Final = (
+    Figure(
+        "node_us",
+        "t_node",
+        "profile",
+        "slowest node: from its sample to its telegram, or from its command to the effect",
+        "in the node",
+    ),
+    Figure("before_us", "t_before", _CYCLE, "what the cycle sends before it", "before it in the cycle"),
+    Figure("telegrams_us", "t_tel", _CYCLE, "telegrams that carry it", "its telegrams"),
+    Figure("ring_us", "t_ring", _CYCLE, "delay of the ring", "ring"),
+    Figure("delay_us", "t", _CYCLE, "from sample to host, or from the start of the cycle to the effect", "delay"),
+)
+"""In the order in which they add up."""
+LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *DELAYS)
+
+
+def delays(
+    network: Network, *, feedback_us: Number, command_us: Number, before_us: Number, ring_us: Number
+) -> tuple[BusLatency, ...]:
+    """How old feedback is when the host has it, and how late a command takes effect.
+
+    Parameters
+    ----------
+    network
+        The network; its nodes sample at once, and take their commands over at once.
+    feedback_us, command_us
+        Telegrams that carry them [us].
+    before_us
+        What the cycle sends before the commands [us].
+    ring_us
+        Delay of the ring [us].
+    """
+    return (
+        _delay("feedback", _slowest(network, lambda one: one.read_execution_us), 0.0, feedback_us, ring_us),
+        _delay("command", _slowest(network, lambda one: one.write_execution_us), before_us, command_us, ring_us),
+    )
+
+
+def _slowest(network: Network, execution_us: Callable[[Group], Number]) -> Number:
+    return reduce(larger, (execution_us(one) + one.worst_extra_us for one in network.groups))
+
+
+def _delay(name: str, *parts_us: Number) -> BusLatency:
+    *parts, whole = DELAYS
+    phases = dict(zip((one.key for one in parts), parts_us, strict=True))
+    return BusLatency(name, None, {**phases, whole.key: total(parts_us)})
