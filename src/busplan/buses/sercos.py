@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import reduce
-from typing import Final
+from typing import Final, TypeAlias
 
 from busplan.buses.bus import BusLatency
 from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
@@ -24,11 +24,12 @@ DELAYS: Final = (
     Figure("delay_us", "t", _CYCLE, "from sample to host, or from the start of the cycle to the effect", "delay"),
 )
 """In the order in which they add up."""
+Sent: TypeAlias = tuple[Number, Number]
 LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *DELAYS)
 
 
 def delays(
-    network: Network, *, feedback_us: Number, command_us: Number, before_us: Number, ring_us: Number
+    network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0
 ) -> tuple[BusLatency, ...]:
     """How old feedback is when the host has it, and how late a command takes effect.
 
@@ -37,15 +38,13 @@ def delays(
     network
         The network; its nodes sample at once, and take their commands over at once.
     feedback_us, command_us
-        Telegrams that carry them [us].
-    before_us
-        What the cycle sends before the commands [us].
+        What the cycle sends before them, and the telegrams that carry them [us].
     ring_us
         Delay of the ring [us].
     """
     return (
-        _delay("feedback", _slowest(network, lambda one: one.read_execution_us), 0.0, feedback_us, ring_us),
-        _delay("command", _slowest(network, lambda one: one.write_execution_us), before_us, command_us, ring_us),
+        _delay("feedback", _slowest(network, lambda one: one.read_execution_us), *feedback_us, ring_us),
+        _delay("command", _slowest(network, lambda one: one.write_execution_us), *command_us, ring_us),
     )
 
 

@@ -1,6 +1,6 @@
 """Derive the figures of `latency` by calling the functions of the bus with traced numbers."""
 
-from math import isinf
+from math import inf
 
 from busplan.analysis.derivation.inputs import traced_profile
 from busplan.analysis.derivation.origin import Input, short
@@ -49,7 +49,7 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
 
 def if_finite(number: Number) -> Number:
     """A figure, or None with the inputs of an infinite one, which does not exist."""
-    if isinstance(number, Traced) and isinf(number.value):
+    if isinstance(number, Traced) and number.value == inf:
         return result_of(None, "does not exist", (number,))
     return number
 

@@ -106,9 +106,8 @@ class Sercos3Cycle(BusCycle):
         """How old feedback is when the host has it, and how late a command takes effect."""
         return delays(
             self.network,
-            feedback_us=self._telegrams_us("read"),
-            command_us=self._telegrams_us("write"),
-            before_us=0.0,
+            feedback_us=(0.0, self._telegrams_us("read")),
+            command_us=(0.0, self._telegrams_us("write")),
             ring_us=self.ring_us,
         )
 

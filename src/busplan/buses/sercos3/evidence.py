@@ -29,8 +29,7 @@ def performance(base: Network, published: Mapping[str, Any]) -> "tuple[EvidenceS
         EvidenceSection(
             title,
             f"{given['source']}. It names no gap and no layout: ours are the telegrams of V1.0 alone, with the least gap "
-            f"and with the default of {DEFAULT_GAP_BYTES:g} bytes. Four telegrams hold no more than "
-            "248 drives of 16 bytes, whatever the gap.",
+            f"and with the default of {DEFAULT_GAP_BYTES:g} bytes. Of 16 bytes four telegrams hold no more, whatever the gap.",
             tuple(
                 Comparison(
                     title,
