@@ -1,6 +1,6 @@
 """What SERCOS I, II and III share: how long feedback and a command are on their way."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import reduce
 from typing import Final, TypeAlias
 
@@ -46,6 +46,21 @@ def delays(
         _delay("feedback", _slowest(network, lambda one: one.read_execution_us), *feedback_us, ring_us),
         _delay("command", _slowest(network, lambda one: one.write_execution_us), *command_us, ring_us),
     )
+
+
+def subject(network: Network, setup: Iterable[str]) -> str:
+    """Say whose delay it is, how the bus is set, and whether somebody has measured the nodes.
+
+    Parameters
+    ----------
+    network
+        The network.
+    setup
+        How the bus is set.
+    """
+    assumed = any(one.node.execution.grade == "assumed" for one in network.groups)
+    last = ("the time in the nodes is assumed",) if assumed else ()
+    return ", ".join(("feedback and commands of all nodes", *setup, *last))
 
 
 def _slowest(network: Network, execution_us: Callable[[Group], Number]) -> Number:

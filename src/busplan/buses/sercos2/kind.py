@@ -7,7 +7,7 @@ from busplan.buses.bus import Bus, EventKind, Limit, PayloadRange, Perturbation,
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import DELAYS, LATENCY
+from busplan.buses.sercos import DELAYS, LATENCY, subject
 from busplan.buses.sercos2 import figures, rules
 from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US, WORD_BYTES
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
@@ -94,7 +94,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
 
     def latency_subject(self, network: Network) -> str:
         """Say whose delay it is."""
-        return ", ".join(("feedback and commands of all drives", *self.setup_words(network)))
+        return subject(network, self.setup_words(network))
 
     def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
         """It runs beside the telegrams: drives sample before MST, and act behind the MDT."""

@@ -46,11 +46,7 @@ class Sercos3Cycle(BusCycle):
     @cached_property
     def fillings(self) -> dict[TransactionKind, Filling]:
         """MDT and AT, filled."""
-        found = {}
-        for kind, sort in SORTS.items():
-            one = telegrams_of(self.network, kind).filling
-            found[kind] = one._replace(telegrams=named(one.telegrams, f"{sort}_telegrams", f"n_{sort.upper()}"))
-        return found
+        return {kind: telegrams_of(self.network, kind).filling for kind in SORTS}
 
     def _telegrams_us(self, kind: TransactionKind) -> Number:
         return telegrams_us(self.fillings[kind], gap_bytes=self.network.profile.bus.gap_bytes)

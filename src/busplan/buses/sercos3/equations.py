@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from busplan.buses.sercos3.constants import BYTE_US, LEAST_BYTES, MOST_BYTES, OVERHEAD_BYTES
-from busplan.elementwise import Number, choose, larger, rounded_down, rounded_up, smaller
+from busplan.elementwise import Number, choose, larger, named, rounded_down, rounded_up, smaller
 
 
 class Items(NamedTuple):
@@ -48,7 +48,7 @@ def padded_bytes(data_bytes: Number) -> Number:
     return larger(data_bytes, LEAST_BYTES)
 
 
-def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number) -> Filling:
+def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, name: str = "") -> Filling:
     """Fill telegrams with items in their order: what does not fit into one goes whole into the next.
 
     Parameters
@@ -59,6 +59,8 @@ def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number) -
         What the first telegram begins with [bytes].
     next_bytes
         What each other telegram begins with [bytes].
+    name
+        What a derivation calls the telegrams.
 
     Examples
     --------
@@ -66,24 +68,25 @@ def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number) -
     Filling(telegrams=2, closed_bytes=1412, open_bytes=700)
     """
     found = Filling(1, 0, first_bytes)
-    for one in items:
-        found = _with_items(found, one, next_bytes)
+    for place, one in enumerate(items, start=1):
+        found = _with_items(found, one, next_bytes, f"{name},{place}")
     return found
 
 
-def _with_items(before: Filling, items: Items, next_bytes: Number) -> Filling:
+def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) -> Filling:
     size_bytes = items.size_bytes
     room = larger(rounded_down((MOST_BYTES - before.open_bytes) / size_bytes), 0)
-    here = smaller(items.count, room)
+    here = named(smaller(items.count, room), f"fit_{name}", f"k_{name}")
     each = larger(rounded_down((MOST_BYTES - next_bytes) / size_bytes), 1)
     more = rounded_up((items.count - here) / each)
     last = items.count - here - (more - 1) * each
     own_bytes = before.open_bytes + here * size_bytes
     closed_bytes = padded_bytes(own_bytes) + (more - 1) * padded_bytes(next_bytes + each * size_bytes)
+    open_bytes = choose(more > 0, next_bytes + last * size_bytes, own_bytes)
     return Filling(
-        before.telegrams + more,
+        named(before.telegrams + more, f"telegrams_{name}", f"n_{name}"),
         before.closed_bytes + choose(more > 0, closed_bytes, 0),
-        choose(more > 0, next_bytes + last * size_bytes, own_bytes),
+        named(open_bytes, f"open_{name}_bytes", f"s_{name}"),
     )
 
 

@@ -7,7 +7,7 @@ from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturb
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import DELAYS, LATENCY
+from busplan.buses.sercos import DELAYS, LATENCY, subject
 from busplan.buses.sercos3 import figures, rules
 from busplan.buses.sercos3.constants import (
     CONNECTION_BYTES,
@@ -113,7 +113,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def latency_subject(self, network: Network) -> str:
         """Say whose delay it is."""
-        return ", ".join(("feedback and commands of all devices", *self.setup_words(network)))
+        return subject(network, self.setup_words(network))
 
     def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
         """It runs beside the telegrams: devices sample before the AT begin, and act behind the MDT."""

@@ -28,11 +28,13 @@ class Telegrams(NamedTuple):
     """What each other begins with [bytes]."""
     items: tuple[Items, ...]
     """What they carry: service channels, control or status, then the data of each group."""
+    name: str
+    """What a derivation calls them."""
 
     @property
     def filling(self) -> Filling:
         """They, filled."""
-        return filled(self.items, first_bytes=self.first_bytes, next_bytes=self.next_bytes)
+        return filled(self.items, first_bytes=self.first_bytes, next_bytes=self.next_bytes, name=self.name)
 
 
 def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
@@ -57,6 +59,7 @@ def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
             Items(network.nodes, DEVICE_BYTES),
             *(Items(one.nodes, data_bytes(network, size)) for one, size in sizes(network, kind)),
         ),
+        SORTS[kind].upper(),
     )
 
 
