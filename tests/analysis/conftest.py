@@ -430,10 +430,11 @@ def _sercos2_bus() -> st.SearchStrategy[dict[str, Any]]:
 @st.composite
 def sercos_profiles(draw: st.DrawFn, bus: st.SearchStrategy[dict[str, Any]]) -> Profile:
     """Random profiles of a SERCOS bus, at periods that it knows and at one that it does not."""
+    own = draw(bus)
     data = {
         "schema_version": 1,
         "name": "test",
-        "bus": draw(bus),
+        "bus": own,
         "cycle": {
             "period_us": draw(st.sampled_from([125.0, 250.0, 500.0, 1000.0, 1100.0])),
             "slice_ratio": draw(st.floats(0.1, 1.0)),
@@ -445,7 +446,7 @@ def sercos_profiles(draw: st.DrawFn, bus: st.SearchStrategy[dict[str, Any]]) -> 
             "execution": {"kind": "linear", "base_us": draw(st.floats(0.0, 100.0)), "per_byte_us": 0.1},
         },
     }
-    return kind_named(data["bus"]["kind"]).profile_model().model_validate(data)
+    return kind_named(own["kind"]).profile_model().model_validate(data)
 
 
 @st.composite

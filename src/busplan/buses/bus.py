@@ -338,7 +338,7 @@ class Bus(ABC):
     """Its figures with a source, by name."""
     key_sources: ClassVar[Mapping[str, "Sourced"]] = {}
     """Keys of a profile whose default is a figure with a source."""
-    key_grades: "ClassVar[Mapping[str, Grade]]" = {}
+    key_grades: ClassVar[Mapping[str, "Grade"]] = {}
     """How well what a profile says of its keys can be known, where that is less than given."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""

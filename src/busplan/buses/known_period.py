@@ -32,7 +32,7 @@ def period_limit(periods: Periods) -> Limit:
     )
 
 
-def period_rule(code: str, periods: Periods, *, source: str) -> Rule:
+def period_rule(code: str, periods: Periods, *, kind: str, source: str) -> Rule:
     """The rule that reports a period that the bus does not know, with its neighbours.
 
     Parameters
@@ -41,6 +41,8 @@ def period_rule(code: str, periods: Periods, *, source: str) -> Rule:
         Its code.
     periods
         Those that it knows.
+    kind
+        Name of the kind of bus.
     source
         Which these are, and who says so.
     """
@@ -48,12 +50,11 @@ def period_rule(code: str, periods: Periods, *, source: str) -> Rule:
     def unknown_period(subject: RuleSubject) -> Iterator[RuleProblem]:
         period_us = subject.profile.cycle.period_us
         if not periods.knows(period_us):
-            near = " or ".join(f"{one:g}" for one in periods.neighbours(period_us))
-            yield RuleProblem("cycle.period_us", periods.refusal(period_us), f"take {near} us")
+            yield RuleProblem("cycle.period_us", periods.refusal(period_us), *subject.cure())
 
     return Rule(
         code,
-        "unknown-period",
+        f"{kind}-unknown-period",
         "error",
         "the bus knows no such period",
         f"The bus runs at some communication periods alone: {source}. A profile with another one loads, and capacity "

@@ -28,9 +28,7 @@ Sent: TypeAlias = tuple[Number, Number]
 LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *DELAYS)
 
 
-def delays(
-    network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0
-) -> tuple[BusLatency, ...]:
+def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Number = 0.0) -> tuple[BusLatency, ...]:
     """How old feedback is when the host has it, and how late a command takes effect.
 
     Parameters

@@ -27,10 +27,11 @@ def axes_of_a_ring(
     return (
         EvidenceSection(
             title,
-            f"{given['source']}: {given['drives']} axes every {given['period_us']:g} us, with no rate and no gap. Ours is "
-            f"the gap between two drives that would leave no more room, with {given['data_bytes']} bytes each way "
+            f"{given['source']}: {given['drives']} axes every {given['period_us']:g} us, with no rate and no gap. Ours "
+            f"is the gap between two drives that would leave no more room, with {given['data_bytes']} bytes each way "
             "(assumed), at the rates that leave any. The paper has a mean contour error alone, "
-            f"{contour['mean_contour_error_mm']} mm ({contour['source']}), and no cycle time: it validates no schedule.",
+            f"{contour['mean_contour_error_mm']} mm ({contour['source']}), and no cycle time: it validates no "
+            "schedule.",
             tuple(
                 Comparison(title, f"gap at {rate} Mbit/s", "us", None, WORST, gap_us, "derived")
                 for rate, gap_us in gaps.items()
@@ -50,4 +51,5 @@ def _gap_us(base: Network, given: Mapping[str, Any], rate_mbit_s: int) -> float:
     ring = base._replace(
         profile=profile, groups=(group._replace(nodes=drives, read_bytes=size, write_bytes=size),), nonperiodic_us=0.0
     )
-    return (given["period_us"] - plain(Sercos2Cycle(ring, WORST).required_us)) / (drives - 1)
+    left_us: float = given["period_us"] - plain(Sercos2Cycle(ring, WORST).required_us)
+    return left_us / (drives - 1)

@@ -28,7 +28,9 @@ LEAST_BYTES: Final = _bytes(40, "least data of a telegram; less is padded")
 MOST_BYTES: Final = _bytes(1494, "most data of a telegram")
 HOT_PLUG_BYTES: Final = _bytes(8, "hot-plug field")
 EXTENDED_BYTES: Final = _bytes(4, "extended function field of the first MDT")
-ALIGNED_BYTES: Final = _bytes(2, "more of it where every telegram has a hot-plug field, before V1.3 of the specification")
+ALIGNED_BYTES: Final = _bytes(
+    2, "more of it where every telegram has a hot-plug field, before V1.3 of the specification"
+)
 CHANNEL_BYTES: Final = _bytes(6, "service channel of a device")
 DEVICE_BYTES: Final = _bytes(2, "control, or status, of a device")
 CONNECTION_BYTES: Final = _bytes(2, "connection control of a device's cyclic data, from V1.1 on")

@@ -144,7 +144,7 @@ def _laid_out(telegrams: Telegrams) -> list[list[tuple[float, int]]]:
     used, node = plain(telegrams.first_bytes), 0
     for place, items in enumerate(telegrams.items):
         size, has_owner = plain(items.size_bytes), place >= _FIELDS
-        for _ in range(int(plain(items.count))):
+        for _ in range(int(plain(items.pieces))):
             if used + size > MOST_BYTES:
                 used = plain(telegrams.next_bytes)
                 found.append([(used, 0)])

@@ -15,7 +15,7 @@ from busplan.elementwise import Number, choose, larger, named, rounded_down, rou
 class Items(NamedTuple):
     """Some pieces of data that are not split. The numbers may be of any sort."""
 
-    count: Number
+    pieces: Number
     """How many [1]."""
     size_bytes: Number
     """Of each [bytes]."""
@@ -76,10 +76,10 @@ def filled(items: Iterable[Items], *, first_bytes: Number, next_bytes: Number, n
 def _with_items(before: Filling, items: Items, next_bytes: Number, name: str) -> Filling:
     size_bytes = items.size_bytes
     room = larger(rounded_down((MOST_BYTES - before.open_bytes) / size_bytes), 0)
-    here = named(smaller(items.count, room), f"fit_{name}", f"k_{name}")
+    here = named(smaller(items.pieces, room), f"fit_{name}", f"k_{name}")
     each = larger(rounded_down((MOST_BYTES - next_bytes) / size_bytes), 1)
-    more = rounded_up((items.count - here) / each)
-    last = items.count - here - (more - 1) * each
+    more = rounded_up((items.pieces - here) / each)
+    last = items.pieces - here - (more - 1) * each
     own_bytes = before.open_bytes + here * size_bytes
     closed_bytes = padded_bytes(own_bytes) + (more - 1) * padded_bytes(next_bytes + each * size_bytes)
     open_bytes = choose(more > 0, next_bytes + last * size_bytes, own_bytes)

@@ -28,8 +28,9 @@ def performance(base: Network, published: Mapping[str, Any]) -> "tuple[EvidenceS
     return (
         EvidenceSection(
             title,
-            f"{given['source']}. It names no gap and no layout: ours are the telegrams of V1.0 alone, with the least gap "
-            f"and with the default of {DEFAULT_GAP_BYTES:g} bytes. Of 16 bytes four telegrams hold no more, whatever the gap.",
+            f"{given['source']}. It names no gap and no layout: ours are the telegrams of V1.0 alone, with the "
+            f"least gap and with the default of {DEFAULT_GAP_BYTES:g} bytes. Of 16 bytes four telegrams hold no more, "
+            "whatever the gap.",
             tuple(
                 Comparison(
                     title,

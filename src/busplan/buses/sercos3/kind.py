@@ -155,10 +155,8 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         given_us = plain(network.nonperiodic_us)
         if not 0 < given_us < LEAST_UCC_US:
             return []
-        return [
-            f"Warning: cycle.nonperiodic_us = {given_us:g}: the master opens no channel for other frames of less than "
-            f"{LEAST_UCC_US:g} us."
-        ]
+        why = f"the master opens no channel for other frames of less than {LEAST_UCC_US:g} us"
+        return [f"Warning: cycle.nonperiodic_us = {given_us:g}: {why}."]
 
     def evidence(
         self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]

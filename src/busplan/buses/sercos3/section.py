@@ -37,8 +37,8 @@ class Sercos3Bus(BusSection):
     )
     timing_method: TimingMethod = Field(
         default="mdt-at-ucc",
-        description="Order of MDT, AT and the channel for other frames (UCC): mdt-at-ucc, mdt-ucc-at, or at-last, with the "
-        "AT at the end of the cycle; methods 1, 2 and 3 of CoSeMa",
+        description="Order of MDT, AT and the channel for other frames (UCC): mdt-at-ucc, mdt-ucc-at, or at-last, with "
+        "the AT at the end of the cycle; methods 1, 2 and 3 of CoSeMa",
         examples=["mdt-ucc-at"],
     )
     gap_bytes: Annotated[int, Field(ge=int(LEAST_GAP_BYTES), le=1000)] = Field(
@@ -76,9 +76,7 @@ class Sercos3Profile(Profile):
     """A whole profile: one motion network and its cycle."""
 
     bus: Sercos3Bus = Field(description="The bus")
-    payload: PayloadSection | None = Field(
-        default=None, description="What travels in a cycle, where devices are alike"
-    )
+    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where devices are alike")
     node: NodeSection | None = Field(default=None, description="One device, where devices are alike")
     group: Annotated[tuple[Sercos3Group, ...], Field(strict=False)] = Field(
         default=(), description="Groups of unlike devices, instead of bus.nodes, [node] and [payload]"
