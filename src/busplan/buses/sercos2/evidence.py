@@ -52,4 +52,5 @@ def _gap_us(base: Network, given: Mapping[str, Any], rate_mbit_s: int) -> float:
         profile=profile, groups=(group._replace(nodes=drives, read_bytes=size, write_bytes=size),), nonperiodic_us=0.0
     )
     left_us: float = given["period_us"] - plain(Sercos2Cycle(ring, WORST).required_us)
-    return left_us / (drives - 1)
+    gap_us: float = left_us / (drives - 1)
+    return gap_us
