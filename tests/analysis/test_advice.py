@@ -31,6 +31,8 @@ Make = Callable[..., Profile]
 
 def is_safe(profile: Profile, change: Change) -> bool:
     network = network_of(override(profile, dict(change.changes))).with_nodes(change.nodes)
+    if profile.bus.kind != "ieee1394":
+        return bus_of(profile).is_safe(network)
     return bool(gap_count_of(network) >= safe_gap_count(hops_of(network)))
 
 

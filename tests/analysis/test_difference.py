@@ -84,11 +84,11 @@ def leaves(data: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     for key, value in data.items():
         if isinstance(value, dict):
             found |= leaves(value, f"{prefix}{key}.")
-        elif key == "group":
-            found["group"] = [one["name"] for one in value]
+        elif key in ("group", "message"):
+            found[key] = [one["name"] for one in value]
             for one in value:
                 found |= leaves(
-                    {inner: each for inner, each in one.items() if inner != "name"}, f"group.{one['name']}."
+                    {inner: each for inner, each in one.items() if inner != "name"}, f"{key}.{one['name']}."
                 )
         else:
             found[f"{prefix}{key}"] = value

@@ -41,7 +41,7 @@ STEP = 15
 def swept(profile: Profile) -> Report:
     grid = checked_grid(
         profile,
-        {"cycle.period_us": Listed((500, 1000, 4000)), "bus.cable_length_m": Listed((1, 4.5))},
+        {"cycle.period_us": Listed((500, 1000, 4000)), "limits.reserve": Listed((0, 0.25))},
         with_circle=False,
     )
     models = model_names(profile)

@@ -20,9 +20,7 @@ _DATA: Final = Path(__file__).resolve().parents[1] / "data"
 class KindEvidence(NamedTuple):
     """What is known of one kind of bus; no section where nothing is."""
 
-    kind: str
-    title: str
-    """What the kind is called."""
+    bus: Bus
     sections: tuple[EvidenceSection, ...]
 
 
@@ -65,7 +63,7 @@ def kind_evidence(kind: str, *, circles: Callable[[], Sequence[CircleFigures]]) 
     if bus_of(load(BENCH_PROFILE).profile) is bus:
         seed = [one for one in found if one.data == PAPER]
         found = (*seed, *circle_sections(published(PAPER), circles()), *(one for one in found if one.data != PAPER))
-    return KindEvidence(kind, bus.title, found)
+    return KindEvidence(bus, found)
 
 
 def paper_evidence(*, circles: Callable[[], Sequence[CircleFigures]]) -> tuple[EvidenceSection, ...]:

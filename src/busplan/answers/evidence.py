@@ -6,7 +6,7 @@ from typing import Final
 
 from busplan.analysis.evidence import KindEvidence
 from busplan.answers.documents import document
-from busplan.answers.verdict import no_evidence
+from busplan.answers.verdict import evidence_sentence
 from busplan.buses.published import Comparison, EvidenceSection
 from busplan.forms.blocks import (
     Block,
@@ -24,7 +24,7 @@ from busplan.forms.blocks import (
 
 _DIGITS: Final = 5
 """Significant digits of a published figure or a quotient of two."""
-_DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0}
+_DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0, "bits": 0}
 """Decimals by unit; contour errors in mm are micrometres, so that they need six."""
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
@@ -91,7 +91,7 @@ def evidence_report(kinds: Sequence[KindEvidence]) -> Report:
 def evidence_records(kinds: Sequence[KindEvidence]) -> list[Record]:
     """One row for each figure and method, with its kind in front."""
     return [
-        {"kind": one.kind, "data": section.data, **record}
+        {"kind": one.bus.kind, "data": section.data, **record}
         for one in kinds
         for section in one.sections
         for record in paper_records([section])
@@ -102,8 +102,9 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
     """Document of `busplan evidence --format json`."""
     return document(
         "evidence",
-        kinds=[one.kind for one in kinds],
-        without=[one.kind for one in kinds if not one.sections],
+        kinds=[one.bus.kind for one in kinds],
+        without=[one.bus.kind for one in kinds if not one.sections],
+        untested={one.bus.kind: one.bus.untested for one in kinds if one.bus.untested},
         notes={section.title: section.note for one in kinds for section in one.sections},
         figures=evidence_records(kinds),
     )
@@ -112,8 +113,7 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
 def _kinds(kinds: Sequence[KindEvidence]) -> Iterator[Block]:
     start = 0
     for one in kinds:
-        if not one.sections:
-            yield no_evidence(one.title, one.kind)
+        yield from evidence_sentence(one.bus)
         yield from _sections(one.sections, start=start)
         start += sum(len(section.comparisons) for section in one.sections)
 

@@ -9,8 +9,19 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
 from busplan.answers.verdict import execution_sentence, not_applicable, warning_sentences
-from busplan.buses.figure import REQUIRED
-from busplan.forms.blocks import Block, Code, JsonDocument, Record, Report, Sentence, Table, TableColumn
+from busplan.buses.figure import REQUIRED, Figure
+from busplan.forms.blocks import (
+    Block,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    Table,
+    TableColumn,
+    TableRow,
+    attribute_value,
+)
 from busplan.sections.profile import Profile
 
 
@@ -41,14 +52,30 @@ def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
 
 
 def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
-    """Phases of the transactions in us; one table for each payload."""
+    """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
     bus = bus_of(profile)
     figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
-    rows = [(figure, 0) for figure in figures if all(figure.key in one.phases for one in result.transactions)]
-    caption = Sentence((f"Phases in us, {bus.latency_subject(network_of(profile))}",))
+    figures = tuple(figure for figure in figures if all(figure.key in one.phases for one in result.transactions))
+    subject = bus.latency_subject(network_of(profile))
+    if bus.has_many_transactions:
+        yield from _by_transaction(result, figures, subject)
+        return
+    rows = [(figure, 0) for figure in figures]
+    caption = Sentence((f"Phases in us, {subject}",))
     for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
         owners = [Owner(_column(one), one.phases, f"/transactions/{place}") for _, place, one in group]
         yield figure_table(rows, owners, caption=caption, unit=False)
+
+
+def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: str) -> Iterator[Table]:
+    """One row for each transaction; one table for each payload and timing model."""
+    columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
+    tables: dict[tuple[int, str], list[TableRow]] = {}
+    for number, place, one in _numbered(result.transactions):
+        values = (attribute_value(figure, one.phases, at=f"/transactions/{place}") for figure in figures)
+        tables.setdefault((number, one.timing_model), []).append(TableRow((_name(one), *values)))
+    for (_, model), rows in tables.items():
+        yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
 
 
 def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:
@@ -64,9 +91,13 @@ def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, T
 
 
 def _column(one: Transaction) -> TableColumn:
-    payload = "" if one.payload_bytes is None else f" {one.payload_bytes} B"
-    group = f"{one.group} " if one.group else ""
-    return TableColumn(one.timing_model, group=f"{group}{one.transaction}{payload}")
+    return TableColumn(one.timing_model, group=_name(one))
+
+
+def _name(one: Transaction) -> str:
+    """What it is called: whose it is, what it is, and its payload."""
+    payload = "" if one.payload_bytes is None else f"{one.payload_bytes} B"
+    return " ".join(filter(None, (one.group, one.transaction, payload)))
 
 
 def _over(result: LatencyResult, profile: Profile) -> list[str]:

@@ -10,6 +10,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import changeable
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.answers.key_values import settings_sentence
+from busplan.buses.bus import Bus
 from busplan.buses.figure import (
     AVAILABLE,
     BIAS,
@@ -63,7 +64,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     at = places.get("verdict", "")
     yield _headline(verdict, profile, at=at)
     yield from not_in_it(profile)
-    yield from evidence_sentence(profile)
+    yield from evidence_sentence(bus_of(profile))
     yield from _other_models(verdict, profile, places)
     yield from reset_sentence(verdict.after_reset, profile)
     if not _broken_limits(figures, profile):
@@ -207,16 +208,13 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
         yield Sentence((f"Not in it: {', '.join(f'{one.label} ({one.key})' for one in left)}.",))
 
 
-def evidence_sentence(profile: Profile) -> Iterator[Sentence]:
-    """Say that nobody else's figure tests the kind's model; nothing where one does."""
-    bus = bus_of(profile)
-    if not bus.has_evidence:
-        yield no_evidence(bus.title, bus.kind)
-
-
-def no_evidence(title: str, kind: str) -> Sentence:
-    """Say that nothing tests the model of a kind."""
-    return Sentence((f"No figure that others have published or measured tests the model of {title} (kind {kind}).",))
+def evidence_sentence(bus: Bus) -> Iterator[Sentence]:
+    """Say what of a kind nobody else's figure tests; nothing where all of it is tested."""
+    if bus.untested:
+        words = (
+            f"No figure that others have published or measured tests {bus.untested} of {bus.title} (kind {bus.kind})."
+        )
+        yield Sentence((words,))
 
 
 def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:

@@ -117,6 +117,21 @@ class Limit(NamedTuple):
         return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
 
 
+class Starter(NamedTuple):
+    """What of a new profile is a matter of the kind."""
+
+    bus: str
+    """Section [bus], as TOML without its nodes."""
+    period: str = "1ms"
+    """Communication period, unless another is asked for."""
+    slice_ratio: str = "1            # the whole period is for communication"
+    """Value of cycle.slice_ratio, with a comment."""
+    measure: str = "measure it on a node"
+    """How execution times are found, a format of `file`, the profile, and `group`, an option of `calibrate`."""
+    base: str = "what a node does in each cycle"
+    """What execution.base_us is."""
+
+
 class Cost(IntEnum):
     """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
 
@@ -316,16 +331,16 @@ class Bus(ABC):
     """Rows of its own in the table of `capacity`."""
     latency_table_figures: ClassVar[tuple[Figure, ...] | None] = None
     """Rows of the table of `latency`; without them its terms."""
+    has_many_transactions: ClassVar[bool] = False
+    """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
     limits_of: ClassVar[str] = "bus"
     """Who sets them, as a message says it."""
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
-    starter: ClassVar[str] = ""
-    """Section [bus] of a new profile, as TOML without its nodes."""
-    starter_period: ClassVar[str] = "1ms"
-    """Communication period of a new profile, unless another is asked for."""
+    starter: "ClassVar[Starter]"
+    """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
@@ -361,6 +376,8 @@ class Bus(ABC):
     """Data files, in busplan/data, with figures of it that others have published or measured."""
     evidence_profiles: ClassVar[tuple[str, ...]] = ()
     """Shipped profiles that these figures are compared on."""
+    untested: ClassVar[str] = "the model"
+    """What of it none of these figures tests, as its verdicts say; empty where they test all of it."""
 
     @abstractmethod
     def profile_model(self) -> "type[Profile]":
@@ -445,11 +462,6 @@ class Bus(ABC):
     def warnings(self, network: Network, *, nodes: Sequence[int]) -> list[str]:  # noqa: ARG002 - a kind may have none
         """What to beware of, whatever the verdict, with each of some numbers of nodes on the bus."""
         return []
-
-    @property
-    def has_evidence(self) -> bool:
-        """Whether a figure of it is known that others have published or measured; its verdicts say where none is."""
-        return bool(self.evidence_data)
 
     def evidence(
         self,

@@ -4,7 +4,7 @@ from typing import Literal, NamedTuple
 
 from busplan.sourced import Grade
 
-Unit = Literal["us", "1", "s", "mm", "bytes"]
+Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
 
 
 class Comparison(NamedTuple):

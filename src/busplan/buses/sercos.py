@@ -25,6 +25,12 @@ DELAYS: Final = (
 )
 """In the order in which they add up."""
 Sent: TypeAlias = tuple[Number, Number]
+WHOLE_PERIOD: Final = (
+    "1            # assumed: the host computes in the next cycle with what it has received in this one"
+)
+MEASURE: Final = "it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)"
+BASE: Final = "from a sample to the telegram that carries it, and from a command to its effect"
+"""What a new profile says of the slice and of the execution times."""
 LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *DELAYS)
 
 

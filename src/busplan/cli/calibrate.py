@@ -89,7 +89,7 @@ def calibrate_command(
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
-    """Find the execution time T_exec of a node from measured latencies.
+    """Find the execution time T_exec of a node from latencies measured on an IEEE 1394 bus.
 
     The CSV file has a header and the columns payload_bytes and latency_us (T_lant, from the request to its last
     acknowledge, in us), a line for each measurement; repetitions are welcome, lines that begin with # are comments. A

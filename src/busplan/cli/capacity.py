@@ -39,9 +39,9 @@ def capacity_command(
 ) -> None:
     """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
 
-    The verdict comes first: fits, not shown to fit, or does not fit, always by the standard model, with its margin, its
-    uncertainty U, the largest doubt and the cheapest change. The paper's closed form stands beside it. Times are in us.
-    A report: it exits 0 whatever the verdict is.
+    The verdict comes first: fits, not shown to fit, or does not fit, always by the timing model that decides on this
+    bus, with its margin, its uncertainty U, the largest doubt and the cheapest change. The other timing models, on
+    IEEE 1394 the paper's closed form, stand beside it. Times are in us. A report: it exits 0 whatever the verdict is.
 
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """

@@ -51,7 +51,7 @@ def init_command(
         typer.Option(
             "--period",
             metavar="TIME",
-            help="Communication period with its unit, as 1ms or 500us.  [default: 1ms; 10ms on can]",
+            help="Communication period with its unit, as 1ms or 500us.  [default: what is usual on the bus]",
         ),
     ] = None,
     bytes_per_axis: Annotated[
@@ -114,7 +114,7 @@ def _machine(
     from busplan.profile.starter import Machine
     from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
-    usual_period = kind_named(kind).starter_period
+    usual_period = kind_named(kind).starter.period
     asks = sys.stdin.isatty() and sys.stderr.isatty()
     taken: list[str] = []
 

@@ -38,10 +38,11 @@ def latency_command(
     format_: FormatOption = None,
     output: OutputOption = None,
 ) -> None:
-    """Show where the microseconds of one read and one write go, phase by phase, under both timing models.
+    """Show how long data takes to arrive, phase by phase, under each timing model.
 
-    The transaction is that of the farthest node. Times are in us, sizes in bytes; each row names the paper's
-    equation that it comes from. A report: it exits 0 whatever the figures are.
+    On IEEE 1394 it is one read and one write of the farthest node, by the broadcast schedule the data of all nodes and
+    the commands to them; on CAN the worst-case response time of every message. Times are in us, sizes in bytes; each
+    phase has its equation or source. A report: it exits 0 whatever the figures are.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """

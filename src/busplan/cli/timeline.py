@@ -65,9 +65,9 @@ def timeline_command(
         str | None,
         typer.Option(
             "--transaction",
-            metavar="read:N|write:N",
-            help="Show one transaction of one node (from 1) with its gaps, as read:1; --from and --to may narrow it "
-            "further.  [default: all of them]",
+            metavar="NAME:N",
+            help="Show one transaction of one node (from 1) with its gaps, as read:1 or write:1, on CAN feedback:1 or "
+            "command:1; --from and --to may narrow it further.  [default: all of them]",
             show_default=False,
         ),
     ] = None,
@@ -98,8 +98,8 @@ def timeline_command(
 
     Everything that takes time on the wire in its order, the non-periodic window, and what is left of the slice. It is
     the second way to the time that `busplan capacity` gives in closed form. A cycle that overruns its slice is drawn
-    whole, and said. Every node is charged the way of the farthest. Times are in us. A report: it exits 0 whatever the
-    figures are.
+    whole, and said. Every node is charged the way of the farthest, unless the profile says otherwise. Times are in us.
+    A report: it exits 0 whatever the figures are.
 
     Example: busplan timeline paper-4ms --transaction read:1
     """

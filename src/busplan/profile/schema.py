@@ -16,25 +16,23 @@ def profile_schema() -> dict[str, Any]:
     Returns
     -------
     dict
-        The schema. With several kinds of bus, `bus.kind` selects one.
+        The schema; `bus.kind` selects that of a kind of bus.
 
     Examples
     --------
-    >>> profile_schema()["required"][:2]
-    ['schema_version', 'name']
+    >>> profile_schema()["properties"]["bus"]["properties"]["kind"]["enum"][:2]
+    ['ieee1394', 'can']
     """
     kinds = {kind: profile_model(kind) for kind in kind_names()}
-    if len(kinds) == 1:
-        (model,) = kinds.values()
-        return {"$schema": _DIALECT, **model.model_json_schema(mode="validation")}
     references, definitions = models_json_schema([(model, "validation") for model in kinds.values()])
     # With conditions, validators name the wrong key; with a union, they would say that no member matches.
     chosen = [
         {"if": _has_kind({"const": kind}), "then": references[model, "validation"]} for kind, model in kinds.items()
     ]
-    return {"$schema": _DIALECT, "type": "object", **_has_kind({"enum": list(kinds)}), "allOf": chosen, **definitions}
+    known = _has_kind({"description": "Kind of bus", "enum": list(kinds)}, description="The bus")
+    return {"$schema": _DIALECT, "type": "object", **known, "allOf": chosen, **definitions}
 
 
-def _has_kind(allowed: dict[str, Any]) -> dict[str, Any]:
-    bus = {"type": "object", "properties": {"kind": allowed}, "required": ["kind"]}
+def _has_kind(allowed: dict[str, Any], **more: str) -> dict[str, Any]:
+    bus = {**more, "type": "object", "properties": {"kind": allowed}, "required": ["kind"]}
     return {"properties": {"bus": bus}, "required": ["bus"]}

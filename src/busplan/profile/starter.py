@@ -5,6 +5,7 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
+from busplan.buses.bus import Starter
 from busplan.errors import BusplanError
 from busplan.nearest import did_you_mean
 from busplan.profile.shipped import locate, shipped_names
@@ -29,7 +30,7 @@ description = "{nodes} nodes, {axes} axes, {period} us, {bytes} bytes an axis ea
 {count}
 [cycle]
 period_us = {period}
-slice_ratio = 0.8          # assumed: the share of the period for communication; the rest is for the host's own work
+slice_ratio = {ratio}
 
 {each}
 [limits]
@@ -67,7 +68,7 @@ write_bytes = {bytes}            # as outputs
 _EXECUTION: Final = """\
 kind = "linear"
 grade = "assumed"
-base_us = 20               # assumed: time in a node between a request and its response
+base_us = 20               # assumed: {base}
 per_byte_us = 0.1          # assumed: what each byte adds
 """
 _ALIKE: Final = f"""\
@@ -76,15 +77,15 @@ _ALIKE: Final = f"""\
 [node]
 axes = {{axes}}
 
-[node.execution]           # measure latencies, then: busplan calibrate {{file}} MEASUREMENTS.csv --apply
+[node.execution]           # {{measure}}
 {_EXECUTION}"""
 _GROUP: Final = f"""\
-[[group]]                  # the groups stand in the order of the chain; the payload is assumed: see the register map
+[[group]]                  # the groups stand in their order on the bus; the payload is assumed: see the register map
 name = "axes-{{axes}}"
 nodes = {{nodes}}
 axes = {{axes}}
 {{payload}}
-[group.execution]          # busplan calibrate {{file}} MEASUREMENTS.csv --group axes-{{axes}} --apply
+[group.execution]          # {{measure}}
 {_EXECUTION}"""
 
 
@@ -120,18 +121,25 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     BusplanError
         An invalid name.
     """
+    starter = kind_named(kind).starter
     per_node, rest = divmod(machine.axes, machine.nodes)
     if rest:
         count = ""
         shares = ((rest, per_node + 1), (machine.nodes - rest, per_node))
-        each = "\n".join(_group(nodes, axes, machine=machine, file=file) for nodes, axes in shares)
+        each = "\n".join(_group(nodes, axes, machine=machine, starter=starter, file=file) for nodes, axes in shares)
     else:
         count = _COUNT.format(nodes=machine.nodes)
-        each = _ALIKE.format(bytes=machine.bytes_per_axis, axes=per_node, file=file)
+        each = _ALIKE.format(
+            bytes=machine.bytes_per_axis,
+            axes=per_node,
+            measure=starter.measure.format(file=file, group=""),
+            base=starter.base,
+        )
     step_us = machine.period_us / ceil(machine.period_us / _LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
-        bus=kind_named(kind).starter,
+        bus=starter.bus,
+        ratio=starter.slice_ratio,
         nodes=machine.nodes,
         axes=machine.axes,
         count=count,
@@ -143,9 +151,10 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     return _checked(text, name=name)
 
 
-def _group(nodes: int, axes: int, *, machine: Machine, file: str) -> str:
+def _group(nodes: int, axes: int, *, machine: Machine, starter: Starter, file: str) -> str:
     payload = (_PAYLOAD if axes else _PAYLOAD_WITHOUT_AXES).format(bytes=machine.bytes_per_axis)
-    return _GROUP.format(nodes=nodes, axes=axes, payload=payload, file=file)
+    measure = starter.measure.format(file=file, group=f" --group axes-{axes}")
+    return _GROUP.format(nodes=nodes, axes=axes, payload=payload, measure=measure, base=starter.base)
 
 
 def _whole(value: float) -> float:

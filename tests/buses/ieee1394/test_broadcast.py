@@ -203,7 +203,10 @@ def test_a_broken_limit_is_said_by_verdict_and_gate(tmp_path: Path, run: Callabl
     assert said in run("capacity", *arguments, cwd=tmp_path).stdout
     checked = run("check", *arguments, "--no-circle", cwd=tmp_path)
     assert checked.returncode == 1
-    assert f"BP101 cycle.period_us: {said}; less read from each node, or" in checked.stdout
+    assert (
+        f"BP101 error: cycle.period_us: {said} (with --set group.full.nodes=12); less read from each node, or"
+        in checked.stdout
+    )
 
 
 def test_no_execution_time_and_no_answer_of_a_node_plays_a_part() -> None:

@@ -1,7 +1,7 @@
 """CAN 2.0 with a CANopen cycle, as a kind of bus."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import (
     Bus,
@@ -9,6 +9,7 @@ from busplan.buses.bus import (
     Limit,
     PayloadRange,
     Perturbation,
+    Starter,
     TimingModel,
 )
 from busplan.buses.can import figures, rules
@@ -30,6 +31,7 @@ from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
     from busplan.buses.can.section import CanProfile
+    from busplan.buses.published import EvidenceSection
 
 _DAVIS: Final = figures.BUS_LOAD.reference
 
@@ -50,15 +52,21 @@ class Can(Bus):
     compared_figures = (figures.BUS_LOAD,)
     table_figures = (figures.BUS_LOAD,)
     latency_table_figures = figures.LATENCY_TABLE
+    has_many_transactions = True
     planned_figures = ("bus_load",)
     facts = ("bit_rate_kbit_s",)
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
-    starter = """\
+    starter = Starter(
+        """\
 [bus]
 kind = "can"
-bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m or so"""
-    starter_period = "10ms"
+bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m or so""",
+        period="10ms",
+        slice_ratio="1            # assumed: the host computes in the next cycle with what it has received in this one",
+        measure="measure both on a node: SYNC to its frame, command to effect",
+        base="from SYNC to a queued feedback PDO, and from a command PDO to its effect",
+    )
     command_events = (("command", "command_frame"),)
     event_kinds = (
         EventKind("sync", "SYNC", _DAVIS, "S", "sync"),
@@ -88,6 +96,8 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         "message.identifier": "id",
     }
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second bus"}
+    evidence_data = ("can", "paper")
+    untested = "the cycle"
 
     def profile_model(self) -> "type[CanProfile]":
         """The model of its profiles."""
@@ -134,6 +144,16 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """The bit rate."""
         return (f"{network.profile.bus.bit_rate_kbit_s} kbit/s",)
+
+    def evidence(
+        self,
+        networks: Mapping[str, Network],  # noqa: ARG002 - it is asked for frames and messages alone
+        published: Mapping[str, Mapping[str, Any]],
+    ) -> "tuple[EvidenceSection, ...]":
+        """Compare published frames, loads and response times with what the equations give."""
+        from busplan.buses.can.evidence import can_sections  # one command alone asks for it
+
+        return can_sections(published["can"], published["paper"])
 
 
 def _all_nodes(network: Network) -> str:

@@ -27,7 +27,7 @@ def late_messages(traffic: Traffic) -> tuple[str, ...]:
 
 def _late(one: Stream, share: float, traffic: Traffic) -> str:
     if share < inf:
-        return f"its worst-case response time is {share * one.deadline_us:.3f} us, over its {one.deadline_us:.3f} us"
+        return f"its worst-case response time is {share * one.deadline_us:g} us, over its {one.deadline_us:g} us"
     load = load_before(one, streams(traffic, is_stuffed=True))
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}"
 

@@ -73,7 +73,7 @@ def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float,
     The second instance is the worst one:
 
     >>> worst_response(Source(1000, 3500), [Source(1000, 2500), Source(1000, 3500)], blocking_us=0, bit_us=8)
-    Response(blocking_us=0, instance=1, interference_us=5000, us=3500)
+    Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
     """
     if sum(one.load for one in (own, *higher)) >= SATURATED:
         return None

@@ -14,7 +14,7 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
         most: float = getattr(subject.profile.limits, "max_load")  # noqa: B009 - a key of this kind alone
         load = subject.deciding.bus_load
         full = "; from 100% on messages have no worst-case response time" if load >= 1 else ""
-        yield RuleProblem("limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{full}; {subject.cure()}")
+        yield RuleProblem("limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{full}", *subject.cure())
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -27,7 +27,7 @@ def deadline_missed(subject: RuleSubject) -> Iterator[RuleProblem]:
     """A message may arrive behind its deadline."""
     for words in late_messages(traffic_of_profile(subject.profile)):
         name, _, why = words.partition(": ")
-        yield RuleProblem(f"message.{name}.deadline_us", why)
+        yield RuleProblem(f"message.{name}.deadline_us", why, *subject.cure())
 
 
 RULES: Final = (

@@ -33,7 +33,7 @@ class CanBus(BusSection):
     )
     nodes: Count | None = Field(default=None, description="Distributed nodes N, host not counted", examples=[8])
     identifier_bits: IdentifierBits = Field(
-        default=11, description="Bits of all identifiers: 11 (CAN 2.0A) or 29 (CAN 2.0B)", examples=[11]
+        default=11, description="Length of all identifiers, 11 (CAN 2.0A) or 29 (CAN 2.0B) [bits]", examples=[11]
     )
     sync_identifier: Identifier = Field(
         default=int(SYNC_IDENTIFIER), description="Identifier of SYNC", examples=[int(SYNC_IDENTIFIER)]

@@ -90,8 +90,8 @@ class Ieee1394Cycle(CycleWithStarts):
 
     @property
     def longest_request_us(self) -> Number:
-        """Data phase of the longest request [us]."""
-        return reduce(larger, (one.phases.request_data_us for one in self.exchanges))
+        """Data phase of the longest request, to the farthest node of its group [us]."""
+        return reduce(larger, (one.phases.request_data_us for one in self._farthest))
 
     @cached_property
     def other_terms(self) -> tuple[Term, ...]:

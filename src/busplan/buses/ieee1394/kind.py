@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import (
     Bus,
-    Cost,
     EventKind,
     Halves,
     Limit,
     PayloadRange,
     Perturbation,
     Setting,
+    Starter,
     TimingModel,
     Value,
 )
@@ -33,6 +33,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
 from busplan.buses.ieee1394.limits import LIMITS
+from busplan.buses.ieee1394.settings import gap_count, responses, schedule
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
@@ -77,11 +78,16 @@ class Ieee1394(Bus):
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     limits_of = "standard"
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
-    starter = """\
+    starter = Starter(
+        """\
 [bus]
 kind = "ieee1394"
 speed = "S400"             # assumed: the slowest port on the way decides, S100, S200 or S400
-gap_count = "optimal"      # assumed: the smallest safe one; the bus manager must write it, until then it is 63"""
+gap_count = "optimal"      # assumed: the smallest safe one; the bus manager must write it, until then it is 63""",
+        slice_ratio="0.8          # assumed: the share for communication; the rest is for the host's own work",
+        measure="measure latencies, then: busplan calibrate {file} MEASUREMENTS.csv{group} --apply",
+        base="time in a node between a request and its response",
+    )
     command_events = (("write", "request_data"), ("write", "execution"), ("write", "worst_extra"))
     event_kinds = (
         EventKind("cycle_start", "cycle start", "profile", "C", "sync"),
@@ -140,6 +146,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
     evidence_profiles = ("paper-two-node", "dvrk")
+    untested = ""
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",
@@ -233,7 +240,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The gap count, one register in each node, how the nodes answer, and the other schedule."""
-        return (_gap_count(network), _responses(network), _schedule(network))
+        return (gap_count(network), responses(network), schedule(network))
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """One hop, one busy retry, and a slower host."""
@@ -302,41 +309,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
             *kit_sections(networks["dvrk"], published["dvrk"]),
             *standard_sections(published["ieee1394"]),
         )
-
-
-def _gap_count(network: Network) -> Setting:
-    """The smallest safe gap count."""
-    key = "bus.gap_count"
-    empty = Setting("gap_count", "gap count", Cost.REGISTER, (key,), ())
-    if not network.profile.bus.cable_is_standard:
-        return empty._replace(reason=f"the table holds for cables of up to {REFERENCE_CABLE_M:g} m")
-    safe = plain(safe_gap_count(hops_of(network)))
-    return empty if gap_count_of(network) == safe else empty._replace(values=({key: safe},))
-
-
-def _schedule(network: Network) -> Setting:
-    """The other way to read and write all nodes."""
-    other = "individual" if is_broadcast(network) else "broadcast"
-    return Setting("schedule", "schedule", Cost.SCHEDULE, (_SCHEDULE,), ({_SCHEDULE: other},))
-
-
-_SCHEDULE: Final = "cycle.schedule"
-_UNSPLIT: Final = {"read_response": "concatenated", "write_response": "unified"}
-"""Answers that need no second arbitration."""
-
-
-def _responses(network: Network) -> Setting:
-    """Answers without a second arbitration: of reads, of writes, of both."""
-    keys = tuple(group.key(name) for group in network.groups for name in _UNSPLIT)
-    if is_broadcast(network):
-        return Setting("responses", "responses", Cost.RESPONSES, keys, (), "no node answers a broadcast")
-    of_reads, of_writes = (
-        {group.key(name): answer for group in network.groups if getattr(group.node, name) == "split"}
-        for name, answer in _UNSPLIT.items()
-    )
-    both = {**of_reads, **of_writes} if of_reads and of_writes else {}
-    values = tuple(filter(None, (of_reads, of_writes, both)))
-    return Setting("responses", "responses", Cost.RESPONSES, keys, values, "" if values else "no node answers split")
 
 
 BUS: Final = Ieee1394()

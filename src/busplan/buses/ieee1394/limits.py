@@ -1,5 +1,6 @@
 """What the standard forbids, and what leaves no time. A gap count below the table fits, but is not safe."""
 
+from math import inf
 from typing import Final
 
 from busplan.buses.bus import Limit
@@ -61,7 +62,7 @@ LIMITS: Final = (
         "broadcasting nodes",
         "{value:.0f} nodes are over the {most:.0f} that a hub collects data of",
         lambda network: network.nodes if is_broadcast(network) else 0,
-        lambda _network: MAX_BROADCAST_NODES,
+        lambda network: MAX_BROADCAST_NODES if is_broadcast(network) else inf,
         way_out=_ONE_BY_ONE,
     ),
     Limit(

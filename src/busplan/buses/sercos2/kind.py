@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, EventKind, Limit, PayloadRange, Perturbation, TimingModel
+from busplan.buses.bus import Bus, EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import DELAYS, LATENCY, subject
+from busplan.buses.sercos import BASE, DELAYS, LATENCY, MEASURE, WHOLE_PERIOD, subject
 from busplan.buses.sercos2 import figures, rules
 from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US, WORD_BYTES
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
@@ -43,11 +43,16 @@ class Sercos2(Bus):
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     periods = PERIODS
-    starter = """\
+    starter = Starter(
+        """\
 [bus]
 kind = "sercos2"
 data_rate_mbit_s = 16      # assumed: 2 or 4, and with SERCOS II 8 or 16
-at_gap_us = 5              # assumed: no public figure says it; the master's time slots do"""
+at_gap_us = 5              # assumed: no public figure says it; the master's time slots do""",
+        slice_ratio=WHOLE_PERIOD,
+        measure=MEASURE,
+        base=BASE,
+    )
     command_events = (("mdt_stretch", "mdt"),)
     event_kinds = (
         EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
@@ -124,11 +129,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         """The data rate and the gap."""
         bus = network.profile.bus
         return (f"{bus.data_rate_mbit_s} Mbit/s", f"gap of {bus.at_gap_us:g} us between two drives (assumed)")
-
-    @property
-    def has_evidence(self) -> bool:
-        """No figure tests a schedule of it: `evidence` says what would make the published one true."""
-        return False
 
     def evidence(
         self, networks: Mapping[str, Network], published: Mapping[str, Mapping[str, Any]]

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, TimingModel
+from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import DELAYS, LATENCY, subject
+from busplan.buses.sercos import BASE, DELAYS, LATENCY, MEASURE, WHOLE_PERIOD, subject
 from busplan.buses.sercos3 import figures, rules
 from busplan.buses.sercos3.constants import (
     CONNECTION_BYTES,
@@ -54,11 +54,16 @@ class Sercos3(Bus):
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     periods = PERIODS
-    starter = """\
+    starter = Starter(
+        """\
 [bus]
 kind = "sercos3"
 version = "V1.1"           # assumed: from V1.1 on each device's data carry 2 bytes of connection control
-gap_bytes = 37             # what every device takes; S-0-1036 of the network says what it runs at"""
+gap_bytes = 37             # what every device takes; S-0-1036 of the network says what it runs at""",
+        slice_ratio=WHOLE_PERIOD,
+        measure=MEASURE,
+        base=BASE,
+    )
     command_events = (("mdt", "gap"),)
     event_kinds = (
         EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
@@ -95,6 +100,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     change_words: ClassVar[Mapping[str, str]] = {_METHOD: "method {}"}
     evidence_data = ("sercos3",)
     evidence_profiles = ("sercos3-servo-8",)
+    untested = "the window"
 
     def profile_model(self) -> "type[Sercos3Profile]":
         """The model of its profiles."""

@@ -1,0 +1,38 @@
+"""Published figures of CAN, each met to the last digit that its source prints."""
+
+from collections.abc import Callable
+from subprocess import CompletedProcess
+
+import pytest
+
+from busplan.analysis.evidence import bus_evidence
+from busplan.buses import kind_named
+from busplan.buses.published import EvidenceSection
+
+SECTIONS = bus_evidence(kind_named("can"))
+SYSTEM = SECTIONS[-1]
+
+
+@pytest.mark.parametrize("section", SECTIONS[:-1], ids=lambda one: one.title)
+def test_each_published_figure_is_met_as_printed(section: EvidenceSection) -> None:
+    for one in section.comparisons:
+        decimals = len(str(one.published).partition(".")[2])
+        assert round(one.computed, decimals) == one.published, one.quantity
+
+
+def test_what_was_not_read_again_is_graded_so() -> None:
+    grades = {section.title: {one.grade for one in section.comparisons} for section in SECTIONS}
+    assert grades.pop("CAN: the worst instance is not the first") == {"recalled"}
+    assert set.union(*grades.values()) == {"published"}
+
+
+def test_the_papers_can_system_spends_its_time_in_the_host() -> None:
+    (one,) = SYSTEM.comparisons
+    assert (one.published, one.computed, SYSTEM.data) == (10500, 135, "paper")
+    assert "the other 10.4 ms are the host's, and no figure of the bus" in SYSTEM.note
+
+
+def test_a_verdict_says_what_nobody_has_tested(run: Callable[..., CompletedProcess[str]]) -> None:
+    words = "No figure that others have published or measured tests the cycle of CAN (kind can)."
+    assert words in run("capacity", "can-servo-8").stdout
+    assert words in run("evidence", "can").stdout
