@@ -206,7 +206,7 @@ def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: st
         assert found.is_gone
         assert found.next_binding_term == largest
         assert found.next_margin_corrected_us == certainty(without).margin_corrected_us
-    else:
+    elif found.binding_term.name != "nonperiodic":  # which a key of every kind takes away
         assert (found.is_gone, found.next_margin_corrected_us) == (False, None)
 
 
