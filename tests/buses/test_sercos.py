@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
+from busplan.analysis.all_answers import all_answers
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.map.ranges import default_direction
 from busplan.analysis.network import network_of
@@ -126,6 +127,30 @@ def test_a_plan_leaves_an_unknown_period_for_the_nearest(kind: str) -> None:
     found = busplan.plan(longer, circle=False)
     assert found.recommended is not None
     assert found.recommended.changes == {"cycle.period_us": own.cycle.period_us}
+
+
+def test_the_smallest_period_of_a_plan_may_be_no_whole_number(run: Run, tmp_path: Path) -> None:
+    text = (
+        'schema_version = 1\nname = "pair"\n[bus]\nkind = "sercos3"\nnodes = 2\n[cycle]\nperiod_us = 250\n'
+        "[payload]\nread_bytes = 8\nwrite_bytes = 8\n[node]\naxes = 1\n"
+        '[node.execution]\nkind = "linear"\nbase_us = 5\nper_byte_us = 0\n'
+    )
+    (tmp_path / "pair.toml").write_text(text, encoding="utf-8")
+    document = json.loads(run("plan", "pair.toml", "--format", "json", cwd=tmp_path).stdout)
+    changes = [one["changes"] for one in document["options"] if one["title"] == "smallest period"]
+    assert changes == [{"cycle.period_us": 31.25}]
+
+
+@KINDS
+def test_each_period_that_is_asked_for_is_named_and_a_report_has_known_ones(
+    kind: str, run: Run, tmp_path: Path
+) -> None:
+    done = run("capacity", f"{kind}-servo-8", "--period", "300us,260us", cwd=tmp_path)
+    assert "knows no period of 300 us" in done.stdout
+    assert "knows no period of 260 us" in done.stdout
+    answers = all_answers(load(f"{kind}-servo-8").profile, with_circle=False)
+    assert len(answers.periods.results) > 2
+    assert all(kind_named(kind).periods.knows(one.period_us) for one in answers.periods.results)
 
 
 @KINDS
