@@ -23,6 +23,7 @@ __all__ = [
     "CheckAnswer",
     "CircleTestAnswer",
     "DiffAnswer",
+    "EvidenceAnswer",
     "ExplainAnswer",
     "LatencyAnswer",
     "MapAnswer",
@@ -37,6 +38,7 @@ __all__ = [
     "check",
     "circle_test",
     "diff",
+    "evidence",
     "explain",
     "latency",
     "load_profile",
@@ -53,6 +55,7 @@ if TYPE_CHECKING:
     from busplan.api.check import CheckAnswer, check
     from busplan.api.circle import CircleTestAnswer, circle_test
     from busplan.api.diff import DiffAnswer, diff
+    from busplan.api.evidence import EvidenceAnswer, evidence
     from busplan.api.explain import ExplainAnswer, explain
     from busplan.api.inputs import load_profile
     from busplan.api.latency import LatencyAnswer, latency
@@ -82,6 +85,8 @@ else:
         "circle_test": "busplan.api.circle",
         "DiffAnswer": "busplan.api.diff",
         "diff": "busplan.api.diff",
+        "EvidenceAnswer": "busplan.api.evidence",
+        "evidence": "busplan.api.evidence",
         "ExplainAnswer": "busplan.api.explain",
         "explain": "busplan.api.explain",
         "LatencyAnswer": "busplan.api.latency",
