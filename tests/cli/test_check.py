@@ -568,7 +568,9 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     document = json.loads(busplan("rule", "--format", "json", cwd=tmp_path).stdout)
     assert (document["schema"], document["command"]) == (1, "rule")
     assert [rule["code"] for rule in document["rules"]] == codes
-    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * len(codes)
+    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * len(
+        codes
+    )
     (one,) = json.loads(busplan("rule", "BP110", "--format", "json", cwd=tmp_path).stdout)["rules"]
     assert one in document["rules"]
 

@@ -55,6 +55,12 @@ def test_its_cycle_is_that_by_hand() -> None:
     assert terms(profile(bus__at_start_us=30.0))["wait"] == 30 + 12 + 9
 
 
+def test_the_gap_is_in_the_uncertainty() -> None:
+    (found,) = busplan.capacity(profile(), timing_model=["worst-stuffing"]).results
+    assert found.uncertainty_us == pytest.approx(2 * 0.1 * 2 * 7)
+    assert found.bias_us is None
+
+
 def test_delays_are_those_by_hand() -> None:
     found = {one.transaction: one for one in busplan.latency(profile(), timing_model=["worst-stuffing"]).transactions}
     until_at_us = MST_BITS / 4 + 12 + 3 * AT_BITS / 4 + 14

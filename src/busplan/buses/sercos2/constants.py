@@ -48,6 +48,14 @@ SLOW_START_US: Final = _us(12, "from MST to the first AT at 2 and 4 Mbit/s, t1mi
 FAST_START_US: Final = _us(4, "from MST to the first AT at 8 and 16 Mbit/s, t1min", symbol="t_1")
 TURNAROUND_US: Final = _us(12, "from the last AT to the MDT, t_ATMT", symbol="t_ATMT")
 
+GAP_SHARE: Final = Sourced(
+    0.1,
+    unit="1",
+    grade="assumed",
+    source="chosen, as of an execution time that is assumed",
+    meaning="standard uncertainty of the gap between two drives, as a share of it",
+)
+
 _STEP_US: Final = 1000
 _LONGEST_US: Final = 65_000
 PERIODS: Final = Periods((62.5, 125.0, 250.0, 500.0, *map(float, range(_STEP_US, _LONGEST_US + 1, _STEP_US))))

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.bus import BusCycle, BusEvent, BusLatency, LeftOut, Term
+from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Network
 from busplan.buses.sercos import delays
-from busplan.buses.sercos2.constants import MST_BYTES, RECORD_BYTES
+from busplan.buses.sercos2.constants import GAP_SHARE, MST_BYTES, RECORD_BYTES
 from busplan.buses.sercos2.equations import start_us, telegram_us, word_bytes
 from busplan.elementwise import Number, named, plain, total
 
@@ -61,6 +61,10 @@ class Sercos2Cycle(BusCycle):
     def computed_terms(self) -> tuple[Term, ...]:
         """The telegrams, the gaps, and the waits for the drives."""
         return tuple(Term(*one) for one in self._sent_us.items())
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """The gap between two drives, which is the same in the whole cycle."""
+        return (Doubt("bus.at_gap_us", "gap between two drives", self._sent_us["cycle_gap_us"] * GAP_SHARE),)
 
     def left_out(self) -> tuple[LeftOut, ...]:
         """The drives' recovery behind the MDT."""
