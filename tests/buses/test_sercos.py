@@ -109,6 +109,22 @@ def test_no_known_period_is_long_enough_for_everything(kind: str, run: Run, tmp_
 
 
 @KINDS
+def test_every_row_of_a_sweep_equals_capacity_of_its_point(kind: str, run: Run, tmp_path: Path) -> None:
+    vary = {"bus.nodes": [1, 8, 61, 300], "cycle.period_us": [260.0, 500.0, 3000.0], "payload.read_bytes": [3, 150]}
+    options = [word for key, ones in vary.items() for word in ("--vary", f"{key}={','.join(map(str, ones))}")]
+    done = run("sweep", f"{kind}-servo-8", *options, "--format", "jsonl", cwd=tmp_path)
+    _, *rows = map(json.loads, done.stdout.splitlines())
+    assert len(rows) == 2 * 4 * 3 * 2
+    for row in rows:
+        own = override(load(f"{kind}-servo-8").profile, {key: row.pop(key) for key in vary})
+        (found,) = busplan.capacity(own, timing_model=[row["timing_model"]]).results
+        for key, value in row.items():
+            expected = getattr(found, key)
+            expected = list(expected) if key == "exceeded" else expected
+            assert value == (pytest.approx(expected, rel=1e-12) if isinstance(expected, float) else expected), key
+
+
+@KINDS
 @pytest.mark.parametrize("axes", [12, 60, 110])
 def test_a_plan_takes_a_known_period(kind: str, axes: int) -> None:
     found = busplan.plan(f"{kind}-servo-8", axes=axes, circle=False)
