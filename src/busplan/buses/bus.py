@@ -475,6 +475,10 @@ class Bus(ABC):
         """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
         return True
 
+    def latency_has_execution(self, network: Network) -> bool:
+        """Whether a latency holds an execution time of the nodes."""
+        return self.has_execution(network)
+
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn; it is asked again after each change of the network."""
         return ()

@@ -52,19 +52,15 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
     )
 
 
-def subject(network: Network, setup: Iterable[str]) -> str:
-    """Say whose delay it is, how the bus is set, and whether somebody has measured the nodes.
+def subject(setup: Iterable[str]) -> str:
+    """Say whose delay it is, and how the bus is set.
 
     Parameters
     ----------
-    network
-        The network.
     setup
         How the bus is set.
     """
-    assumed = any(one.node.execution.grade == "assumed" for one in network.groups)
-    last = ("the time in the nodes is assumed",) if assumed else ()
-    return ", ".join(("feedback and commands of all nodes", *setup, *last))
+    return ", ".join(("feedback and commands of all nodes", *setup))
 
 
 def _slowest(network: Network, execution_us: Callable[[Group], Number]) -> Number:

@@ -125,6 +125,10 @@ master_us = 50             # assumed: the master's own time, from its task to th
         """No device keeps a frame waiting: their own time is in latencies alone."""
         return False
 
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
+        """The nodes' time is in every latency."""
+        return True
+
     def arrivals_us(self, cycle: "BusCycle") -> Mapping[int, float]:
         """When the last byte of its frame has reached each device [us]."""
         return arrivals_us(cycle.network)

@@ -99,11 +99,15 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
 
     def latency_subject(self, network: Network) -> str:
         """Say whose delay it is."""
-        return subject(network, self.setup_words(network))
+        return subject(self.setup_words(network))
 
     def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
         """It runs beside the telegrams: drives sample before MST, and act behind the MDT."""
         return False
+
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
+        """The nodes' time is in every latency."""
+        return True
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """A longer gap, and the fastest ring."""

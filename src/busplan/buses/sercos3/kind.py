@@ -119,11 +119,15 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def latency_subject(self, network: Network) -> str:
         """Say whose delay it is."""
-        return subject(network, self.setup_words(network))
+        return subject(self.setup_words(network))
 
     def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
         """It runs beside the telegrams: devices sample before the AT begin, and act behind the MDT."""
         return False
+
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
+        """The nodes' time is in every latency."""
+        return True
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The other timing methods, in the order of CoSeMa."""
