@@ -22,6 +22,7 @@ __all__ = [
     "CapacityAnswer",
     "CheckAnswer",
     "CircleTestAnswer",
+    "CompareAnswer",
     "DiffAnswer",
     "ExplainAnswer",
     "LatencyAnswer",
@@ -36,6 +37,7 @@ __all__ = [
     "capacity",
     "check",
     "circle_test",
+    "compare",
     "diff",
     "explain",
     "latency",
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
     from busplan.api.capacity import CapacityAnswer, capacity
     from busplan.api.check import CheckAnswer, check
     from busplan.api.circle import CircleTestAnswer, circle_test
+    from busplan.api.compare import CompareAnswer, compare
     from busplan.api.diff import DiffAnswer, diff
     from busplan.api.explain import ExplainAnswer, explain
     from busplan.api.inputs import load_profile
@@ -80,6 +83,8 @@ else:
         "check": "busplan.api.check",
         "CircleTestAnswer": "busplan.api.circle",
         "circle_test": "busplan.api.circle",
+        "CompareAnswer": "busplan.api.compare",
+        "compare": "busplan.api.compare",
         "DiffAnswer": "busplan.api.diff",
         "diff": "busplan.api.diff",
         "ExplainAnswer": "busplan.api.explain",

@@ -1,0 +1,58 @@
+"""What the figures of a machine rest on, kind of bus by kind of bus, in sentences."""
+
+from collections.abc import Iterator
+
+from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind
+from busplan.analysis.network import bus_of, network_of
+from busplan.answers.verdict import evidence_sentence
+from busplan.buses import kind_named
+from busplan.forms.blocks import Code, Sentence, joined
+from busplan.forms.numbers import period
+from busplan.sections.profile import Profile
+
+
+def notes(found: KindComparison) -> Iterator[Sentence]:
+    """Say of each kind what stands in the way, what of the profile it leaves out and what nobody has tested.
+
+    Parameters
+    ----------
+    found
+        The comparison.
+    """
+    for one in found.kinds:
+        if isinstance(one, NotOnKind):
+            why = "; ".join(one.why)
+            yield Sentence((f"{kind_named(one.kind).title} cannot have this machine: {why}.",), "warns")
+        else:
+            said = [*_obstacles(one), *_circle(one), *_machine(one, found.profile)]
+            said += evidence_sentence(bus_of(one.profile))
+            if said:
+                yield joined(Sentence((f"{bus_of(one.profile).title}:",)), *said)
+
+
+def _obstacles(one: MachineOnKind) -> Iterator[Sentence]:
+    """The limits that are broken, and why no period is shown to fit."""
+    bus, network = bus_of(one.profile), network_of(one.profile)
+    broken = [limit.words(network) for key in one.figures.exceeded if key != TIME and (limit := bus.limit(key))]
+    if broken:
+        yield Sentence((f"At {period(one.figures.period_us)} {'; '.join(broken)}.",))
+    if one.smallest.us is None:
+        yield Sentence((f"No period is shown to fit: {one.smallest.why}.",))
+
+
+def _circle(one: MachineOnKind) -> Iterator[Sentence]:
+    """Why the circle fails or cannot be run."""
+    if one.circle is not None and one.circle.problems:
+        yield Sentence((f"The circle: {', and '.join(one.circle.problems)}.",))
+
+
+def _machine(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
+    """What of the profile is left out, and what its execution times stand for."""
+    if one.left_out:
+        keys = joined(*(Sentence((Code(key),)) for key in one.left_out), by=", ")
+        yield Sentence(("Left out: ", *keys.parts, "."))
+    bus, own = bus_of(one.profile), bus_of(profile)
+    if not one.is_own and bus.has_execution(network_of(one.profile)):
+        none = "" if own.has_execution(network_of(profile)) else f" The cycle of {own.title} has none."
+        yield Sentence((f"Execution times mean here: {bus.starter.base}.{none}",))
