@@ -44,7 +44,8 @@ def _obstacles(one: MachineOnKind) -> Iterator[Sentence]:
 def _circle(one: MachineOnKind) -> Iterator[Sentence]:
     """Why the circle fails or cannot be run."""
     if one.circle is not None and one.circle.problems:
-        yield Sentence((f"The circle: {', and '.join(one.circle.problems)}.",))
+        at = f"{one.smallest.us:.3f} us"
+        yield Sentence((f"The circle at {at}: {', and '.join(one.circle.problems)}.",))
 
 
 def _machine(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
@@ -54,5 +55,7 @@ def _machine(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
         yield Sentence(("Left out: ", *keys.parts, "."))
     bus, own = bus_of(one.profile), bus_of(profile)
     if not one.is_own and bus.has_execution(network_of(one.profile)):
-        none = "" if own.has_execution(network_of(profile)) else f" The cycle of {own.title} has none."
-        yield Sentence((f"Execution times mean here: {bus.starter.base}.{none}",))
+        said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}."
+        has_none = not own.has_execution(network_of(profile))
+        none = f" The cycle of {own.title} has none as this profile sets it." if has_none else ""
+        yield Sentence((f"{said}{none}",))
