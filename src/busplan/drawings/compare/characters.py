@@ -39,7 +39,8 @@ def compare_lines(found: KindComparison, *, width: int) -> list[Line]:
     indent = " " * (gutter + 2)
     below = (" " * own + _OWN_PERIOD, _below(found, plane, columns))
     legend = [f"{line.letter} {line.title}" for line in lines]
-    legend += [f"{_SEVERAL} several", f"{_OWN} and {_OWN_PERIOD} the axes and the period of this machine"]
+    legend += [f"{_SEVERAL} several"] if any(_SEVERAL in row for row in cells) else []
+    legend.append(f"{_OWN} and {_OWN_PERIOD} the axes and the period of this machine")
     return [
         *(Line(one, "drawn") for one in drawn),
         *(Line(f"{indent}{one}".rstrip(), "drawn") for one in below),
