@@ -24,6 +24,7 @@ __all__ = [
     "CircleTestAnswer",
     "CompareAnswer",
     "DiffAnswer",
+    "EvidenceAnswer",
     "ExplainAnswer",
     "LatencyAnswer",
     "MapAnswer",
@@ -39,6 +40,7 @@ __all__ = [
     "circle_test",
     "compare",
     "diff",
+    "evidence",
     "explain",
     "latency",
     "load_profile",
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
     from busplan.api.circle import CircleTestAnswer, circle_test
     from busplan.api.compare import CompareAnswer, compare
     from busplan.api.diff import DiffAnswer, diff
+    from busplan.api.evidence import EvidenceAnswer, evidence
     from busplan.api.explain import ExplainAnswer, explain
     from busplan.api.inputs import load_profile
     from busplan.api.latency import LatencyAnswer, latency
@@ -87,6 +90,8 @@ else:
         "compare": "busplan.api.compare",
         "DiffAnswer": "busplan.api.diff",
         "diff": "busplan.api.diff",
+        "EvidenceAnswer": "busplan.api.evidence",
+        "evidence": "busplan.api.evidence",
         "ExplainAnswer": "busplan.api.explain",
         "explain": "busplan.api.explain",
         "LatencyAnswer": "busplan.api.latency",

@@ -98,7 +98,8 @@ def _broadcasts_us(data: dict[str, Any], nodes: int) -> Fraction:
     phy_us = Fraction(14) / base if bus["phy_delay_us"] is None else Fraction(bus["phy_delay_us"])
     way_us = hops * (Fraction("0.023") * Fraction(bus["cable_length_m"]) / Fraction("4.5") + phy_us)
     sub_us, reset_us, hold_us = Fraction(29 + 16 * gap) / base, Fraction(53 + 32 * gap) / base, Fraction("1.63")
-    is_fast = cycle["broadcast_request"] == "isochronous"
+    is_fast = cycle["broadcast_request"] != "priority"
+    slot_us = Fraction(256) / Fraction("49.152") if cycle["broadcast_request"] == "timed" else 0
     gap_us, asked_us = (0, way_us + hold_us) if is_fast else (sub_us, way_us + hold_us + Fraction(4 * gap) / base)
 
     def sent_us(size: int) -> Fraction:
@@ -108,7 +109,9 @@ def _broadcasts_us(data: dict[str, Any], nodes: int) -> Fraction:
     acknowledge_us = way_us + Fraction("0.25")
     now_us = asked_at_us = sent_us(20) + acknowledge_us
     now_us += max(Fraction(0), Fraction(150) / Fraction("49.152") - gap_us)
-    for _ in range(nodes):
+    first_us = now_us
+    for place in range(nodes):
+        now_us = max(now_us, first_us + place * slot_us)
         now_us += gap_us + asked_us + way_us + Fraction(8 * (24 + _filled(payload["read_bytes"]))) / rate
     now_us = max(now_us + reset_us, max(now_us, asked_at_us + 10 + 5 * nodes) + host_us)
     now_us += sent_us(20) + acknowledge_us
@@ -317,21 +320,24 @@ def profiles(draw: st.DrawFn) -> Profile:
         "bus__phy_delay_us": draw(st.one_of(st.none(), st.floats(0.01, 0.2))),
         "cycle__retries": draw(st.integers(0, 5)),
         "cycle__schedule": draw(st.sampled_from(["individual", "broadcast"])),
-        "cycle__broadcast_request": draw(st.sampled_from(["isochronous", "priority"])),
+        "cycle__broadcast_request": draw(st.sampled_from(["isochronous", "priority", "timed"])),
         "host": {"transaction_us": draw(st.one_of(st.just(0.0), st.floats(0.0, 60.0)))},
         "node__read_response": draw(st.sampled_from(["split", "concatenated"])),
         "node__write_response": draw(st.sampled_from(["split", "unified"])),
         "node__response_us": draw(st.floats(0.0, 1.63)),
         "node__execution__worst_extra_us": draw(st.floats(0.0, 10.0)),
     }
+    chosen = own if draw(st.booleans()) else {}
+    # A hub collects of 16 nodes; some are beyond it.
+    most = 18 if chosen.get("cycle__schedule") == "broadcast" else 80
     return make_profile(
-        **(own if draw(st.booleans()) else {}),
+        **chosen,
         node__execution__grade=draw(st.sampled_from([None, "measured", "derived", "assumed"])),
         node__execution__residual=draw(st.sampled_from(["none", "paper", "standard"])),
         node__execution__measured_gap_count=draw(st.integers(0, 63)),
         bus__speed=draw(st.sampled_from(["S100", "S200", "S400"])),
         bus__gap_count=draw(st.one_of(st.integers(0, 63), st.just("optimal"))),
-        bus__nodes=draw(st.integers(1, 80)),
+        bus__nodes=draw(st.integers(1, most)),
         bus__max_hops=draw(st.one_of(st.none(), st.integers(1, 20))),
         bus__cable_length_m=draw(st.sampled_from([0.5, 2.0, 4.5])),
         bus__timing_model=draw(st.sampled_from(["paper", "standard"])),

@@ -106,7 +106,7 @@ def grouped(draw: st.DrawFn) -> Profile:
                 "slice_ratio": draw(st.floats(0.3, 1.0)),
                 "retries": draw(st.sampled_from([0, 2])),
                 "schedule": draw(st.sampled_from(["individual", "broadcast"])),
-                "broadcast_request": draw(st.sampled_from(["isochronous", "priority"])),
+                "broadcast_request": draw(st.sampled_from(["isochronous", "priority", "timed"])),
             },
             "group": each,
             "limits": {"reserve": draw(st.sampled_from([0.0, 0.15]))},

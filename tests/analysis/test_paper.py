@@ -146,6 +146,11 @@ def test_the_hub_and_a_board_of_the_kit(others: list[Comparison]) -> None:
     assert {name: one.computed for name, one in boards.items()} == pytest.approx(by_hand)
 
 
+def test_the_times_of_the_boards_are_the_firmwares(others: list[Comparison]) -> None:
+    times = chosen(others, "dVRK: when a board broadcasts, firmware up to Rev 7", "standard model").values()
+    assert [round(one.computed, 2) for one in times] == [one.published for one in times] == [3.05, 5.21]
+
+
 def test_what_is_known_of_the_standard_beside_the_paper(others: list[Comparison]) -> None:
     delays = [one for one in others if one.section.startswith("IEEE 1394: delays")]
     assert [(one.quantity, one.published) for one in delays] == [

@@ -84,7 +84,7 @@ def test_the_same_question_has_the_same_answer() -> None:
 
 
 HEADLINES = {
-    "latency": "<LatencyAnswer: paper-1ms: 4 transactions of the farthest node>",
+    "latency": "<LatencyAnswer: paper-1ms: farthest of 2 nodes, 2 hops, gap count 63>",
     # 263.320 us of 500 us by the standard, a bias of 8 * 0.827 us; the paper says 207.117 us.
     "capacity": "<CapacityAnswer: paper-1ms at 1 ms: fits. Margin 230.064 us +/- 6.311 us of 500.000 us, less a bias "
     "of 6.616 us. Largest doubt: execution time, 54% of U squared.>",

@@ -82,6 +82,8 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "explain paper-4ms latency.latency_us --transaction read --timing standard": lambda: busplan.explain(
         "paper-4ms", "latency.latency_us", transaction="read", timing_model="standard"
     ),
+    "evidence": busplan.evidence,
+    "evidence can": lambda: busplan.evidence("can"),
     "calibrate paper-two-node table-1.csv --form linear --robust --keep-outliers --timing paper": lambda: (
         busplan.calibrate(
             "paper-two-node", "table-1.csv", form="linear", robust=True, keep_outliers=True, timing_model="paper"

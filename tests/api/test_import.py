@@ -11,7 +11,7 @@ import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "scipy", "tomllib", "tomli_w", "json"}
 FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
-WITH_NUMPY = ("circle_test", "sweep", "map_", "report")
+WITH_NUMPY = ("circle_test", "evidence", "sweep", "map_", "report")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
 
 

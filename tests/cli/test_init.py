@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,13 @@ def answered(folder: Path, *answers: bytes, arguments: tuple[str, ...] = ()) -> 
             assert heard()
         said += "<"
         os.write(leader, answer)
-    code = process.wait(timeout=30)
+    for _ in range(30):
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=1)
+            break
+        # A signal between a prompt and its read is lost, as at any keyboard: who presses Ctrl-C presses it again.
+        os.write(leader, answers[-1].replace(b"\n", b""))
+    code = process.wait(timeout=1)
     while select.select([leader], [], [], 0.1)[0] and heard():
         pass
     os.close(leader)

@@ -199,12 +199,13 @@ def simulate(scene: Scene, execution: Execution, *, cycles: int = 1) -> Run:
     return Run(tuple(starts_us), tuple(bus.packets))
 
 
-def simulate_broadcasts(scene: Scene, *, isochronous: bool, cycles: int = 1) -> Run:
+def simulate_broadcasts(scene: Scene, *, isochronous: bool, slot_us: float = 0.0, cycles: int = 1) -> Run:
     """Run cycles of the broadcast schedule: a query, a packet of each node, one read of the hub, one write.
 
     Node 1 is the hub here, at its own hops. Each node starts when it has heard the one before it, the first one when
-    its clock has counted 150 from the query. The host knows only its own clock: it waits 10 us and 5 us a node behind
-    the acknowledge of its query, and has its own time before each request.
+    its clock has counted 150 from the query; with slots, no node before its own time behind that. The host knows only
+    its own clock: it waits 10 us and 5 us a node behind the acknowledge of its query, and has its own time before each
+    request.
     """
     bus, ready_us, starts_us = _Bus(scene), 0.0, []
     (hub, *_), number = scene.nodes, len(scene.nodes)
@@ -216,7 +217,7 @@ def simulate_broadcasts(scene: Scene, *, isochronous: bool, cycles: int = 1) -> 
         starts_us.append(bus.packets[-1].start_us)
         if cycle == cycles:
             break
-        turn_us = asked_us + 150 / 49.152
+        turn_us = first_us = asked_us + 150 / 49.152
         for place, node in enumerate(scene.nodes, start=1):
             packet = 24 + -(-node.read_bytes // 4) * 4 + 4
             # All must hear it: the farthest does.
@@ -224,7 +225,8 @@ def simulate_broadcasts(scene: Scene, *, isochronous: bool, cycles: int = 1) -> 
                 scene.hops * scene.hop_us + MAX_HOLD_US if isochronous else scene.arbitration_us(scene.hops)
             )
             wire_us = arbitration_us + scene.data_us(scene.hops, packet)
-            turn_us = bus.send(f"data {place}", place, ready_us=turn_us, wire_us=wire_us, isochronous=isochronous)
+            ready_us = max(turn_us, first_us + (place - 1) * slot_us)
+            turn_us = bus.send(f"data {place}", place, ready_us=ready_us, wire_us=wire_us, isochronous=isochronous)
         # The host's own time follows its wait, or the last broadcast if that is later.
         ready_us = max(turn_us, asked_us + 10 + 5 * number) + scene.host_us
         answer_us = scene.data_us(hub.hops, 24 + collected) + scene.acknowledge_us(hub.hops)

@@ -6,13 +6,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from busplan.analysis.circle.roundness import CircleFigures
+from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.paper import BENCH_PROFILE, PAPER, circle_sections
-from busplan.buses import kind_named
+from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, PAPER, circle_sections
+from busplan.buses import kind_named, kind_names
 from busplan.buses.bus import Bus
 from busplan.buses.published import EvidenceSection
+from busplan.errors import BusplanError
 from busplan.profile.shipped import load
+from busplan.progress import Progress
 
 _DATA: Final = Path(__file__).resolve().parents[1] / "data"
 
@@ -20,7 +22,11 @@ _DATA: Final = Path(__file__).resolve().parents[1] / "data"
 class KindEvidence(NamedTuple):
     """What is known of one kind of bus; no section where nothing is."""
 
-    bus: Bus
+    kind: str
+    title: str
+    """What the kind is called."""
+    untested: str
+    """What of it nobody else's figure tests; empty where all of it is tested."""
     sections: tuple[EvidenceSection, ...]
 
 
@@ -48,6 +54,32 @@ def bus_evidence(bus: Bus) -> tuple[EvidenceSection, ...]:
     return bus.evidence(networks, {name: published(name) for name in bus.evidence_data})
 
 
+def known_kinds(kind: str | None) -> tuple[str, ...]:
+    """The kind of a name, or all of them without one.
+
+    Raises
+    ------
+    BusplanError
+        No such kind.
+    """
+    if kind is None:
+        return kind_names()
+    if kind not in kind_names():
+        raise BusplanError(f"{kind}: no such kind of bus; there are {', '.join(kind_names())}")
+    return (kind,)
+
+
+def paper_circles(*, progress: Progress | None = None) -> Sequence[CircleFigures]:
+    """Run the circle tests of the paper, those of `CIRCLE_PROFILES` in this order.
+
+    Parameters
+    ----------
+    progress
+        Called from time to time with the steps simulated and the steps known to be needed.
+    """
+    return [circle_test(load(name).profile, progress=progress).results[0] for name in CIRCLE_PROFILES]
+
+
 def kind_evidence(kind: str, *, circles: Callable[[], Sequence[CircleFigures]]) -> KindEvidence:
     """What is known of one kind of bus, the paper's circles among it where the paper's bench is of this kind.
 
@@ -63,7 +95,7 @@ def kind_evidence(kind: str, *, circles: Callable[[], Sequence[CircleFigures]]) 
     if bus_of(load(BENCH_PROFILE).profile) is bus:
         seed = [one for one in found if one.data == PAPER]
         found = (*seed, *circle_sections(published(PAPER), circles()), *(one for one in found if one.data != PAPER))
-    return KindEvidence(bus, found)
+    return KindEvidence(bus.kind, bus.title, bus.untested, found)
 
 
 def paper_evidence(*, circles: Callable[[], Sequence[CircleFigures]]) -> tuple[EvidenceSection, ...]:

@@ -91,7 +91,7 @@ def evidence_report(kinds: Sequence[KindEvidence]) -> Report:
 def evidence_records(kinds: Sequence[KindEvidence]) -> list[Record]:
     """One row for each figure and method, with its kind in front."""
     return [
-        {"kind": one.bus.kind, "data": section.data, **record}
+        {"kind": one.kind, "data": section.data, **record}
         for one in kinds
         for section in one.sections
         for record in paper_records([section])
@@ -102,9 +102,9 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
     """Document of `busplan evidence --format json`."""
     return document(
         "evidence",
-        kinds=[one.bus.kind for one in kinds],
-        without=[one.bus.kind for one in kinds if not one.sections],
-        untested={one.bus.kind: one.bus.untested for one in kinds if one.bus.untested},
+        kinds=[one.kind for one in kinds],
+        without=[one.kind for one in kinds if not one.sections],
+        untested={one.kind: one.untested for one in kinds if one.untested},
         notes={section.title: section.note for one in kinds for section in one.sections},
         figures=evidence_records(kinds),
     )
@@ -113,7 +113,7 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
 def _kinds(kinds: Sequence[KindEvidence]) -> Iterator[Block]:
     start = 0
     for one in kinds:
-        yield from evidence_sentence(one.bus)
+        yield from evidence_sentence(one)
         yield from _sections(one.sections, start=start)
         start += sum(len(section.comparisons) for section in one.sections)
 

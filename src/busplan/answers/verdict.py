@@ -1,6 +1,7 @@
 """The verdict of `capacity` in sentences."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
 from busplan.analysis.capacity.cycle import TIME
@@ -10,7 +11,6 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import changeable
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.answers.key_values import settings_sentence
-from busplan.buses.bus import Bus
 from busplan.buses.figure import (
     AVAILABLE,
     BIAS,
@@ -42,6 +42,10 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import listed, nouns, period_value
 from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.analysis.evidence import KindEvidence  # it loads NumPy
+    from busplan.buses.bus import Bus
 
 Places = Mapping[str, str]
 """JSON pointers: to the figures of each timing model, and to the `verdict` and its `change`."""
@@ -207,7 +211,7 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
         yield Sentence((f"Not in it: {', '.join(f'{one.label} ({one.key})' for one in left)}.",))
 
 
-def evidence_sentence(bus: Bus) -> Iterator[Sentence]:
+def evidence_sentence(bus: "Bus | KindEvidence") -> Iterator[Sentence]:
     """Say what of a kind nobody else's figure tests; nothing where all of it is tested."""
     if bus.untested:
         words = (

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from busplan.analysis import latency as analysis
 from busplan.analysis.latency import Transaction
+from busplan.analysis.network import bus_of, network_of
 from busplan.answers.latency import latency_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, load_profile, one_or_several, whole
 from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
-from busplan.forms.numbers import plural
 from busplan.sections.profile import Profile
 
 
@@ -33,7 +33,7 @@ class LatencyAnswer(Answer):
         return latency_report(self._found, self.profile)
 
     def _headline(self) -> str:
-        return f"{self.profile.name}: {plural(len(self.transactions), 'transaction')} of the farthest node"
+        return f"{self.profile.name}: {bus_of(self.profile).latency_subject(network_of(self.profile))}"
 
     @property
     def _found(self) -> analysis.LatencyResult:
@@ -47,7 +47,7 @@ def latency(
     payload_bytes: int | Iterable[int] | None = None,
     timing_model: Models | None = None,
 ) -> LatencyAnswer:
-    """Show every phase of one read and one write of the farthest node.
+    """Show how long data takes to arrive, phase by phase, as `busplan latency` does.
 
     Parameters
     ----------
@@ -62,7 +62,8 @@ def latency(
     Returns
     -------
     LatencyAnswer
-        Its `transactions` have 2 n entries for each timing model; times are in us.
+        Its `transactions`: on IEEE 1394 2 n for each timing model, a read and a write; on CAN one for each message.
+        Times are in us.
 
     Raises
     ------

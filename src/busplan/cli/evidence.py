@@ -7,7 +7,6 @@ import typer
 from busplan.cli.answering import answer
 from busplan.cli.options import AllOption, FormatOption, OutputOption
 from busplan.cli.progress import progress_bar
-from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,21 +39,15 @@ def evidence_command(
     Example: busplan evidence ieee1394
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.analysis.evidence import kind_evidence
+        from busplan.analysis.evidence import kind_evidence, known_kinds
         from busplan.answers.evidence import evidence_report
-        from busplan.buses import kind_names
 
-        if kind is not None and kind not in kind_names():
-            raise BusplanError(f"{kind}: no such kind of bus; there are {', '.join(kind_names())}")
-        kinds = kind_names() if kind is None else (kind,)
-        give(evidence_report([kind_evidence(name, circles=paper_circles) for name in kinds]))
+        give(evidence_report([kind_evidence(name, circles=shown_circles) for name in known_kinds(kind)]))
 
 
-def paper_circles() -> "Sequence[CircleFigures]":
-    """Run the circle tests of the paper."""
-    from busplan.analysis.circle.roundness import circle_test
-    from busplan.analysis.paper import CIRCLE_PROFILES
-    from busplan.profile.shipped import load
+def shown_circles() -> "Sequence[CircleFigures]":
+    """Run the circle tests of the paper with a progress bar."""
+    from busplan.analysis.evidence import paper_circles
 
     with progress_bar("circle tests") as progress:
-        return [circle_test(load(name).profile, progress=progress).results[0] for name in CIRCLE_PROFILES]
+        return paper_circles(progress=progress)

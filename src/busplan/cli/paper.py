@@ -1,7 +1,7 @@
 """`busplan paper`."""
 
 from busplan.cli.answering import answer
-from busplan.cli.evidence import paper_circles
+from busplan.cli.evidence import shown_circles
 from busplan.cli.options import AllOption, FormatOption, OutputOption
 
 
@@ -20,4 +20,4 @@ def paper_command(all_: AllOption = False, format_: FormatOption = None, output:
         from busplan.analysis.evidence import paper_evidence
         from busplan.answers.evidence import paper_report
 
-        give(paper_report(paper_evidence(circles=paper_circles)))
+        give(paper_report(paper_evidence(circles=shown_circles)))

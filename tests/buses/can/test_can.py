@@ -15,7 +15,7 @@ import busplan
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.buses import kind_named
-from busplan.buses.can.response import Source, worst_response
+from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.buses.can.streams import response, streams
 from busplan.buses.can.traffic import traffic_of_profile
@@ -155,7 +155,7 @@ def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None
     }
     each = streams(traffic_of_profile(override(profile(), changes)), is_stuffed=True)
     sent = {
-        identifier: Source(one.frame_us, one.period_us, one.jitter_us)
+        identifier: Sender(one.frame_us, one.period_us, one.jitter_us)
         for one in each
         for identifier in range(one.first, one.last + 1)
     }

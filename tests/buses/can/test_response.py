@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.buses.can.response import Response, Source, settled_us, worst_response
+from busplan.buses.can.response import Response, Sender, settled_us, worst_response
 
 SOME = settings(max_examples=60, deadline=None)
 JUST_BEFORE = 2.0**-10
@@ -39,20 +39,20 @@ def simulated(queued: Sequence[Queued]) -> list[tuple[Queued, float]]:
 
 
 @st.composite
-def messages(draw: st.DrawFn, most_load: float = 0.95) -> list[Source]:
+def messages(draw: st.DrawFn, most_load: float = 0.95) -> list[Sender]:
     """Some messages with whole microseconds, by priority; together they leave the bus some time."""
-    found: list[Source] = []
+    found: list[Sender] = []
     for _ in range(draw(st.integers(1, 5))):
         frame_us = draw(st.integers(5, 13))
         period_us = draw(st.integers(15, 90))
         jitter_us = draw(st.sampled_from([0, 0, 3, 14]))
-        one = Source(frame_us, period_us, min(jitter_us, period_us))
+        one = Sender(frame_us, period_us, min(jitter_us, period_us))
         if sum(each.load for each in (*found, one)) <= most_load:
             found.append(one)
-    return found or [Source(10, 40)]
+    return found or [Sender(10, 40)]
 
 
-def analysed(each: Sequence[Source], place: int, *, bit_us: float) -> Response:
+def analysed(each: Sequence[Sender], place: int, *, bit_us: float) -> Response:
     blocking_us = max((one.frames_us for one in each[place + 1 :]), default=0.0)
     found = worst_response(each[place], each[:place], blocking_us=blocking_us, bit_us=bit_us)
     assert found is not None
@@ -61,7 +61,7 @@ def analysed(each: Sequence[Source], place: int, *, bit_us: float) -> Response:
 
 @SOME
 @given(messages())
-def test_it_is_what_a_simulation_of_the_critical_instant_finds(each: list[Source]) -> None:
+def test_it_is_what_a_simulation_of_the_critical_instant_finds(each: list[Sender]) -> None:
     for place, own in enumerate(each):
         # Behind a frame that started just before, all starts are so much before what arrives with the whole clock.
         found = analysed(each, place, bit_us=0.0 if each[place + 1 :] else JUST_BEFORE)
@@ -89,7 +89,7 @@ def test_it_is_what_a_simulation_of_the_critical_instant_finds(each: list[Source
 
 @SOME
 @given(messages(), st.randoms(use_true_random=False))
-def test_no_simulated_start_takes_longer(each: list[Source], random: Random) -> None:
+def test_no_simulated_start_takes_longer(each: list[Sender], random: Random) -> None:
     draw = random.randint
     queued = []
     for priority, one in enumerate(each):
@@ -103,21 +103,21 @@ def test_no_simulated_start_takes_longer(each: list[Source], random: Random) -> 
 
 def test_the_worst_instance_is_not_always_the_first() -> None:
     # Davis et al. 2007, Table 2: 7 bytes at 125 kbit/s take 1 ms; the old analysis says 3 ms of the last, within 3.25.
-    each = [Source(1000, 2500), Source(1000, 3500), Source(1000, 3500)]
+    each = [Sender(1000, 2500), Sender(1000, 3500), Sender(1000, 3500)]
     assert [analysed(each, place, bit_us=8).us for place in range(3)] == [2000, 3000, 3500]
     assert analysed(each, 2, bit_us=8).instance == 1
 
 
 def test_a_load_of_one_or_more_has_no_response_time() -> None:
-    full = [Source(500, 1000), Source(500, 1000)]
+    full = [Sender(500, 1000), Sender(500, 1000)]
     assert worst_response(full[1], full[:1], blocking_us=0, bit_us=1) is None
     assert worst_response(full[0], [], blocking_us=500, bit_us=1) is not None
-    assert worst_response(Source(499, 1000), full[:1], blocking_us=0, bit_us=1) is not None
+    assert worst_response(Sender(499, 1000), full[:1], blocking_us=0, bit_us=1) is not None
 
 
 @SOME
 @given(messages(), st.integers(0, 300))
-def test_a_span_ends_when_all_that_arrives_in_it_is_sent(each: list[Source], others_us: int) -> None:
+def test_a_span_ends_when_all_that_arrives_in_it_is_sent(each: list[Sender], others_us: int) -> None:
     span_us = settled_us(others_us, each)
     assert span_us == others_us + sum(one.released_us(span_us) for one in each)
     for shorter_us in range(int(others_us + sum(one.frames_us for one in each)), int(span_us)):
@@ -126,7 +126,7 @@ def test_a_span_ends_when_all_that_arrives_in_it_is_sent(each: list[Source], oth
 
 @pytest.mark.parametrize("load", [0.991, 0.9999, 1.0, 3.0])
 def test_a_span_of_a_nearly_full_bus_is_a_bound_that_grows(load: float) -> None:
-    each = [Source(load * 1000, 1000, 10)]
+    each = [Sender(load * 1000, 1000, 10)]
     near_us, far_us = settled_us(50, each), settled_us(60, each)
     assert near_us < far_us < float("inf")
     if load < 0.9999:

@@ -77,6 +77,18 @@ def test_the_kit_by_hand_with_both_kinds_of_request() -> None:
     assert required_us(DVRK, cycle__broadcast_request="isochronous") == pytest.approx(by_hand_us, rel=1e-12)
 
 
+def test_with_firmware_up_to_rev_7_each_board_has_a_time_of_its_own() -> None:
+    # JHU FireWire.v: 256 N + 150 clocks of 49.152 MHz behind N others; the kit's 128 bytes take longer than 256.
+    timed: dict[str, object] = {"cycle.broadcast_request": "timed"}
+    assert required_us(override(DVRK, timed)) == required_us(DVRK, cycle__broadcast_request="isochronous")
+    small = {**timed, **{f"group.{name}.read_bytes": 4 for name in ("full", "partial")}}
+    cycle = cycle_of(override(DVRK, small), model="standard")
+    assert isinstance(cycle, BroadcastCycle)
+    sent_us = WAY_US + 1.63 + data_us(32)
+    assert sent_us < 256 / 49.152
+    assert plain(cycle.boards_us) == pytest.approx((150 + 7 * 256) / 49.152 + sent_us, rel=1e-12)
+
+
 def test_the_hub_is_read_no_earlier_than_the_software_does() -> None:
     # Four bytes of data: 3.052 + 8 (1.323 + 1.63 + 1.323 + 0.651) = 42.5 us, and the host waits 10 + 5 * 8 = 50 us.
     small: dict[str, object] = {"cycle.broadcast_request": "isochronous"}
@@ -128,7 +140,7 @@ def test_bias_and_doubt_count_each_packet_as_half_a_transaction() -> None:
 def buses(draw: st.DrawFn) -> tuple[Profile, dict[str, Any]]:
     nodes = draw(st.integers(1, 16))
     sizes = {f"{kind}_bytes": draw(st.integers(1, 120)) for kind in ("read", "write")}
-    isochronous = draw(st.booleans())
+    request = draw(st.sampled_from(["isochronous", "priority", "timed"]))
     gap_count = draw(st.integers(5, 63))
     host_us = draw(st.sampled_from([0.0, 3.0, 25.0]))
     first_start_us = draw(st.none() | st.floats(0.0, 125.0))
@@ -146,7 +158,7 @@ def buses(draw: st.DrawFn) -> tuple[Profile, dict[str, Any]]:
             "cycle": {
                 "period_us": 10_000.0,
                 "schedule": "broadcast",
-                "broadcast_request": "isochronous" if isochronous else "priority",
+                "broadcast_request": request,
             },
             "payload": sizes,
             "host": {"transaction_us": host_us},
@@ -161,7 +173,8 @@ def buses(draw: st.DrawFn) -> tuple[Profile, dict[str, Any]]:
         "host_us": host_us,
         "first_start_us": first_start_us,
     }
-    return profile, {"scene": BUS.Scene(**scene), "isochronous": isochronous}
+    slot_us = 256 / 49.152 if request == "timed" else 0.0
+    return profile, {"scene": BUS.Scene(**scene), "isochronous": request != "priority", "slot_us": slot_us}
 
 
 @settings(max_examples=150, deadline=None)

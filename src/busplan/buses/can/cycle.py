@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.can.equations import frame_us, payload_us
-from busplan.buses.can.response import Source, settled_us
+from busplan.buses.can.response import Sender, settled_us
 from busplan.buses.can.streams import frame_sizes, response, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Message, Pdos, Traffic, traffic_of
 from busplan.buses.network import Group, Network
@@ -217,7 +217,7 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
 
 def _settled(others_us: float, *numbers: float) -> float:
     """The span in which all messages that arrive in it are sent, of their times, periods and jitters in one row."""
-    return settled_us(others_us, [Source(*numbers[place : place + 3]) for place in range(0, len(numbers), 3)])
+    return settled_us(others_us, [Sender(*numbers[place : place + 3]) for place in range(0, len(numbers), 3)])
 
 
 def _phase(traffic: Traffic, is_stuffed: bool, place: int, key: str, *numbers: float) -> float:

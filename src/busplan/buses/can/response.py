@@ -13,7 +13,7 @@ from typing import NamedTuple
 from busplan.buses.can.constants import SATURATED
 
 
-class Source(NamedTuple):
+class Sender(NamedTuple):
     """Frames that one identifier, or several of one kind, put on the bus."""
 
     frames_us: float
@@ -44,7 +44,7 @@ class Response(NamedTuple):
     """R [us]."""
 
 
-def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float, bit_us: float) -> Response | None:
+def worst_response(own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float) -> Response | None:
     """Find the worst-case response time of one message.
 
     Parameters
@@ -72,7 +72,7 @@ def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float,
     --------
     The second instance is the worst one:
 
-    >>> worst_response(Source(1000, 3500), [Source(1000, 2500), Source(1000, 3500)], blocking_us=0, bit_us=8)
+    >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
     """
     if sum(one.load for one in (own, *higher)) >= SATURATED:
@@ -99,33 +99,33 @@ def worst_response(own: Source, higher: Sequence[Source], *, blocking_us: float,
     return worst
 
 
-def settled_us(others_us: float, sources: Sequence[Source]) -> float:
+def settled_us(others_us: float, senders: Sequence[Sender]) -> float:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
     ----------
     others_us
-        What takes time beside the sources [us].
-    sources
+        What takes time beside the senders [us].
+    senders
         What arrives within the span.
 
     Returns
     -------
     float
-        The smallest w = others + sum ceil((w + J) / T) C. With a load of the sources above 0.99 a bound of it in closed
+        The smallest w = others + sum ceil((w + J) / T) C. With a load of the senders above 0.99 a bound of it in closed
         form, and from `SATURATED` on one that says no more than that the bus is full.
 
     Examples
     --------
-    >>> settled_us(900.0, [Source(100, 500)])
+    >>> settled_us(900.0, [Sender(100, 500)])
     1200.0
     """
-    load = sum(one.load for one in sources)
+    load = sum(one.load for one in senders)
     if load > _NEARLY_FULL:
-        first_us = others_us + sum(one.frames_us + one.load * one.jitter_us for one in sources)
+        first_us = others_us + sum(one.frames_us + one.load * one.jitter_us for one in senders)
         return first_us / (1 - min(load, SATURATED))
-    start_us = others_us + sum(one.frames_us for one in sources)
-    return _settled(start_us, lambda span_us: others_us + sum(one.released_us(span_us) for one in sources))
+    start_us = others_us + sum(one.frames_us for one in senders)
+    return _settled(start_us, lambda span_us: others_us + sum(one.released_us(span_us) for one in senders))
 
 
 _NEARLY_FULL = 0.99

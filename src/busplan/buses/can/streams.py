@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from busplan.buses.can.constants import FRAME_BYTES, PDO_STEP
 from busplan.buses.can.equations import bit_us, frame_us
-from busplan.buses.can.response import Response, Source, worst_response
+from busplan.buses.can.response import Response, Sender, worst_response
 from busplan.buses.can.traffic import FOLLOWS, SYNC, Pdos, Traffic
 from busplan.elementwise import Number, plain
 
@@ -41,9 +41,9 @@ class Stream(NamedTuple):
         """What it is called."""
         return f"{self.group} {self.name}" if self.group else self.name
 
-    def source(self, count: int) -> Source:
+    def sender(self, count: int) -> Sender:
         """Some of its frames as a source."""
-        return Source(count * self.frame_us, self.period_us, self.jitter_us)
+        return Sender(count * self.frame_us, self.period_us, self.jitter_us)
 
     def goes_before(self, other: "Stream") -> bool:
         """Whether its frames win the arbitration against the last frame of another."""
@@ -143,8 +143,8 @@ def response(own: Stream, each: Sequence[Stream], *, bit_rate_kbit_s: float) -> 
         None where the load up to it is 1 or more.
     """
     others = [one for one in each if one is not own]
-    higher = [one.source(one.identifiers) for one in others if one.goes_before(own)]
+    higher = [one.sender(one.identifiers) for one in others if one.goes_before(own)]
     if own.identifiers > 1:
-        higher.append(own.source(own.identifiers - 1))
+        higher.append(own.sender(own.identifiers - 1))
     blocking_us = max((one.frame_us for one in others if not one.goes_before(own)), default=0.0)
-    return worst_response(own.source(1), higher, blocking_us=blocking_us, bit_us=plain(bit_us(bit_rate_kbit_s)))
+    return worst_response(own.sender(1), higher, blocking_us=blocking_us, bit_us=plain(bit_us(bit_rate_kbit_s)))

@@ -49,7 +49,7 @@ class BroadcastCycle(BroadcastTerms):
             "response_and_acknowledge_us": sent.hub_block_us + own.acknowledge_us,
             "latency_us": read_us,
             "latency_with_gaps_us": read_us + gaps.both_us,
-            "idle_us": self.first_wait_us + self.network.nodes * self.gap_us + self.hub_wait.gap_us + self.idle.gap_us,
+            "idle_us": self.node_waits_us + self.hub_wait.gap_us + self.idle.gap_us,
             "host_us": self.hub_wait.host_us + self.idle.host_us,
             "transaction_us": read_us + self.idle.us,
         }
@@ -96,23 +96,22 @@ class BroadcastCycle(BroadcastTerms):
     def stretches(self) -> Iterator[Sequence[BusEvent]]:
         """What no cycle start interrupts: the query, each broadcast, the read of the hub, and the write."""
         yield [BusEvent("sync", "sync_us", plain(self.query_us), "query to all nodes")]
-        node = 0
+        node, waits_us = 0, plain(self.first_wait_us)
         for group in self.network.groups:
             for _ in range(int(group.nodes)):
                 node += 1
-                yield list(self._broadcast_events(group, node))
+                yield list(self._broadcast_events(group, node, waits_us))
+                waits_us = plain(self.slot_wait_us(group))
         yield [*_waits(self.hub_wait, "before the hub is read"), *self._hub_events()]
         yield [*_waits(self.idle, "behind the hub's block"), *self._write_events()]
         yield _waits(self.idle, "behind the write")
 
-    def _broadcast_events(self, group: Group, node: int) -> Iterator[BusEvent]:
-        first_us = plain(self.first_wait_us) if node == 1 else 0.0
-
+    def _broadcast_events(self, group: Group, node: int, waits_us: float) -> Iterator[BusEvent]:
         def event(kind: str, term: str, us: Number, label: str) -> BusEvent:
             return BusEvent(kind, f"cycle_{term}_us", plain(us), label, node, "read", "response")
 
         yield event("subaction_gap", "idle", self.gap_us, "subaction gap before the broadcast")
-        yield event("first_wait", "idle", first_us, "wait of the first node")
+        yield event("node_wait", "idle", waits_us, "wait of the node")
         yield event("arbitration", "arbitration", self.arbitration_us, "node arbitration")
         yield event("response_data", "data", self.broadcast_us(group), "node broadcast")
 

@@ -23,6 +23,7 @@ from busplan.buses.ieee1394.constants import (
     BLOCK_WRITE_REQUEST_OVERHEAD_BYTES,
     BROADCAST_CLOCK_MHZ,
     BROADCAST_NODE_BYTES,
+    BROADCAST_SLOT_CLOCKS,
     FIRST_BROADCAST_CLOCKS,
     HUB_TIMING_BYTES,
     HUB_WAIT_PER_NODE_US,
@@ -113,7 +114,11 @@ class BroadcastTerms(CycleWithStarts):
 
     @property
     def _is_isochronous(self) -> bool:
-        return bool(self.network.profile.cycle.broadcast_request == "isochronous")
+        return bool(self.network.profile.cycle.broadcast_request != "priority")
+
+    @property
+    def _is_timed(self) -> bool:
+        return bool(self.network.profile.cycle.broadcast_request == "timed")
 
     @cached_property
     def gap_us(self) -> Number:
@@ -123,8 +128,31 @@ class BroadcastTerms(CycleWithStarts):
     @cached_property
     def first_wait_us(self) -> Number:
         """What the first node waits behind the query, beyond its gap [us]."""
-        wait_us = alike(FIRST_BROADCAST_CLOCKS, self.link.hops) / BROADCAST_CLOCK_MHZ
-        return larger(wait_us - self.gap_us, 0.0)
+        return larger(self._clocks_us(FIRST_BROADCAST_CLOCKS) - self.gap_us, 0.0)
+
+    def _clocks_us(self, clocks: Number) -> Number:
+        return alike(clocks, self.link.hops) / BROADCAST_CLOCK_MHZ
+
+    def slot_wait_us(self, group: Group) -> Number:
+        """What the next node waits behind the broadcast of a node, where each has its own time [us].
+
+        With unlike nodes it is the most: a node that is late because of a long broadcast waits less.
+
+        Parameters
+        ----------
+        group
+            The node's group.
+        """
+        if not self._is_timed:
+            return 0.0
+        sent_us = self.arbitration_us + self.broadcast_us(group)
+        return larger(self._clocks_us(BROADCAST_SLOT_CLOCKS) - sent_us, 0.0)
+
+    @cached_property
+    def slot_waits_us(self) -> Number:
+        """What all nodes wait for their times behind the first; nobody waits behind the last [us]."""
+        groups = self.network.groups
+        return total(group.nodes * self.slot_wait_us(group) for group in groups) - self.slot_wait_us(groups[-1])
 
     @cached_property
     def arbitration_us(self) -> Number:
@@ -151,12 +179,17 @@ class BroadcastTerms(CycleWithStarts):
         found_us = self.delays.arbitration_us + self.packets.query_us + self.delays.acknowledge_us
         return named(found_us, "query_us", "T_query")
 
+    @property
+    def node_waits_us(self) -> Number:
+        """Idle bus before all broadcasts [us]."""
+        return self.first_wait_us + self.network.nodes * self.gap_us + self.slot_waits_us
+
     @cached_property
     def boards_us(self) -> Number:
         """All broadcasts with their gaps [us]."""
         each_us = self.gap_us + self.arbitration_us
         sent_us = total(group.nodes * (each_us + self.broadcast_us(group)) for group in self.network.groups)
-        return named(self.first_wait_us + sent_us, "boards_us", "T_boards")
+        return named(self.first_wait_us + sent_us + self.slot_waits_us, "boards_us", "T_boards")
 
     @cached_property
     def hub_us(self) -> Number:
@@ -218,9 +251,7 @@ class BroadcastTerms(CycleWithStarts):
             Term("cycle_data_us", broadcasts_us + sent.hub_request_us + sent.hub_block_us + sent.write_us),
             Term("cycle_acknowledge_us", 3 * own.acknowledge_us),
             *(Term(f"cycle_{name}_us", 0.0) for name in ("hold", "execution", "worst_extra")),
-            Term(
-                "cycle_idle_us", self.first_wait_us + nodes * self.gap_us + self.hub_wait.gap_us + 2 * self.idle.gap_us
-            ),
+            Term("cycle_idle_us", self.node_waits_us + self.hub_wait.gap_us + 2 * self.idle.gap_us),
             Term("cycle_host_us", self.hub_wait.host_us + 2 * self.idle.host_us),
             Term("retries_us", self.retries_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),

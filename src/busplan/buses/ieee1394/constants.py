@@ -221,7 +221,7 @@ SYNC_PACKET_BYTES: Final = Sourced(
 # --- the broadcast schedule --------------------------------------------------------------------------------
 
 _JHU_SOFTWARE = "JHU mechatronics-software, BasePort.cpp and FirewirePort.cpp"
-_JHU_FIRMWARE = "JHU mechatronics-firmware, the broadcast protocol"
+_JHU_FIRMWARE = "JHU mechatronics-firmware, FireWire.v up to Rev 7, HubReg.v from Rev 8"
 
 MAX_BROADCAST_NODES: Final = Sourced(
     16,
@@ -243,6 +243,13 @@ FIRST_BROADCAST_CLOCKS: Final = Sourced(
     grade="published",
     source=_JHU_FIRMWARE,
     meaning="how long the first node waits behind the query",
+)
+BROADCAST_SLOT_CLOCKS: Final = Sourced(
+    256,
+    unit="clocks",
+    grade="published",
+    source="JHU mechatronics-firmware, FireWire.v up to Rev 7: 256 clocks for each board before it",
+    meaning="from the time of a node to broadcast to that of the next, where each has its own",
 )
 HUB_WAIT_US: Final = Sourced(
     10,

@@ -8,7 +8,10 @@ from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.broadcast_terms import hub_block_bytes
 from busplan.buses.ieee1394.constants import (
+    BROADCAST_CLOCK_MHZ,
+    BROADCAST_SLOT_CLOCKS,
     DATA_RATE_MBIT_S,
+    FIRST_BROADCAST_CLOCKS,
     MAX_GAP_COUNT,
     QUADLET_BYTES,
     REFERENCE_CABLE_M,
@@ -40,7 +43,13 @@ def kit_sections(kit: Network, published: Published) -> tuple[EvidenceSection, .
     ----------
     Z. Chen, P. Kazanzides, TePRA 2014; JHU mechatronics-software.
     """
-    return (_gain(kit, published), _rates(kit, published), _board(kit, published), _hub_block(kit, published))
+    return (
+        _gain(kit, published),
+        _rates(kit, published),
+        _board(kit, published),
+        _times(published),
+        _hub_block(kit, published),
+    )
 
 
 def _changed(kit: Network, *, host_us: float | None = None, **cycle: str) -> Network:
@@ -56,7 +65,7 @@ def _one_by_one_us(kit: Network, host_us: float | None = None) -> float:
 
 
 def _broadcast_us(kit: Network, host_us: float | None = None) -> float:
-    changed = _changed(kit, host_us=host_us, schedule="broadcast", broadcast_request="isochronous")
+    changed = _changed(kit, host_us=host_us, schedule="broadcast", broadcast_request="timed")
     return plain(BroadcastCycle(changed, "standard").required_us)
 
 
@@ -92,8 +101,8 @@ def _rates(kit: Network, published: Published) -> EvidenceSection:
     return EvidenceSection(
         title,
         f"TePRA 2014, {given['source']}. A period holds the host's own work, too, so a cycle must be shorter: the "
-        "residual is what is left to the host. Requests are isochronous, as in 2014; packets are those of today's "
-        "firmware, longer than those of 2014.",
+        "residual is what is left to the host. Requests are timed, as the firmware of 2014 has them; packets are "
+        "those of today's firmware, longer than those of 2014.",
         (
             Comparison(title, "one by one", "us", one_us, _STANDARD, _one_by_one_us(kit), given["grade"]),
             Comparison(title, "by broadcasts", "us", all_us, _STANDARD, _broadcast_us(kit), given["grade"]),
@@ -126,6 +135,23 @@ def _board(kit: Network, published: Published) -> EvidenceSection:
                 given["grade"],
             )
             for hops in (1, int(plain(kit.nodes)))
+        ),
+        "dvrk",
+    )
+
+
+def _times(published: Published) -> EvidenceSection:
+    title, given = "dVRK: when a board broadcasts, firmware up to Rev 7", published["times"]
+    found = (
+        ("first board", "first_us", FIRST_BROADCAST_CLOCKS),
+        ("each further board", "per_board_us", BROADCAST_SLOT_CLOCKS),
+    )
+    return EvidenceSection(
+        title,
+        f"{given['source']}. From Rev 8 on a board sends when it has heard the one before it.",
+        tuple(
+            Comparison(title, name, "us", given[key], _STANDARD, clocks / BROADCAST_CLOCK_MHZ, given["grade"])
+            for name, key, clocks in found
         ),
         "dvrk",
     )

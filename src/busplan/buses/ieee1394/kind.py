@@ -101,7 +101,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         _kind("response_data", "response data", "response_data_us", "<", "response"),
         _kind("subaction_gap", "subaction gap", "subaction_gap_us", ".", "gap"),
         _kind("arbitration_reset_gap", "arbitration reset gap", "arbitration_reset_gap_us", ":", "long-gap"),
-        EventKind("first_wait", "wait of the first node", "broadcast", "f", "gap"),
+        EventKind("node_wait", "wait of a node", "broadcast", "w", "gap"),
         EventKind("allowance", "allowance for a faster node", "idle", "+", "gap"),
         _kind("host", "host", "host_us", "o", "contention"),
         EventKind("retry", "busy retry", "profile", "r", "request"),

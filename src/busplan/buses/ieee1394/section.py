@@ -163,7 +163,8 @@ class Ieee1394CycleSection(CycleSection):
     broadcast_request: BroadcastRequest = Field(
         default="priority",
         description="How the nodes ask for the bus to broadcast: priority, each after a subaction gap (JHU firmware "
-        "Rev 9), or isochronous, without one (up to Rev 8); read with the schedule broadcast",
+        "Rev 9); isochronous, without one (Rev 8); timed, each at a time of its own (up to Rev 7); read with the "
+        "schedule broadcast",
         examples=["isochronous"],
     )
     retries: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(

@@ -29,7 +29,7 @@ from busplan.elementwise import Number, alike, choose, named, worded
 from busplan.sections.transactions import TransactionKind
 
 TimingModelName = Literal["paper", "standard"]
-BroadcastRequest = Literal["isochronous", "priority"]
+BroadcastRequest = Literal["isochronous", "priority", "timed"]
 """How a node asks for the bus to broadcast its data."""
 
 
