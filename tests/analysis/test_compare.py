@@ -33,6 +33,7 @@ from busplan.sections.transactions import TRANSACTION_KINDS
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
 SOME = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 KINDS = pytest.mark.parametrize("kind", kind_names())
+BOTH = ("ieee1394", "can")
 GANTRY = load("gantry-24").profile
 
 
@@ -208,7 +209,7 @@ def test_the_step_is_the_largest_that_divides_the_period(period_us: float, most_
 
 def test_a_circle_is_that_of_the_smallest_period_and_its_step() -> None:
     profile = load("paper-1ms").profile
-    found = compare(profile, with_circle=True)
+    found = compare(profile, kinds=BOTH, with_circle=True)
     for one in found.compared:
         assert one.circle is not None
         assert one.circle.figures is not None
@@ -231,7 +232,7 @@ def test_a_circle_that_cannot_be_run_says_why() -> None:
 def test_a_kind_that_cannot_have_the_machine_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     can = bus_of(load("can-servo-8").profile)
     monkeypatch.setattr(type(can), "starter", can.starter._replace(bus='[bus]\nkind = "can"'))
-    first, second = compare(GANTRY).kinds
+    first, second = compare(GANTRY, kinds=BOTH).kinds
     assert isinstance(first, MachineOnKind)
     assert isinstance(second, NotOnKind)
     assert (second.kind, len(second.why)) == ("can", 1)

@@ -61,7 +61,7 @@ def test_characters_fit_and_every_letter_is_in_the_legend(found: KindComparison,
 
 def test_points_in_one_place_are_a_star() -> None:
     found = FOUND["paper-1ms"]
-    (own, _) = found.compared
+    own = found.compared[0]
     twice = found._replace(kinds=(own, own._replace(is_own=False)))
     drawn = "\n".join(line.text for line in compare_lines(twice, width=80))
     assert drawn.count("*") == sum(bool(each.axes) for each in own.curve) + 1

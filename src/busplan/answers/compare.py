@@ -42,10 +42,10 @@ _COLUMNS: Final = (
     TableColumn("margin", "us"),
     TableColumn("U", "us"),
     TableColumn("smallest period", "us"),
-    TableColumn("largest term or limit", kind="words", wraps=True),
+    TableColumn("binds", kind="words", rank=1, leaves="below", wraps=True),
     TableColumn("most", group="safe axes"),
-    TableColumn("limited by", kind="words", group="safe axes", wraps=True),
-    TableColumn("assumed", rank=1),
+    TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
+    TableColumn("assumed", rank=2),
 )
 _CIRCLE: Final = (
     TableColumn("", kind="words", group="circle"),
