@@ -56,7 +56,7 @@ def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None
     (note,) = [line for line in said(GANTRY) if line.startswith("CAN: ")]
     assert "At 1 ms a PDO of 40 bytes is over the 32 bytes of four frames; the bus load is 690.0%" in note
     assert "No period is shown to fit: a PDO of 40 bytes" in note
-    assert "Left out: bus.speed, bus.gap_count, bus.charge_hops, group.io.write_response." in note
+    assert "Left out on CAN: bus.speed, bus.gap_count, bus.charge_hops, group.io.write_response." in said(GANTRY)
     assert "Execution times are assumed to be as long as on IEEE 1394; here they are: from SYNC to a queued" in note
     assert "No figure that others have published or measured tests the cycle of CAN (kind can)." in note
     assert not [line for line in said(GANTRY) if line.startswith("IEEE 1394: ")]

@@ -42,7 +42,7 @@ def test_a_picture_goes_down_a_pipe(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["gantry-24", "can-servo-8", "paper-1ms", "dvrk"])
 def test_a_report_exits_0_and_has_every_kind(run: Run, name: str) -> None:
-    done = run("compare", name, "--circle", "--format", "json")
+    done = run("compare", name, *(["--circle"] if name == "paper-1ms" else []), "--format", "json")
     assert (done.returncode, done.stderr) == (0, "")
     document = json.loads(done.stdout, parse_constant=pytest.fail)
     assert {one["kind"] for one in document["buses"]} == set(kind_names())
@@ -51,13 +51,17 @@ def test_a_report_exits_0_and_has_every_kind(run: Run, name: str) -> None:
         if one["smallest_period_us"] is None:
             assert one["no_period"] or one["why_not"]
             assert one["circle"] is None
-        else:
+        elif document["with_circle"]:
             steps = one["smallest_period_us"] / one["circle"]["step_us"]
             assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
 def test_the_circle_says_its_step(run: Run) -> None:
-    first, *_ = (line for line in run("compare", "paper-1ms", "--circle").stdout.splitlines() if "as it is" in line)
+    first, *_ = (
+        line
+        for line in run("compare", "paper-1ms", "--buses", "ieee1394", "--circle").stdout.splitlines()
+        if "as it is" in line
+    )
     assert first.split()[-2:] == ["PASSED", "92.082"]
     assert "PASSED" not in run("compare", "paper-1ms").stdout
 

@@ -8,12 +8,12 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.answers.verdict import evidence_sentence
 from busplan.buses import kind_named
 from busplan.forms.blocks import Code, Sentence, joined
-from busplan.forms.numbers import period
+from busplan.forms.numbers import listed, period
 from busplan.sections.profile import Profile
 
 
 def notes(found: KindComparison) -> Iterator[Sentence]:
-    """Say of each kind what stands in the way, what of the profile it leaves out and what nobody has tested.
+    """Say of each kind what stands in the way and what nobody has tested, and what of the profile is left out.
 
     Parameters
     ----------
@@ -25,10 +25,22 @@ def notes(found: KindComparison) -> Iterator[Sentence]:
             why = "; ".join(one.why)
             yield Sentence((f"{kind_named(one.kind).title} cannot have this machine: {why}.",), "warns")
         else:
-            said = [*_obstacles(one), *_circle(one), *_machine(one, found.profile)]
+            said = [*_obstacles(one), *_circle(one), *_execution(one, found.profile)]
             said += evidence_sentence(bus_of(one.profile))
             if said:
                 yield joined(Sentence((f"{bus_of(one.profile).title}:",)), *said)
+    yield from _left_out(found)
+
+
+def _left_out(found: KindComparison) -> Iterator[Sentence]:
+    """What of the profile is left out, once for the kinds that leave out the same."""
+    titles: dict[tuple[str, ...], list[str]] = {}
+    for one in found.compared:
+        if one.left_out:
+            titles.setdefault(one.left_out, []).append(bus_of(one.profile).title)
+    for left_out, names in titles.items():
+        keys = joined(*(Sentence((Code(key),)) for key in left_out), by=", ")
+        yield Sentence((f"Left out on {listed(names, 'and')}: ", *keys.parts, "."))
 
 
 def _obstacles(one: MachineOnKind) -> Iterator[Sentence]:
@@ -48,11 +60,8 @@ def _circle(one: MachineOnKind) -> Iterator[Sentence]:
         yield Sentence((f"The circle at {at}: {', and '.join(one.circle.problems)}.",))
 
 
-def _machine(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
-    """What of the profile is left out, and what its execution times stand for."""
-    if one.left_out:
-        keys = joined(*(Sentence((Code(key),)) for key in one.left_out), by=", ")
-        yield Sentence(("Left out: ", *keys.parts, "."))
+def _execution(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
+    """What the execution times of the profile stand for."""
     bus, own = bus_of(one.profile), bus_of(profile)
     if not one.is_own and bus.has_execution(network_of(one.profile)):
         said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}."
