@@ -665,7 +665,7 @@ def test_an_unknown_kind_is_answered_with_the_known_ones_at_its_line(run: Run, r
     done = run("capacity", ring.name, cwd=ring.parent)
     assert done.returncode == 2
     assert done.stderr.splitlines() == [
-        'ring.toml:5:1: bus.kind = "rung": expected "ieee1394" or "can" or "ring"',
+        'ring.toml:5:1: bus.kind = "rung": expected "ieee1394" or "can" or "ethercat" or "ring"',
         "ring.toml:9:1: cycle.period_us = -1: must be 0.001 or more",
     ]
 

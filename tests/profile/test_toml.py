@@ -102,7 +102,10 @@ FAULTS = {
         *('kind = "table"', 'kind = "table"\ngrade = "guessed"'),
         ('20:1: node.execution.grade = "guessed": expected "measured", "derived", "calibrated" or "assumed"'),
     ),
-    "unknown kind of bus": ('"ieee1394"', '"sercos"', '4:1: bus.kind = "sercos": expected "ieee1394" or "can"'),
+    "unknown kind of bus": (
+        *('"ieee1394"', '"sercos"'),
+        ('4:1: bus.kind = "sercos": expected "ieee1394" or "can" or "ethercat"'),
+    ),
     "S800": (
         *('"S400"', '"S800"'),
         ('5:1: bus.speed = "S800": S800 arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. '

@@ -106,6 +106,8 @@ def test_codes_are_stable() -> None:
         "BP121": "bus-load-over-limit",
         "BP122": "identifiers-collide",
         "BP123": "deadline-missed",
+        "BP131": "no-common-clock",
+        "BP132": "command-behind-sync",
         "BP201": "circle-tolerance",
         "BP202": "no-stability-margin",
         "BP203": "circle-impossible",
