@@ -123,3 +123,11 @@ def test_every_kind_has_a_column_in_csv() -> None:
     assert {one["kind"] for one in rows} == set(kind_names())
     assert {one["profile"] for one in rows} == {"can-servo-8"}
     assert len({tuple(one) for one in rows}) == 1
+
+
+def test_a_cycle_without_execution_times_says_so() -> None:
+    found = compare(load("paper-1ms").profile, kinds=["ethercat"])
+    assert [line for line in said(found) if line.startswith("EtherCAT: No execution time is in its cycle.")]
+    own = compare(load("ethercat-servo-8").profile, kinds=["ethercat", "ieee1394"])
+    assert not [line for line in said(own) if "No execution time" in line]
+    assert [line for line in said(own) if "The cycle of EtherCAT has none as this profile sets it." in line]

@@ -63,8 +63,13 @@ def _circle(one: MachineOnKind) -> Iterator[Sentence]:
 def _execution(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
     """What the execution times of the profile stand for."""
     bus, own = bus_of(one.profile), bus_of(profile)
-    if not one.is_own and bus.has_execution(network_of(one.profile)):
-        said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}."
-        has_none = not own.has_execution(network_of(profile))
-        none = f" The cycle of {own.title} has none as this profile sets it." if has_none else ""
-        yield Sentence((f"{said}{none}",))
+    owns_any = own.has_execution(network_of(profile))
+    if one.is_own:
+        return
+    if not bus.has_execution(network_of(one.profile)):
+        if owns_any:
+            yield Sentence(("No execution time is in its cycle.",))
+        return
+    said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}."
+    none = "" if owns_any else f" The cycle of {own.title} has none as this profile sets it."
+    yield Sentence((f"{said}{none}",))
