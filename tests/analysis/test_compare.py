@@ -146,6 +146,9 @@ def test_the_smallest_period_of_a_limit_is_exact() -> None:
     (one,) = compare(load("paper-1ms").profile, kinds=["can"]).compared
     assert one.smallest.us == pytest.approx(frames_us / 0.8, rel=1e-9)
     assert one.figures.bus_load == pytest.approx(frames_us / 1000, rel=1e-9)
+    # Whatever share of the period is for communication.
+    half = override(one.profile, {"cycle.slice_ratio": 0.5, "limits.max_load": 0.1})
+    assert smallest_period(half).us == pytest.approx(frames_us / 0.1, rel=1e-9)
 
 
 def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:

@@ -75,12 +75,11 @@ def converted(profile: Profile, kind: str) -> Conversion:
 
 
 def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
-    """What profiles of every kind say, without the slice ratio; and the keys of the rest, a section by its name."""
+    """What profiles of every kind say; and the keys of the rest, a section by its name."""
     rest: list[str] = []
     found = _part(data, [Profile], "", rest)
     nodes = data["bus"].get(_NODES)
     found["bus"] = {} if nodes is None else {_NODES: nodes}
-    found["cycle"].pop(_RATIO, None)
     said = {f"bus.{one}" for one in (_NODES, _SHOWN_FIRST)}
     return found, tuple(one for one in rest if one not in said)
 
@@ -111,7 +110,7 @@ def _new_bus(starter: Starter) -> TomlTable:
 
 
 def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:
-    """Both, section by section; the machine has no key of the new bus."""
+    """Both, section by section; a key of both is that of the new bus."""
     return {**machine, **{name: {**machine.get(name, {}), **section} for name, section in new.items()}}
 
 
