@@ -22,6 +22,8 @@ def test_a_written_profile_reads_to_the_same(name: str) -> None:
         "ieee1394": ("bus.gap_count", "optimal"),
         "can": ("bus.sync_counter", True),
         "ethercat": ("bus.command", "LRD-LWR"),
+        "sercos3": ("bus.version", "V1.0"),
+        "sercos2": ("bus.data_rate_mbit_s", 4),
     }[profile.bus.kind]
     changed = override(profile, {nodes_key: 7, key: value, "cycle.period_us": 812.5})
     for one in (profile, changed):

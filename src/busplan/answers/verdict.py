@@ -200,7 +200,8 @@ def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:
 def _broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
     """Say by how much each limit of the bus is broken."""
     broken = (bus_of(profile).limit(key) for key in figures.exceeded if key != TIME)
-    return [limit.words(network_of(profile)) for limit in broken if limit is not None]
+    network = network_of(profile)._replace(period_us=figures.period_us)
+    return [limit.words(network) for limit in broken if limit is not None]
 
 
 def not_in_it(profile: Profile) -> Iterator[Sentence]:

@@ -15,6 +15,8 @@ _MODULES: Final[dict[str, str]] = {
     "ieee1394": "busplan.buses.ieee1394.kind",
     "can": "busplan.buses.can.kind",
     "ethercat": "busplan.buses.ethercat.kind",
+    "sercos3": "busplan.buses.sercos3.kind",
+    "sercos2": "busplan.buses.sercos2.kind",
 }
 _LOADED: Final[dict[str, "Bus"]] = {}
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
 from busplan.buses.network import Network
+from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
 from busplan.elementwise import Number, plain, total
 from busplan.errors import BusplanError
@@ -20,7 +21,7 @@ from busplan.errors import BusplanError
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
-    from busplan.sourced import Sourced
+    from busplan.sourced import Grade, Sourced
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -99,6 +100,8 @@ class Limit(NamedTuple):
     says: Callable[[Network], str] | None = None
     """What is said of a broken one, where more than its value is: instead of `over`."""
 
+    is_of_period: bool = False
+    """The period alone breaks it: a plan takes no period that does."""
     slice_us: Callable[[Network], float] | None = None
     """The slice from which on plain numbers keep it, the slice ratio as it is, where a longer period is a cure [us];
     without it no period is."""
@@ -339,6 +342,8 @@ class Bus(ABC):
     """In the order in which they are reported; at least one grows with the nodes."""
     limits_of: ClassVar[str] = "bus"
     """Who sets them, as a message says it."""
+    periods: ClassVar[Periods] = ANY_PERIOD
+    """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
     starter: "ClassVar[Starter]"
     """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -353,6 +358,8 @@ class Bus(ABC):
     """Its figures with a source, by name."""
     key_sources: ClassVar[Mapping[str, "Sourced"]] = {}
     """Keys of a profile whose default is a figure with a source."""
+    key_grades: ClassVar[Mapping[str, "Grade"]] = {}
+    """How well what a profile says of its keys can be known, where that is less than given."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""
     choosing_keys: ClassVar[tuple[str, ...]] = ("execution.grade",)

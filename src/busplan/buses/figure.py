@@ -45,6 +45,7 @@ _UNITS: Final = {
     "_db": "dB",
     "_hz": "Hz",
     "_kbit_s": "kbit/s",
+    "_mbit_s": "Mbit/s",
     "_s": "s",
 }
 """Unit by the end of a key's name, the longer ends first."""

@@ -60,7 +60,8 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     >>> steps.max_axes(1000.0)
     16
     """
-    longest, bus = override(profile, {"cycle.period_us": MAX_TIME_US}), bus_of(profile)
+    bus = bus_of(profile)
+    longest = override(profile, {"cycle.period_us": min(MAX_TIME_US, bus.periods.longest_us)})
     is_safe = model == bus.deciding_model
     most, limit = safe_nodes(longest, group=group) if is_safe else largest_nodes(longest, model=model, group=group)
     network = network_of(profile).asking(group)
@@ -68,7 +69,7 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     cycle = bus.cycle(network.with_nodes(counts), model=model)
     needed_us = np.asarray(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us)
     said, ratio = network.asked_nodes, profile.cycle.slice_ratio
-    from_us = np.broadcast_to(needed_us / ratio, counts.shape).tolist()
+    from_us = np.broadcast_to(np.asarray(bus.periods.from_us(needed_us / ratio)), counts.shape).tolist()
     return NodeSteps(model, said.node.axes, tuple(from_us), limit, is_safe, int(said.nodes))
 
 
