@@ -19,7 +19,8 @@ from busplan.analysis.comparison.kinds import (
     most_safe_axes,
 )
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.smallest_period import PERIOD, smallest_period
+from busplan.analysis.planning.freedoms import PERIOD
+from busplan.analysis.planning.smallest_period import smallest_period
 from busplan.buses import kind_names
 from busplan.errors import BusplanError
 from busplan.profile.conversion import converted
@@ -159,6 +160,9 @@ def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
     assert "gap count" in unsafe.why
     endless = smallest_period(override(load("paper-4ms").profile, {"cycle.nonperiodic_us": MAX_TIME_US}))
     assert endless == (None, "it would be over 1000 s")
+    known = override(load("sercos3-servo-8").profile, {"cycle.nonperiodic_us": 1e5})
+    assert smallest_period(known) == (None, "it would be over 65 ms")
+    assert smallest_period(load("sercos3-servo-8").profile).us == 250
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "can-servo-8", "gantry-24", "dvrk"])

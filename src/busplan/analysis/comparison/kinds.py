@@ -11,7 +11,8 @@ from busplan.analysis.comparison.circle_tests import circle_tests
 from busplan.analysis.comparison.difference import ComputeCircleFigures
 from busplan.analysis.network import varied_nodes
 from busplan.analysis.planning.constraints import STEP
-from busplan.analysis.planning.smallest_period import PERIOD, SmallestPeriod, smallest_period
+from busplan.analysis.planning.freedoms import PERIOD
+from busplan.analysis.planning.smallest_period import SmallestPeriod, smallest_period
 from busplan.buses import kind_named, kind_names
 from busplan.errors import BusplanError
 from busplan.nearest import did_you_mean

@@ -7,11 +7,14 @@ from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import Need, shown
+from busplan.analysis.planning.freedoms import PERIOD, longest_period_us
+from busplan.buses.bus import Bus
+from busplan.elementwise import plain
+from busplan.forms.numbers import period
 from busplan.profile.toml import override
-from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
+from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
 
-PERIOD: Final = "cycle.period_us"
 _MOST_TRIES: Final = 64
 """Each try keeps one more limit, so that a few are enough."""
 _NEXT: Final = 1 + 1e-9
@@ -21,7 +24,7 @@ _HALVINGS: Final = 40
 
 
 class SmallestPeriod(NamedTuple):
-    """The smallest period at which a profile is shown to fit."""
+    """The smallest period at which a profile is shown to fit, of those that its bus knows."""
 
     us: float | None
     """None if there is none [us]."""
@@ -39,18 +42,23 @@ def smallest_period(profile: Profile) -> SmallestPeriod:
     """
     bus, ratio = bus_of(profile), profile.cycle.slice_ratio
     cycle = bus.cycle(network_of(profile), model=bus.deciding_model)
-    short_us, found_us = 0.0, max(MIN_STEP_US, float(certainty(cycle).safe_required_us) / ratio)
+    short_us, found_us = 0.0, _known_us(bus, float(certainty(cycle).safe_required_us) / ratio)
+    longest_us = longest_period_us(profile)
     for _ in range(_MOST_TRIES):
-        if found_us > MAX_TIME_US:
+        if found_us > longest_us:
             break
         need = _need(profile, found_us)
         if need is None:
-            return SmallestPeriod(_between(profile, short_us, found_us))
+            return SmallestPeriod(_known_us(bus, _between(profile, short_us, found_us)))
         if need.us == inf:
             return SmallestPeriod(None, need.why)
-        short_us = found_us
-        found_us = max(need.us / ratio, found_us * _NEXT)
-    return SmallestPeriod(None, f"it would be over {MAX_TIME_US / 1e6:g} s")
+        short_us, found_us = found_us, _known_us(bus, max(need.us / ratio, found_us * _NEXT))
+    return SmallestPeriod(None, f"it would be over {period(longest_us)}")
+
+
+def _known_us(bus: Bus, least_us: float) -> float:
+    """The shortest period that a bus knows and that is no shorter than a time; infinite where none is [us]."""
+    return float(plain(bus.periods.from_us(max(MIN_STEP_US, least_us))))
 
 
 def _need(profile: Profile, period_us: float) -> Need | None:

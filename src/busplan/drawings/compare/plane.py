@@ -51,9 +51,10 @@ def kind_lines(found: KindComparison) -> tuple[KindLine, ...]:
         letters = [each for each in f"{one.profile.bus.kind.upper()}{ascii_uppercase}" if each in ascii_uppercase]
         letter = next((each for each in letters if each not in taken), "#")
         taken.add(letter)
-        own = " (this profile)" if one.is_own else ""
+        own, points = " (this profile)" if one.is_own else "", _points(one)
+        none = "" if points else ": none"
         ink = INKS_OF_LINES[number % len(INKS_OF_LINES)]
-        lines.append(KindLine(letter, ink, f"{bus_of(one.profile).title}{own}", _points(one)))
+        lines.append(KindLine(letter, ink, f"{bus_of(one.profile).title}{own}{none}", points))
     return tuple(lines)
 
 
