@@ -35,7 +35,7 @@ def compare_png(found: KindComparison, *, title: str) -> bytes:
     with rc_context({"text.parse_math": False}):
         figure = Figure(figsize=(9.0, 5.4), layout="constrained")
         figure.suptitle("\n".join(wrap(title, _TITLE_CHARACTERS)), fontsize=11)
-        axes = figure.subplots()
+        axes: Any = figure.subplots()
         _scales(axes, found)
         for line in kind_lines(found):
             _line(axes, line)
