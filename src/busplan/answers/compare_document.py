@@ -52,13 +52,16 @@ def _row(record: Record) -> Record:
 def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
     """A kind of bus as plain data; what a kind that cannot have the machine lacks is null."""
     if isinstance(one, NotOnKind):
-        empty: Record = dict.fromkeys((*_FIGURES, *_SAFE, "smallest_period_us", "no_period", "circle"))
+        empty: Record = dict.fromkeys(
+            (*_FIGURES, "verdict_after_reset", *_SAFE, "smallest_period_us", "no_period", "circle")
+        )
         lists: Record = {"assumed": [], "left_out": [], "curve": []}
         return {**_head(one.kind, is_own=False, why_not=list(one.why)), **empty, **lists}
     bus = bus_of(one.profile)
     return {
         **_head(bus.kind, is_own=one.is_own, why_not=[]),
         **{key: _plain(getattr(one.figures, key)) for key in _FIGURES},
+        "verdict_after_reset": None if one.after_reset is None else one.after_reset.verdict,
         **_safe_record(one.safe),
         "smallest_period_us": one.smallest.us,
         "no_period": one.smallest.why or None,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.verdict import evidence_sentence
+from busplan.answers.verdict import evidence_sentence, reset_sentence
 from busplan.buses import kind_named
 from busplan.forms.blocks import Code, Sentence, joined
 from busplan.forms.numbers import listed, period
@@ -25,7 +25,8 @@ def notes(found: KindComparison) -> Iterator[Sentence]:
             why = "; ".join(one.why)
             yield Sentence((f"{kind_named(one.kind).title} cannot have this machine: {why}.",), "warns")
         else:
-            said = [*_obstacles(one), *_circle(one), *_execution(one, found.profile)]
+            said = [*_obstacles(one), *reset_sentence(one.after_reset, one.profile), *_circle(one)]
+            said += _execution(one, found.profile)
             said += evidence_sentence(bus_of(one.profile))
             if said:
                 yield joined(Sentence((f"{bus_of(one.profile).title}:",)), *said)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.capacity.node_limit import safe_nodes
+from busplan.analysis.capacity.verdict import after_reset
 from busplan.analysis.comparison.circle_tests import circle_tests
 from busplan.analysis.comparison.difference import ComputeCircleFigures
 from busplan.analysis.network import varied_nodes
@@ -65,6 +66,8 @@ class MachineOnKind(NamedTuple):
     """Keys and sections that the profile sets and this kind does not have."""
     figures: CapacityFigures
     """Under the timing model that decides, at the profile's period."""
+    after_reset: CapacityFigures | None
+    """After a bus reset, where it is shown to fit as it is set and not then."""
     safe: SafeAxes
     """At the profile's period."""
     smallest: SmallestPeriod
@@ -159,12 +162,14 @@ def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
         other = converted(profile, kind)
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
+    found = figures(other.profile, model=kind_named(kind).deciding_model)
     return MachineOnKind(
         profile=other.profile,
         is_own=kind == profile.bus.kind,
         assumed=other.assumed,
         left_out=other.left_out,
-        figures=figures(other.profile, model=kind_named(kind).deciding_model),
+        figures=found,
+        after_reset=after_reset(other.profile, found),
         safe=most_safe_axes(other.profile),
         smallest=smallest_period(other.profile),
         circle=None,
