@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.map.cells import Cell, Region, State
-from busplan.analysis.map.direction import AXES, PERIOD, Direction, varied_nodes
+from busplan.analysis.map.direction import AXES, PERIOD, Direction
 from busplan.analysis.map.trade_off import TradeOff
-from busplan.analysis.network import bus_of
+from busplan.analysis.network import bus_of, varied_nodes
 from busplan.buses.bus import Term, Value
 from busplan.buses.figure import Ink
 from busplan.forms.blocks import ShownValue, Swatch
