@@ -46,7 +46,7 @@ def test_the_first_lines_say_where_it_fits_and_which_kind_is_best() -> None:
 
 def test_a_row_has_the_verdict_margin_smallest_period_axes_and_what_binds() -> None:
     own = "IEEE 1394, as it is fits 230.064 6.311 552.494 execution 12 time 0 PASSED 92.082"
-    other = "CAN does not fit -48.467 2.309 1218.750 load 4 load 7 PASSED 93.750"
+    other = "CAN does not fit -48.467 14.693 1218.750 load 4 load 7 PASSED 93.750"
     assert " ".join(row(PAPER, "IEEE 1394, as it is")) == own
     assert " ".join(row(PAPER, "CAN")) == other
     assert row(GANTRY, "CAN")[-6:] == ["-", "payload,", "load", "0", "payload", "9"]

@@ -45,6 +45,8 @@ class Conversion(NamedTuple):
 def converted(profile: Profile, kind: str) -> Conversion:
     """Put the machine of a profile on a kind of bus; on its own kind it stays as it is.
 
+    Its execution times are as long there, which is assumed.
+
     Parameters
     ----------
     profile
@@ -68,6 +70,10 @@ def converted(profile: Profile, kind: str) -> Conversion:
         return Conversion(profile, (), ())
     data = profile.model_dump(exclude_unset=True)
     machine, left_out = _common(data)
+    for nodes in (machine.get("node"), *machine.get("group", ())):
+        if nodes and "execution" in nodes:
+            # Whoever measured it did so on the other bus.
+            nodes["execution"]["grade"] = "assumed"
     new = _new_bus(kind_named(kind).starter)
     found = profile_of(_merged(machine, new))
     given = [AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}"]
