@@ -21,24 +21,11 @@ import busplan
 from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes
 from busplan.buses import kind_names, registered
-from busplan.buses.bus import (
-    Bus,
-    BusCycle,
-    BusEvent,
-    Cost,
-    Doubt,
-    EventKind,
-    LeftOut,
-    Limit,
-    PayloadRange,
-    Perturbation,
-    Setting,
-    Starter,
-    Term,
-    TimingModel,
-)
+from busplan.buses.bus import Bus
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Term
 from busplan.buses.figure import NONPERIODIC, Figure, capacity_figures
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, plain, rounded_up, total
 from busplan.profile.shipped import load

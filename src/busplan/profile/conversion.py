@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, NamedTuple
 from pydantic import BaseModel
 
 from busplan.buses import kind_named
-from busplan.buses.bus import Starter
+from busplan.buses.parts import Starter
 from busplan.profile.document import TomlTable
 from busplan.profile.keys import dotted_keys, flat, named_tables
 from busplan.profile.kinds import models_of

@@ -4,7 +4,7 @@ from typing import Any, Final, NamedTuple
 
 from busplan.analysis.network import network_of, varied_nodes
 from busplan.analysis.sweep.grid import Values, require_keys
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.sections.base import value_at
