@@ -4,8 +4,9 @@ from collections.abc import Callable
 from typing import Final
 
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.bus import BusCycle, Limit
+from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number
 from busplan.sections.profile import Profile
@@ -53,7 +54,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of a network's kind of bus in the order of reports, time the last; without those of safety."""
     bus = bus_of(network.profile)
-    time = time_limit(lambda one: bus.cycle(one, model=model).required_us)
+    time = time_limit(lambda one: bus.cycle(one, model=model).most_required_us)
     return (*(limit for limit in bus.limits if not limit.is_safety), time)
 
 

@@ -16,9 +16,10 @@ from busplan.analysis.capacity.figures import COUNTS, certainty_numbers, numeric
 from busplan.analysis.capacity.node_limit import most_nodes
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
-from busplan.buses.bus import BusCycle, Limit
+from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, Sort
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
@@ -254,8 +255,9 @@ def _combinations(keys: tuple[str, ...]) -> tuple[list[str], ...]:
 
 
 def _typed(number: Number, sort: Sort) -> Array:
-    """Array of the type that the sort of a figure has."""
-    return np.asarray(number, dtype=_TYPES[sort])
+    """Array of the type that the sort of a figure has; NaN for what does not exist."""
+    found: Array = np.asarray(number, dtype=_TYPES[sort])
+    return np.where(np.isinf(found), np.nan, found) if sort == "number" else found
 
 
 def _with_axes(values: Number, axes: int) -> Array:

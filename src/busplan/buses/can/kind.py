@@ -3,15 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import (
-    Bus,
-    EventKind,
-    Limit,
-    PayloadRange,
-    Perturbation,
-    Starter,
-    TimingModel,
-)
+from busplan.buses.bus import Bus
 from busplan.buses.can import figures, rules
 from busplan.buses.can.constants import (
     BASE_BITS,
@@ -25,6 +17,7 @@ from busplan.buses.can.cycle import NONE, WORST, CanCycle
 from busplan.buses.can.limits import LIMITS
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
@@ -120,6 +113,10 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         none = "; from a load of 1 on, messages of low priority have no response time" if load >= 1 else ""
         words = (f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network))
         return f"{', '.join(words)}, bus load {load:.1%}{none}"
+
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
+        """A response time ends when the frame has arrived, and begins when it is queued."""
+        return False
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """SYNC with its counter, and identifiers of 29 bits."""
