@@ -129,6 +129,7 @@ def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
 
 def _figure_table(profile: Profile) -> Table:
     rows = (
-        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in explained_figures(profile)
+        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning))
+        for command, one in explained_figures(profile)
     )
     return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
