@@ -48,8 +48,8 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
             name = refused.name.rpartition(".")[2]
             key = _key_of(name, subject.profile)
             # A key that is the parameter says its name already.
-            said = f"{refused.value}: {refused.right}" if key.endswith(f".{name}") else refused.message
-            words, _, way_out = said.partition("; ")
+            message = f"{refused.value}: {refused.right}" if key.endswith(f".{name}") else refused.message
+            words, _, way_out = message.partition("; ")
             yield "BP203", RuleProblem(key, words, way_out)
         return
     except BusplanError as error:
@@ -109,8 +109,8 @@ RULES: Final = (
         "error",
         "the circle test cannot be run",
         "The values of [servo] and [circle] do not go together: the period is no multiple of the step, the drive "
-        "cannot reach the feed, the circle is too short for its ramps, or the bus puts more than one period into a loop "
-        "on the host.",
+        "cannot reach the feed, the circle is too short for its ramps, or the bus puts more than one period into a "
+        "loop on the host.",
     ),
     Rule(
         "BP204",
