@@ -90,6 +90,34 @@ def test_identifiers_follow_those_of_the_pre_defined_connection_set() -> None:
     ]
 
 
+def test_a_payload_beyond_all_pdos_has_no_more_streams_than_it_takes_to_break_the_limit() -> None:
+    huge = profile(payload__read_bytes=100_000)
+    each = streams(traffic_of_profile(huge), is_stuffed=True)
+    assert [one.first for one in each if one.name == "feedback"] == [0x181, 0x281, 0x381, 0x481, 0x581]
+    assert terms(huge)["feedback"] == 3 * 12_500 * 135 * BIT_US
+    (found,) = busplan.capacity(huge, timing_model=["worst-stuffing"]).results
+    assert "payload" in found.exceeded
+
+
+def test_a_latency_says_nothing_of_the_profiles_own_load_with_another_payload(run: Run) -> None:
+    said = run("latency", "can-servo-8", "--payload", "4").stdout
+    assert "worst case of SYNC" in said
+    assert "load" not in said
+
+
+@pytest.mark.parametrize(
+    ("payload", "said"),
+    [
+        ("33", "a PDO of 33 bytes is over the 32 bytes of four frames"),
+        ("25", "feedback and sdo-response share the identifier 0x481"),
+    ],
+)
+def test_a_latency_says_what_a_payload_breaks(run: Run, payload: str, said: str) -> None:
+    changed = ("--set", "message.sdo-response.identifier=0x481")
+    assert said in run("latency", "can-servo-8", *changed, "--payload", payload).stdout
+    assert "Warning" not in run("latency", "can-servo-8", *changed).stdout
+
+
 def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> None:
     node = {**DATA["node"], "axes": 1}
     groups = [
@@ -178,7 +206,7 @@ def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path
     path = tmp_path / "press.toml"
     path.write_text(profile_text(profile(cycle__period_us=2000.0, message__alarm__identifier=0x600)), encoding="utf-8")
     done = run("latency", path.name, cwd=tmp_path)
-    assert "from a load of 1 on, messages of low priority have no response time" in done.stdout
+    assert "from 100% on messages of low priority have no worst-case response time" in " ".join(done.stdout.split())
     assert "alarm: it has no worst-case response time, for with it the bus has a load of 110.5%" in done.stdout
     document = json.loads(run("latency", path.name, "--format", "json", cwd=tmp_path).stdout)
     by_name = {(one["timing_model"], one["transaction"]): one["worst_response_us"] for one in document["transactions"]}

@@ -132,6 +132,16 @@ def _load(network: Network) -> Number:
     return CanCycle(network, WORST).load
 
 
+def when_full(load: float) -> str:
+    """Say of a load what comes of it, where it is 1 or more."""
+    return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
+
+
+def _load_words(network: Network) -> str:
+    load, most = plain(_load(network)), network.profile.limits.max_load
+    return f"the bus load is {load:.1%}, over limits.max_load, {most:.1%}{when_full(load)}"
+
+
 LIMITS: Final = (
     Limit(
         "nodes",
@@ -171,6 +181,7 @@ LIMITS: Final = (
         lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
+        says=_load_words,
         slice_us=lambda network: plain(CanCycle(network, WORST).load_period_us * network.slice_ratio),
     ),
     Limit(
