@@ -47,10 +47,13 @@ def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tm
     assert list(files(tmp_path)) == ["gantry.toml"]
     own = run("capacity", "gantry.toml", cwd=tmp_path)
     assert own.stdout.splitlines()[0].startswith(verdict)
-    data = tomllib.loads((tmp_path / "gantry.toml").read_text(encoding="utf-8"))
+    written = (tmp_path / "gantry.toml").read_text(encoding="utf-8")
+    data = tomllib.loads(written)
     assert (data["bus"]["nodes"], data["node"]["axes"], data["cycle"]["period_us"]) == (6, 4, 1000)
     assert (data["payload"]["read_bytes_per_axis"], data["payload"]["write_bytes_per_axis"]) == (8, 8)
     assert (data["limits"]["reserve"], data["circle"]["path"]) == (0.15, "iso230-4")
+    steps = [line for line in written.splitlines() if line.startswith(("step_us", "loop", "drive_lag_us"))]
+    assert {line.index("#") for line in steps} == {27}
     # Nobody invented how round its circle must be.
     assert "tolerance" not in data
     assert (data["node"]["execution"]["grade"], data["servo"]["grade"]) == ("assumed", "assumed")
