@@ -47,16 +47,20 @@ def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tm
     assert list(files(tmp_path)) == ["gantry.toml"]
     own = run("capacity", "gantry.toml", cwd=tmp_path)
     assert own.stdout.splitlines()[0].startswith(verdict)
-    written = (tmp_path / "gantry.toml").read_text(encoding="utf-8")
-    data = tomllib.loads(written)
+    data = tomllib.loads((tmp_path / "gantry.toml").read_text(encoding="utf-8"))
     assert (data["bus"]["nodes"], data["node"]["axes"], data["cycle"]["period_us"]) == (6, 4, 1000)
     assert (data["payload"]["read_bytes_per_axis"], data["payload"]["write_bytes_per_axis"]) == (8, 8)
     assert (data["limits"]["reserve"], data["circle"]["path"]) == (0.15, "iso230-4")
-    steps = [line for line in written.splitlines() if line.startswith(("step_us", "loop", "drive_lag_us"))]
-    assert {line.index("#") for line in steps} == {27}
     # Nobody invented how round its circle must be.
     assert "tolerance" not in data
     assert (data["node"]["execution"]["grade"], data["servo"]["grade"]) == ("assumed", "assumed")
+
+
+def test_comments_are_in_line_whatever_the_values(run: Run, tmp_path: Path) -> None:
+    run("init", "gantry", "--nodes", 2, "--axes", 2, "--period", "31.25us", cwd=tmp_path)
+    written = (tmp_path / "gantry.toml").read_text(encoding="utf-8")
+    servo = [line for line in written.splitlines() if line.startswith(("step_us = 31.25 ", "loop", "drive_lag_us"))]
+    assert [line.index("#") for line in servo] == [27, 27, 27]
 
 
 def test_a_profile_of_ones_own_is_neutral_and_no_command_stumbles_over_it(run: Run, tmp_path: Path) -> None:
