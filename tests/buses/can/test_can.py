@@ -327,7 +327,7 @@ def test_no_plan_is_made_where_no_period_keeps_a_deadline() -> None:
     many = override(load("can-servo-8").profile, {"bus.nodes": 40})
     found = busplan.plan(many, circle=False)
     assert found.recommended_changes is None
-    assert "its worst-case response time is" in str(found)
+    assert "the worst-case response time of sdo-response is" in str(found)
 
 
 @pytest.mark.parametrize("nodes", [8, 12, 20])

@@ -33,11 +33,13 @@ def _all_late(traffic: Traffic) -> str:
     late = sorted(_late_streams(traffic), key=lambda pair: -pair[1])
     endless = [one.name for one, share in late if share == inf]
     if endless:
-        more = f" and {len(endless) - 1} more messages have" if len(endless) > 1 else " has"
-        return f"{endless[0]}{more} no worst-case response time"
-    one, share = late[0]
-    more = f", and {len(late) - 1} more are late" if len(late) > 1 else ""
-    return f"{one.name} takes up to {share * one.deadline_us:g} us to its deadline at {one.deadline_us:g} us{more}"
+        more = len(endless) - 1
+        others = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
+        return f"{endless[0]}{others} no worst-case response time"
+    times = ((one.name, share * one.deadline_us, one.deadline_us) for one, share in late)
+    return _and_more(
+        [f"the worst-case response time of {one} is {us:g} us, over its {most:g} us" for one, us, most in times]
+    )
 
 
 def _late(one: Stream, share: float, traffic: Traffic) -> str:
@@ -82,8 +84,8 @@ def _collisions_in_words(traffic: Traffic) -> Iterator[tuple[str, str]]:
         yield _identifier_key(other), f"{pair} share {_from(first, shared)}"
 
 
-def _and_more(pairs: Sequence[str]) -> str:
-    return f"{pairs[0]}, and {len(pairs) - 1} more" if len(pairs) > 1 else pairs[0]
+def _and_more(clauses: Sequence[str]) -> str:
+    return f"{clauses[0]}, and {len(clauses) - 1} more" if len(clauses) > 1 else clauses[0]
 
 
 def _identifier_key(one: Stream) -> str:
