@@ -157,7 +157,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     """
     limits = _broken_limits(figures, profile)
     safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
-    why = "".join(f", {words}" for words in limits)
+    why = f", {'; '.join(limits)}" if limits else ""
     state = state_of(figures.verdict == FITS and figures.safe)
     said = sentence(f"{{}}{{}}{why}.", _figure(VERDICT, figures, at=at)._replace(state=state), Words(safe, state))
     if limits:

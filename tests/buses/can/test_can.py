@@ -15,6 +15,7 @@ import busplan
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.buses import kind_named
+from busplan.buses.can.limits import shared_identifiers
 from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.buses.can.streams import response, streams
@@ -140,6 +141,25 @@ def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> Non
 
 
 @pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"bus.nodes": 120, "payload.feedback_identifier": 0x1F0},
+            "feedback and command share 103 identifiers from 0x201",
+        ),
+        (
+            {"bus.nodes": 257, "payload.read_bytes": 32},
+            "frames of feedback PDOs share the identifier 0x281, and 2 more",
+        ),
+    ],
+)
+def test_collisions_of_one_key_are_one_finding(changes: dict[str, Any], words: str) -> None:
+    found = shared_identifiers(traffic_of_profile(override(profile(), changes)))
+    assert len({key for key, _ in found}) == len(found)
+    assert words in [said for _, said in found]
+
+
+@pytest.mark.parametrize(
     ("changes", "exceeded"),
     [
         ({}, ()),
@@ -207,7 +227,7 @@ def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path
     path.write_text(profile_text(profile(cycle__period_us=2000.0, message__alarm__identifier=0x600)), encoding="utf-8")
     done = run("latency", path.name, cwd=tmp_path)
     assert "from 100% on messages of low priority have no worst-case response time" in " ".join(done.stdout.split())
-    assert "alarm: it has no worst-case response time, for with it the bus has a load of 110.5%" in done.stdout
+    assert "alarm has no worst-case response time." in done.stdout
     document = json.loads(run("latency", path.name, "--format", "json", cwd=tmp_path).stdout)
     by_name = {(one["timing_model"], one["transaction"]): one["worst_response_us"] for one in document["transactions"]}
     assert by_name["worst-stuffing", "SYNC"] == 110 + 270
@@ -335,7 +355,7 @@ def test_no_plan_is_made_where_no_period_keeps_a_deadline() -> None:
     many = override(load("can-servo-8").profile, {"bus.nodes": 40})
     found = busplan.plan(many, circle=False)
     assert found.recommended_changes is None
-    assert "its worst-case response time is" in str(found)
+    assert "the worst-case response time of sdo-response is" in str(found)
 
 
 @pytest.mark.parametrize("nodes", [8, 12, 20])
