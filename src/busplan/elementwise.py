@@ -7,7 +7,7 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
-from math import ceil, floor, sqrt
+from math import ceil, floor, inf, sqrt
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 if TYPE_CHECKING:
@@ -314,6 +314,30 @@ def from_table(table: Sequence[float], place: Number, *, words: str, sources: tu
     import numpy as np
 
     return np.asarray(table)[np.minimum(np.asarray(place, dtype=np.int64), len(table) - 1)]
+
+
+def next_entry(table: Sequence[float], least: Number, *, words: str) -> Number:
+    """The first entry of an ascending table that is no less than a number; infinite where none is.
+
+    Parameters
+    ----------
+    table
+        The entries.
+    least
+        The number.
+    words
+        What a derivation says of it.
+
+    Examples
+    --------
+    >>> next_entry((5, 7, 8), 5.5, words="a table"), next_entry((5, 7, 8), 9, words="a table")
+    (7, inf)
+    """
+    if isinstance(least, (*_PLAIN, SpecialNumber)):
+        return pointwise(lambda one: next(iter(table[bisect_left(table, one) :]), inf), least, words=words)
+    import numpy as np
+
+    return np.append(np.asarray(table, dtype=float), inf)[np.searchsorted(table, least)]
 
 
 def interpolated(places: Sequence[float], values: Sequence[float], place: Number, *, words: str) -> Number:

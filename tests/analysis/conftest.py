@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 from hypothesis import strategies as st
 
+from busplan.buses import kind_named
 from busplan.buses.can.section import CanProfile
+from busplan.buses.ethercat.section import EthercatProfile
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.sections.profile import Profile
 
@@ -394,7 +396,65 @@ def any_profile() -> st.SearchStrategy[Profile]:
 @pytest.fixture(scope="session")
 def profiles_by_kind() -> dict[str, st.SearchStrategy[Profile]]:
     """Random profiles of every kind of bus; a new kind is tried on all that holds of any by a line here."""
-    return {"ieee1394": profiles(), "can": can_profiles()}
+    return {
+        "ieee1394": profiles(),
+        "can": can_profiles(),
+        "ethercat": ethercat_profiles(),
+        "sercos3": sercos_profiles(_sercos3_bus()),
+        "sercos2": sercos_profiles(_sercos2_bus()),
+    }
+
+
+def _sercos3_bus() -> st.SearchStrategy[dict[str, Any]]:
+    return st.fixed_dictionaries(
+        {
+            "kind": st.just("sercos3"),
+            "nodes": st.integers(1, 20),
+            "version": st.sampled_from(["V1.0", "V1.1"]),
+            "hot_plug_field": st.sampled_from(["first", "all"]),
+            "timing_method": st.sampled_from(["mdt-at-ucc", "mdt-ucc-at", "at-last"]),
+            "gap_bytes": st.integers(12, 60),
+            "device_delay_us": st.floats(0.0, 2.0),
+            "master_jitter_us": st.floats(0.0, 5.0),
+            "master_delay_us": st.floats(0.0, 5.0),
+        }
+    )
+
+
+def _sercos2_bus() -> st.SearchStrategy[dict[str, Any]]:
+    return st.fixed_dictionaries(
+        {
+            "kind": st.just("sercos2"),
+            "nodes": st.integers(1, 20),
+            "data_rate_mbit_s": st.sampled_from([2, 4, 8, 16]),
+            "at_gap_us": st.floats(0.0, 20.0),
+            "at_start_us": st.one_of(st.none(), st.floats(0.0, 20.0)),
+            "turnaround_us": st.floats(0.0, 20.0),
+            "recovery_us": st.floats(0.0, 20.0),
+        }
+    )
+
+
+@st.composite
+def sercos_profiles(draw: st.DrawFn, bus: st.SearchStrategy[dict[str, Any]]) -> Profile:
+    """Random profiles of a SERCOS bus, at periods that it knows and at one that it does not."""
+    own = draw(bus)
+    data = {
+        "schema_version": 1,
+        "name": "test",
+        "bus": own,
+        "cycle": {
+            "period_us": draw(st.sampled_from([125.0, 250.0, 500.0, 1000.0, 1100.0])),
+            "slice_ratio": draw(st.floats(0.1, 1.0)),
+            "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
+        },
+        "payload": {"read_bytes": draw(st.integers(1, 200)), "write_bytes": draw(st.integers(1, 200))},
+        "node": {
+            "axes": draw(st.integers(1, 3)),
+            "execution": {"kind": "linear", "base_us": draw(st.floats(0.0, 100.0)), "per_byte_us": 0.1},
+        },
+    }
+    return kind_named(own["kind"]).profile_model().model_validate(data)
 
 
 @st.composite
@@ -445,3 +505,36 @@ def can_profiles(draw: st.DrawFn) -> Profile:
         "message": messages,
     }
     return CanProfile.model_validate(data)
+
+
+@st.composite
+def ethercat_profiles(draw: st.DrawFn) -> Profile:
+    """Random profiles of an EtherCAT segment, from a frame that is padded to several, with room for some hundred."""
+    data = {
+        "schema_version": 1,
+        "name": "test",
+        "bus": {
+            "kind": "ethercat",
+            "nodes": draw(st.integers(1, 40)),
+            "command": draw(st.sampled_from(["LRW", "LRD-LWR"])),
+            "distributed_clocks": draw(st.booleans()),
+            "mailbox_polls": draw(st.integers(0, 2)),
+            "mailbox_bytes": draw(st.sampled_from([1, 128, 1486])),
+            "master_us": draw(st.sampled_from([0.0, 12.5])),
+            "master_uncertainty_us": draw(st.sampled_from([None, 2.0])),
+        },
+        "cycle": {
+            "period_us": draw(st.floats(60.0, 900.0)),
+            "slice_ratio": draw(st.floats(0.1, 1.0)),
+            "nonperiodic_us": draw(st.sampled_from([0.0, 0.0, 55.5])),
+        },
+        "payload": {"read_bytes": draw(st.integers(1, 800)), "write_bytes": draw(st.integers(1, 800))},
+        "node": {
+            "axes": draw(st.integers(1, 3)),
+            "port": draw(st.sampled_from(["100BASE-TX", "E-bus"])),
+            "delay_us": draw(st.one_of(st.none(), st.floats(0.5, 1.0))),
+            "cable_m": draw(st.sampled_from([0.0, 2.5, 100.0, 101.0])),
+            "execution": {"kind": "linear", "grade": "assumed", "base_us": 50.0, "per_byte_us": 0.1},
+        },
+    }
+    return EthercatProfile.model_validate(data)

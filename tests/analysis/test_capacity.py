@@ -120,6 +120,7 @@ def test_the_figures_of_a_profile_agree_with_each_other(
     assert found.axes == profile.alike_nodes[0].node.axes * found.nodes
     assert found.time_slice_us * found.nodes == pytest.approx(found.available_us)
     assert found.gaps_us == pytest.approx(found.subaction_gap_us + found.arbitration_reset_gap_us)
+    assert found.min_period_us is not None
     assert found.min_period_us * profile.cycle.slice_ratio == pytest.approx(found.required_us)
     assert found.min_slice_ratio * profile.cycle.period_us == pytest.approx(found.required_us)
     if model == "paper":
@@ -144,6 +145,7 @@ def test_the_smallest_period_fits_and_nothing_below_it(
 ) -> None:
     profile = data.draw(any_profile)
     smallest_us = figures(profile, model=model).min_period_us
+    assert smallest_us is not None
     at, below = (
         figures(result, model=model)
         for result in (

@@ -614,7 +614,8 @@ def test_every_key_of_the_profile_schema_is_described_with_its_unit() -> None:
     units = {
         "per_byte_us": "[us/byte]", "um_per_m": "[um/m]", "mm_per_min": "[mm/min]", "per_s2": "[1/s^2]",
         "per_s": "[1/s]", "mm_s": "[mm/s]", "us": "[us]", "mm": "[mm]", "bytes": "[bytes]", "deg": "[deg]",
-        "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "kbit_s": "[kbit/s]", "s": "[s]",
+        "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "kbit_s": "[kbit/s]",
+        "mbit_s": "[Mbit/s]", "s": "[s]",
     }  # fmt: skip
     # A grade has the name of the value that it grades, and no unit.
     sections = [schema, *(section for name, section in schema["$defs"].items() if name != "ServoGrades")]

@@ -559,7 +559,7 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     listed = busplan("rule", cwd=tmp_path)
     assert listed.returncode == 0
     codes = re.findall(r"^(BP\d+) ", listed.stdout, re.MULTILINE)
-    assert len(codes) == 31
+    assert len(set(codes)) == len(codes) > 30
     for code in ("BP110", "bp110"):
         page = busplan("rule", code, cwd=tmp_path)
         assert page.returncode == 0
@@ -568,7 +568,9 @@ def test_rule_lists_and_explains(busplan: Busplan, tmp_path: Path) -> None:
     document = json.loads(busplan("rule", "--format", "json", cwd=tmp_path).stdout)
     assert (document["schema"], document["command"]) == (1, "rule")
     assert [rule["code"] for rule in document["rules"]] == codes
-    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * 31
+    assert [set(rule) for rule in document["rules"]] == [{"code", "rule", "severity", "summary", "explanation"}] * len(
+        codes
+    )
     (one,) = json.loads(busplan("rule", "BP110", "--format", "json", cwd=tmp_path).stdout)["rules"]
     assert one in document["rules"]
 

@@ -12,7 +12,10 @@ from busplan.manual import FOLDER, topics
 Run = Callable[..., CompletedProcess[str]]
 Refused = Callable[..., str]
 
-TOPICS = ["can", "circle", "commands", "gate", "json", "limits", "models", "plan", "profile", "python"]
+TOPICS = [
+    *("can", "circle", "commands", "ethercat", "gate", "json"),
+    *("limits", "models", "plan", "profile", "python", "sercos"),
+]
 
 
 def test_without_a_topic_it_lists_them_a_line_each_and_says_how_to_show_one(run: Run) -> None:

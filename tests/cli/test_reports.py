@@ -326,7 +326,7 @@ def test_evidence_has_the_papers_part_and_what_else_is_known(run: Run) -> None:
     )
     refused = run("evidence", "can-opener")
     assert (refused.returncode, refused.stdout) == (2, "")
-    assert refused.stderr == "can-opener: no such kind of bus; there are ieee1394, can\n"
+    assert refused.stderr.startswith("can-opener: no such kind of bus; there are ieee1394, can")
 
 
 def test_profiles_lists_what_every_command_takes_by_name(run: Run) -> None:

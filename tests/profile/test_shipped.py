@@ -225,7 +225,7 @@ def test_a_starter_comes_from_a_shipped_profile_only(source: str) -> None:
     with pytest.raises(BusplanError) as caught:
         starter_text(source, name="x")
     assert str(caught.value).startswith(
-        f"--from {source}: no shipped profile; shipped are can-servo-8, dvrk, gantry-24, paper-1ms, "
+        f"--from {source}: no shipped profile; shipped are can-servo-8, dvrk, ethercat-servo-8, gantry-24, "
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from busplan.buses import kind_names
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import MAX_FILE_BYTES, decode, override, read_bytes, validate
@@ -76,6 +77,7 @@ def test_the_text_of_these_tests_is_a_profile() -> None:
 
 # --- one fault, one message -------------------------------------------------------------------------------
 
+KINDS = " or ".join(f'"{one}"' for one in kind_names())
 FAULTS = {
     "wrong type, text": ("nodes = 2", 'nodes = "2"', '7:1: bus.nodes = "2": expected a whole number'),
     "wrong type, bool": ("nodes = 2", "nodes = true", "7:1: bus.nodes = true: expected a whole number"),
@@ -102,7 +104,11 @@ FAULTS = {
         *('kind = "table"', 'kind = "table"\ngrade = "guessed"'),
         ('20:1: node.execution.grade = "guessed": expected "measured", "derived", "calibrated" or "assumed"'),
     ),
-    "unknown kind of bus": ('"ieee1394"', '"sercos"', '4:1: bus.kind = "sercos": expected "ieee1394" or "can"'),
+    "unknown kind of bus": (
+        '"ieee1394"',
+        '"lon"',
+        f'4:1: bus.kind = "lon": expected {KINDS}',
+    ),
     "S800": (
         *('"S400"', '"S800"'),
         ('5:1: bus.speed = "S800": S800 arbitrates by BOSS, which has no gaps: equations (4) and (10) do not hold. '

@@ -18,7 +18,13 @@ def read(text: str) -> Profile:
 def test_a_written_profile_reads_to_the_same(name: str) -> None:
     profile = load(name).profile
     nodes_key = profile.alike_nodes[0].nodes_key
-    key, value = {"ieee1394": ("bus.gap_count", "optimal"), "can": ("bus.sync_counter", True)}[profile.bus.kind]
+    key, value = {
+        "ieee1394": ("bus.gap_count", "optimal"),
+        "can": ("bus.sync_counter", True),
+        "ethercat": ("bus.command", "LRD-LWR"),
+        "sercos3": ("bus.version", "V1.0"),
+        "sercos2": ("bus.data_rate_mbit_s", 4),
+    }[profile.bus.kind]
     changed = override(profile, {nodes_key: 7, key: value, "cycle.period_us": 812.5})
     for one in (profile, changed):
         again = read(profile_text(one))

@@ -23,7 +23,7 @@ from busplan.servo.checks import ParameterError, Refused
 EXAMPLES = Path(__file__).parent / "examples"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
 VALID = sorted(EXAMPLES.glob("*/valid*.toml"))
-CURED = ("BP101", "BP103", "BP104", "BP105", "BP109", "BP114", "BP121")
+CURED = ("BP101", "BP103", "BP104", "BP105", "BP109", "BP114", "BP121", "BP141", "BP151")
 """Rules that say the cheapest cure."""
 EXPECT = re.compile(rb"# expect: ((?:\d+:\d+ ?)+)")
 
@@ -106,6 +106,10 @@ def test_codes_are_stable() -> None:
         "BP121": "bus-load-over-limit",
         "BP122": "identifiers-collide",
         "BP123": "deadline-missed",
+        "BP131": "no-common-clock",
+        "BP132": "command-behind-sync",
+        "BP141": "sercos3-unknown-period",
+        "BP151": "sercos2-unknown-period",
         "BP201": "circle-tolerance",
         "BP202": "no-stability-margin",
         "BP203": "circle-impossible",

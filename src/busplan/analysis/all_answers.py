@@ -13,7 +13,7 @@ from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.latency import LatencyResult, latency
 from busplan.analysis.map.trade_off import TradeOff, trade_off
-from busplan.analysis.network import model_names
+from busplan.analysis.network import bus_of, model_names
 from busplan.analysis.timeline.schedule import Schedule, schedule
 from busplan.errors import BusplanError
 from busplan.progress import Progress, part_of
@@ -69,7 +69,8 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
     """
     bus = capacity(profile)
     own_us = profile.cycle.period_us
-    periods_us = [own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US]
+    near_us = (own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US)
+    periods_us = [one for one in near_us if one == own_us or bus_of(profile).periods.knows(one)]
     plan, no_schedule = _schedule(profile)
     circle, contour, no_circle = (
         _circle(profile, progress) if with_circle and profile.asks_for_circle else (None, None, ())

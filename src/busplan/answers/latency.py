@@ -46,7 +46,7 @@ def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
         )
     )
     yield from not_applicable(profile)
-    yield from execution_sentence(profile)
+    yield from execution_sentence(profile, of_latency=True)
     yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
     yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
 

@@ -106,10 +106,19 @@ def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Se
     return (Sentence((words,), "warns") for words in warnings(profile, nodes=nodes, most=most))
 
 
-def execution_sentence(profile: Profile) -> Iterator[Sentence]:
-    """Say how the execution time behind the figures is known; nothing if there is no grade or none on the bus."""
-    grades = execution_grades(profile)
-    if grades is not None and bus_of(profile).has_execution(network_of(profile)):
+def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterator[Sentence]:
+    """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    of_latency
+        Whether the figures are latencies, and not those of the cycle.
+    """
+    grades, bus, network = execution_grades(profile), bus_of(profile), network_of(profile)
+    has_execution = bus.latency_has_execution(network) if of_latency else bus.has_execution(network)
+    if grades is not None and has_execution:
         text = f"The execution time behind these figures is {grades}."
         yield sentence(text, state="warns" if "assumed" in grades else "neutral")
 
@@ -200,7 +209,8 @@ def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:
 def _broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
     """Say by how much each limit of the bus is broken."""
     broken = (bus_of(profile).limit(key) for key in figures.exceeded if key != TIME)
-    return [limit.words(network_of(profile)) for limit in broken if limit is not None]
+    network = network_of(profile)._replace(period_us=figures.period_us)
+    return [limit.words(network) for limit in broken if limit is not None]
 
 
 def not_in_it(profile: Profile) -> Iterator[Sentence]:

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
 
-_MODULES: Final[dict[str, str]] = {"ieee1394": "busplan.buses.ieee1394.kind", "can": "busplan.buses.can.kind"}
+_MODULES: Final[dict[str, str]] = {
+    "ieee1394": "busplan.buses.ieee1394.kind",
+    "can": "busplan.buses.can.kind",
+    "ethercat": "busplan.buses.ethercat.kind",
+    "sercos3": "busplan.buses.sercos3.kind",
+    "sercos2": "busplan.buses.sercos2.kind",
+}
 _LOADED: Final[dict[str, "Bus"]] = {}
 
 

@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
 from busplan.buses.network import Network
+from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
-from busplan.elementwise import Number, total
+from busplan.elementwise import Number, plain, total
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
-    from busplan.sourced import Sourced
+    from busplan.sourced import Grade, Sourced
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -99,6 +100,8 @@ class Limit(NamedTuple):
     says: Callable[[Network], str] | None = None
     """What is said of a broken one, where more than its value is: instead of `over`."""
 
+    is_of_period: bool = False
+    """The period alone breaks it: a plan takes no period that does."""
     slice_us: Callable[[Network], float] | None = None
     """The slice from which on plain numbers keep it, the slice ratio as it is, where a longer period is a cure [us];
     without it no period is."""
@@ -260,6 +263,11 @@ class BusCycle(ABC):
         """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
         return total(term.us for term in self.terms)
 
+    @property
+    def most_required_us(self) -> Number:
+        """No less than it needs with any number of nodes up to its own, where one more can make it shorter [us]."""
+        return self.required_us
+
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
         """What the whole cycle grows by if what it transmits takes longer [us].
 
@@ -334,6 +342,8 @@ class Bus(ABC):
     """In the order in which they are reported; at least one grows with the nodes."""
     limits_of: ClassVar[str] = "bus"
     """Who sets them, as a message says it."""
+    periods: ClassVar[Periods] = ANY_PERIOD
+    """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
     starter: "ClassVar[Starter]"
     """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -348,6 +358,8 @@ class Bus(ABC):
     """Its figures with a source, by name."""
     key_sources: ClassVar[Mapping[str, "Sourced"]] = {}
     """Keys of a profile whose default is a figure with a source."""
+    key_grades: ClassVar[Mapping[str, "Grade"]] = {}
+    """How well what a profile says of its keys can be known, where that is less than given."""
     key_symbols: ClassVar[Mapping[str, str]] = {}
     """What stands for its keys in formulas, where it is not by their name."""
     choosing_keys: ClassVar[tuple[str, ...]] = ("execution.grade",)
@@ -431,6 +443,41 @@ class Bus(ABC):
     def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - most have
         """Whether the cycle holds an execution time of the nodes."""
         return True
+
+    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
+        """When each node has its command, by its number from 1, from the start of a cycle of plain numbers [us].
+
+        The last of its `command_events` has ended then; what belongs to no one node is the command of all.
+        """
+        found: dict[int, float] = {}
+        nodes, now_us = int(plain(cycle.network.nodes)), 0.0
+        for event in cycle.events():
+            now_us += event.us
+            if (event.transaction, event.kind) in self.command_events:
+                owners = range(1, nodes + 1) if event.node is None else (event.node,)
+                found |= dict.fromkeys(owners, now_us)
+        return found or dict.fromkeys(range(1, nodes + 1), now_us)
+
+    def loop_periods(self, network: Network, *, at_sync: bool) -> int:  # noqa: ARG002 - most read and write in a cycle
+        """Whole periods inside a loop on the host, from a sample to its command [1].
+
+        Parameters
+        ----------
+        network
+            The network, of plain numbers.
+        at_sync
+            Whether commands take effect at the next synchronous point, which is counted; otherwise they do when they
+            arrive, which comes on top.
+        """
+        return 1 if at_sync else 0
+
+    def acts_at_once(self, network: Network) -> bool:  # noqa: ARG002 - most have a synchronous packet
+        """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
+        return True
+
+    def latency_has_execution(self, network: Network) -> bool:
+        """Whether a latency holds an execution time of the nodes."""
+        return self.has_execution(network)
 
     def settings(self, network: Network) -> tuple[Setting, ...]:  # noqa: ARG002 - a kind may have none
         """What of the bus a plan may turn; it is asked again after each change of the network."""

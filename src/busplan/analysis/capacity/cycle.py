@@ -53,7 +53,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
     """The limits of a network's kind of bus in the order of reports, time the last; without those of safety."""
     bus = bus_of(network.profile)
-    time = time_limit(lambda one: bus.cycle(one, model=model).required_us)
+    time = time_limit(lambda one: bus.cycle(one, model=model).most_required_us)
     return (*(limit for limit in bus.limits if not limit.is_safety), time)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import chain
+from math import isinf
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import VERDICTS, Certainty, VerdictWord, certainty, verdict_code
@@ -12,6 +13,7 @@ from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
 from busplan.buses.bus import BusCycle, Doubt, Term
 from busplan.buses.figure import CERTAINTY
+from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, plain
 from busplan.profile.toml import override
@@ -62,7 +64,8 @@ class CapacityFigures(NamedTuple):
     max_axes: int | None
     limited_by: str | None
     """Key of the limit that keeps `max_nodes` from being more."""
-    min_period_us: float
+    min_period_us: float | None
+    """This and `safe_min_period_us` are None where no period that the bus knows is long enough."""
     min_slice_ratio: float
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
@@ -162,7 +165,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Any] = {key: plain(number) for key, number in numeric_figures(cycle).items()}
+    numbers: dict[str, Any] = {key: _existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     broken = broken_limits(profile)
@@ -218,7 +221,7 @@ def _certainty_figures(cycle: BusCycle, *, is_broken: bool) -> dict[str, Any]:
     """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
     found = certainty(cycle)
     return {
-        **certainty_numbers(found, cycle),
+        **{key: None if one is None else _existing(one) for key, one in certainty_numbers(found, cycle).items()},
         "verdict": VERDICTS[int(verdict_code(found, cycle.network, is_broken=is_broken))],
         "doubts": found.doubts,
     }
@@ -239,7 +242,7 @@ def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | N
         "margin_corrected_us": found.margin_corrected_us,
         "uncertainty_us": found.uncertainty_us,
         "safe_required_us": found.safe_required_us,
-        "safe_min_period_us": found.safe_required_us / cycle.network.slice_ratio,
+        "safe_min_period_us": _shortest_us(cycle.network, found.safe_required_us),
     }
 
 
@@ -271,6 +274,16 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "utilisation": required_us / given_us,
         # What fits by rounding alone has no margin, and no negative one either.
         "margin_us": choose(spare_us < 0, choose(fits_in(required_us, available_us=given_us), 0.0, spare_us), spare_us),
-        "min_period_us": required_us / ratio,
+        "min_period_us": _shortest_us(network, required_us),
         "min_slice_ratio": required_us / period_us,
     }
+
+
+def _existing(number: Number) -> float | None:
+    """A plain number; None for an infinite one, which does not exist."""
+    return None if isinf(found := plain(number)) else found
+
+
+def _shortest_us(network: Network, needed_us: Number) -> Number:
+    """The shortest period that gives a cycle its time, and that the bus knows; infinite where it knows none [us]."""
+    return bus_of(network.profile).periods.from_us(needed_us / network.slice_ratio)

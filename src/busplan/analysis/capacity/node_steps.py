@@ -4,11 +4,12 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import FIT_ROUNDING
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.network import bus_of, network_of
-from busplan.elementwise import plain
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
@@ -59,14 +60,17 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     >>> steps.max_axes(1000.0)
     16
     """
-    longest, bus = override(profile, {"cycle.period_us": MAX_TIME_US}), bus_of(profile)
+    bus = bus_of(profile)
+    longest = override(profile, {"cycle.period_us": min(MAX_TIME_US, bus.periods.longest_us)})
     is_safe = model == bus.deciding_model
     most, limit = safe_nodes(longest, group=group) if is_safe else largest_nodes(longest, model=model, group=group)
     network = network_of(profile).asking(group)
-    cycles = (bus.cycle(network.with_nodes(nodes), model=model) for nodes in range(1, most + 1))
-    needed_us = (plain(certainty(one).safe_required_us if is_safe else one.required_us) for one in cycles)
+    counts = np.arange(1, most + 1)
+    cycle = bus.cycle(network.with_nodes(counts), model=model)
+    needed_us = np.asarray(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us)
     said, ratio = network.asked_nodes, profile.cycle.slice_ratio
-    return NodeSteps(model, said.node.axes, tuple(us / ratio for us in needed_us), limit, is_safe, int(said.nodes))
+    from_us = np.broadcast_to(np.asarray(bus.periods.from_us(needed_us / ratio)), counts.shape).tolist()
+    return NodeSteps(model, said.node.axes, tuple(from_us), limit, is_safe, int(said.nodes))
 
 
 def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:

@@ -5,8 +5,9 @@ from typing import Any, Final
 
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
-from busplan.analysis.circle.delays import loop_delays_us
+from busplan.analysis.circle.delays import loop_delays_us, skew_us
 from busplan.analysis.network import bus_of
+from busplan.errors import BusplanError
 from busplan.sections.base import Section
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -48,7 +49,7 @@ def setup(profile: Profile) -> Setup:
         x=x,
         y=y,
         timing=timing,
-        delivery=Delivery(**_parameters_in(delivery, Delivery)),
+        delivery=Delivery(**_parameters_in(delivery, Delivery) | {"skew_us": delivery.skew_us + skew_us(profile)}),
         mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
         settled=settling_us != inf,
     )
@@ -77,8 +78,20 @@ def loop_timing(profile: Profile) -> LoopTiming:
 
 
 def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
-    """Both axes of a profile with the delays of their loops."""
+    """Both axes of a profile with the delays of their loops.
+
+    Raises
+    ------
+    BusplanError
+        The bus puts more than a period into a loop on the host.
+    """
     x_us, y_us = loop_delays_us(profile)
+    period_us = profile.cycle.period_us
+    if max(x_us, y_us) > period_us:
+        raise BusplanError(
+            f'servo.loop = "host": the bus puts {max(x_us, y_us):g} us into a loop over it, and the circle test knows '
+            f'one period, {period_us:g} us, at most; close the loop on the node, servo.loop = "node"'
+        )
     servo = profile.servo
     return Axis(**servo.axis_keys("x"), delay_us=x_us), Axis(**servo.axis_keys("y"), delay_us=y_us)
 

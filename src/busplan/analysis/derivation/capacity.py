@@ -17,7 +17,7 @@ from busplan.analysis.capacity.figures import (
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.formulas import against
 from busplan.analysis.derivation.inputs import traced, traced_profile
-from busplan.analysis.derivation.latency import chosen, remembered
+from busplan.analysis.derivation.latency import chosen, if_finite, remembered
 from busplan.analysis.derivation.origin import short
 from busplan.analysis.derivation.trace import Traced, found, value_of
 from busplan.analysis.network import bus_of, model_names, network_of
@@ -65,7 +65,9 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         **numeric_figures(cycle),
     }
     known = by_key(bus.capacity_figures)
-    named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if key in known}
+    named = {
+        key: remembered(if_finite(number), key, known[key].symbol) for key, number in numbers.items() if key in known
+    }
     if network.is_uniform:
         named |= _most(network, plain, model=model)
     else:
@@ -114,7 +116,11 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
     for doubt in weighed.doubts:
         remembered(doubt.us, doubt.key, f"u({doubt.label})")
     numbers = certainty_numbers(weighed, cycle)
-    named = {key: remembered(number, key, known[key].symbol) for key, number in numbers.items() if number is not None}
+    named = {
+        key: remembered(if_finite(number), key, known[key].symbol)
+        for key, number in numbers.items()
+        if number is not None
+    }
     if network.is_uniform:
         named |= _most_safe(network, plain)
     named["verdict"] = Traced(

@@ -78,6 +78,7 @@ def given(profile: Profile, key: str) -> Input:
     default = bus.key_sources.get(alike_key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
+    grade = bus.key_grades.get(alike_key, grade)
     # A plain number shows no unit.
     unit = "" if unit == "1" else unit
     symbol = _SYMBOLS.get(alike_key) or bus.key_symbols.get(alike_key) or SYMBOLS.get(name) or name

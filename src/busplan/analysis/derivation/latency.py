@@ -1,6 +1,6 @@
 """Derive the figures of `latency` by calling the functions of the bus with traced numbers."""
 
-from math import isinf
+from math import inf
 
 from busplan.analysis.derivation.inputs import traced_profile
 from busplan.analysis.derivation.origin import Input, short
@@ -42,14 +42,14 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
         "transaction": chosen(kind, "transaction", "transaction asked for"),
         "payload_bytes": one.payload_bytes,
         "nodes": network.nodes,
-        **{key: _if_finite(number) for key, number in one.phases.items()},
+        **{key: if_finite(number) for key, number in one.phases.items()},
     }
     return {figure.key: remembered(found.get(figure.key), figure.key, figure.symbol) for figure in bus.latency_figures}
 
 
-def _if_finite(number: Number) -> Number:
-    """A phase, or None with the inputs of an infinite one, which does not exist."""
-    if isinstance(number, Traced) and isinf(number.value):
+def if_finite(number: Number) -> Number:
+    """A figure, or None with the inputs of an infinite one, which does not exist."""
+    if isinstance(number, Traced) and number.value == inf:
         return result_of(None, "does not exist", (number,))
     return number
 

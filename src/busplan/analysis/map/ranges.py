@@ -42,7 +42,9 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
         others = own_value(AXES, profile) - steps.own_nodes * each
         return Direction(AXES, tuple(others + one * each for one in nodes))
     own_us = own_value(PERIOD, profile)
-    periods_us = _round_numbers(max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US))
+    least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
+    known = [one for one in bus_of(profile).periods.us if least_us <= one <= most_us]
+    periods_us = _thinned(known) if known else _round_numbers(least_us, most_us)
     drawn = (one for one in periods_us if not with_circle or _can_turn(profile, one))
     return Direction(PERIOD, tuple(sorted({*drawn, own_us})))
 
@@ -63,7 +65,12 @@ def _round_numbers(least: float, most: float) -> list[float]:
         found = [one for one in numbers if least <= one <= most]
         if len(found) <= _MOST:
             break
-    return found[:: ceil(len(found) / _MOST) or 1]
+    return _thinned(found)
+
+
+def _thinned(numbers: list[float]) -> list[float]:
+    """As many of some numbers as are drawn, evenly."""
+    return numbers[:: ceil(len(numbers) / _MOST) or 1]
 
 
 def _can_turn(profile: Profile, period_us: float) -> bool:

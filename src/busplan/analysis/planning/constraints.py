@@ -39,7 +39,7 @@ def shown(network: Network) -> Need:
     """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely."""
     bus = bus_of(network.profile)
     for limit in bus.limits:
-        if limit.is_broken(network):
+        if not limit.is_of_period and limit.is_broken(network):
             way_out = f" ({limit.way_out})" if limit.way_out else ""
             slice_us = inf if limit.slice_us is None else limit.slice_us(network)
             return Need(slice_us, limit.key, f"{limit.words(network)}{way_out}")
@@ -78,7 +78,25 @@ def needs(profile: Profile) -> list[Need]:
     return [need for constraint in CONSTRAINTS for need in constraint(profile)]
 
 
-def refused_period(profile: Profile, period_us: float) -> str:
+def refused_period(profile: Profile, period_us: float) -> Need | None:
+    """Why a period is none of the bus, or does not go with the step of the circle that a profile asks for, if so.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    period_us
+        Communication period [us].
+    """
+    network, bus = network_of(profile)._replace(period_us=period_us), bus_of(profile)
+    broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
+    if broken is not None:
+        return Need(inf, broken.key, broken.words(network))
+    why = refused_step(profile, period_us)
+    return Need(inf, STEP, why) if why else None
+
+
+def refused_step(profile: Profile, period_us: float) -> str:
     """Why a period does not go with the step of the circle that a profile asks for; empty where it does.
 
     Parameters

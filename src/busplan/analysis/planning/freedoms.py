@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.constraints import refused_step
 from busplan.analysis.planning.machine import (
     NODES_KEY,
     Changes,
@@ -16,7 +17,15 @@ from busplan.analysis.planning.machine import (
     with_nodes,
     with_payload_within,
 )
-from busplan.analysis.planning.short_numbers import MOST_RATIO, PERIOD_DIGITS, PERIOD_STEP_US, RATIOS, ShortNumbers
+from busplan.analysis.planning.short_numbers import (
+    MOST_RATIO,
+    PERIOD_DIGITS,
+    PERIOD_STEP_US,
+    RATIOS,
+    ListedNumbers,
+    NumberGrid,
+    ShortNumbers,
+)
 from busplan.buses.bus import Cost
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
@@ -192,12 +201,20 @@ def most_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom], *
     return low
 
 
-def period_grid(profile: "Profile") -> ShortNumbers:
-    """Periods that are advised: multiples of the circle's step, where the profile asks for a circle."""
+def period_grid(profile: "Profile") -> NumberGrid:
+    """Periods that are advised: those that the bus knows, or short ones; no circle refuses one for its step."""
+    known = bus_of(profile).periods.us
+    if known:
+        return ListedNumbers(tuple(one for one in known if not refused_step(profile, one)))
     return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 
-def place_of(grid: ShortNumbers, needed_us: float, *, each_us: float) -> int:
+def longest_period_us(profile: "Profile") -> float:
+    """The longest period that a profile may have and its bus knows [us]."""
+    return min(bus_of(profile).periods.longest_us, MAX_TIME_US)
+
+
+def place_of(grid: NumberGrid, needed_us: float, *, each_us: float) -> int:
     """The place of the smallest number of a grid with which the slice gives some time.
 
     Parameters

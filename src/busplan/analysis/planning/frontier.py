@@ -5,7 +5,7 @@ from math import inf
 
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import CIRCLE
-from busplan.analysis.planning.freedoms import PERIOD, Freedom, most_nodes, period_grid, place_of
+from busplan.analysis.planning.freedoms import PERIOD, Freedom, longest_period_us, most_nodes, period_grid, place_of
 from busplan.analysis.planning.machine import with_nodes, with_payload
 from busplan.analysis.planning.option import Impossible, Option, option
 from busplan.analysis.planning.search import Search
@@ -49,7 +49,7 @@ def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
         tried += 1
         place += 1 if tried < search.max_circles else 2 ** (tried - search.max_circles + 1)
     if not tried:
-        return Impossible(title, f"it would be over {MAX_TIME_US / 1e6:g} s")
+        return Impossible(title, f"it would be over {longest_period_us(goal) / 1e6:g} s")
     return Impossible(title, search.binding(cheap, {PERIOD: grid.number(first)}).why, proven=False)
 
 

@@ -5,14 +5,13 @@ from math import inf
 from typing import Final
 
 from busplan.analysis.capacity.cycle import fits_in
-from busplan.analysis.planning.constraints import CIRCLE, STEP, Need, needs, refused_period
-from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom
+from busplan.analysis.planning.constraints import CIRCLE, Need, needs, refused_period
+from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
 from busplan.analysis.planning.machine import Changes
 from busplan.analysis.planning.short_numbers import MOST_RATIO
 from busplan.buses.bus import Cost, Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
-from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
 
 FindCircleFailures = Callable[[Profile], tuple[str, ...]]
@@ -182,7 +181,7 @@ class Search:
     def most_slice_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The longest slice with some freedoms [us]."""
         is_free = any(one.cost == Cost.PERIOD for one in levels)
-        return self.most_ratio(changes, levels) * (MAX_TIME_US if is_free else self.period_us(changes))
+        return self.most_ratio(changes, levels) * (longest_period_us(self._own) if is_free else self.period_us(changes))
 
     def is_bounded(self, levels: Sequence[Freedom]) -> bool:
         """Whether some freedoms have an end: no period is free, and no limit of the bus is broken."""
@@ -209,7 +208,7 @@ class Search:
             return worst._replace(why=worst.words(most_us))
         refused = refused_period(self._own, self.period_us(furthest))
         if refused and all(one.cost != Cost.PERIOD for one in levels):
-            return Need(inf, STEP, refused)
+            return refused
         failures = self.circle_failures(furthest) if self._fits(furthest) else ()
         return Need(inf, CIRCLE, failures[0] if failures else "no period that was tried passes the circle")
 

@@ -1,10 +1,47 @@
-"""Numbers that are short to write: what is advised stands in a file."""
+"""Numbers that are advised: short to write, for they stand in a file, or those of a list."""
 
+from bisect import bisect_left
 from decimal import ROUND_CEILING, Decimal
-from math import ceil
-from typing import Final, NamedTuple
+from math import ceil, inf
+from typing import Final, NamedTuple, Protocol
 
 from busplan.analysis.capacity.cycle import FIT_ROUNDING
+
+
+class NumberGrid(Protocol):
+    """Numbers at places from 1 on, ascending."""
+
+    def number(self, place: int) -> float:
+        """The number at a place; infinite beyond the last."""
+
+    def place(self, least: float) -> int:
+        """The place of the smallest number that is no less than another one, but for float rounding."""
+
+
+class ListedNumbers(NamedTuple):
+    """Numbers of a list.
+
+    Parameters
+    ----------
+    numbers
+        They, ascending.
+
+    Examples
+    --------
+    >>> known = ListedNumbers((250.0, 500.0))
+    >>> known.place(300.0), known.number(2), known.number(3)
+    (2, 500.0, inf)
+    """
+
+    numbers: tuple[float, ...]
+
+    def number(self, place: int) -> float:
+        """The number at a place; infinite beyond the last."""
+        return self.numbers[place - 1] if place <= len(self.numbers) else inf
+
+    def place(self, least: float) -> int:
+        """The place of the smallest number that is no less than another one, but for float rounding."""
+        return bisect_left(self.numbers, least * (1 - FIT_ROUNDING)) + 1
 
 
 class ShortNumbers(NamedTuple):

@@ -254,8 +254,9 @@ def _combinations(keys: tuple[str, ...]) -> tuple[list[str], ...]:
 
 
 def _typed(number: Number, sort: Sort) -> Array:
-    """Array of the type that the sort of a figure has."""
-    return np.asarray(number, dtype=_TYPES[sort])
+    """Array of the type that the sort of a figure has; NaN for what does not exist."""
+    found: Array = np.asarray(number, dtype=_TYPES[sort])
+    return np.where(np.isinf(found), np.nan, found) if sort == "number" else found
 
 
 def _with_axes(values: Number, axes: int) -> Array:

@@ -66,27 +66,27 @@ def _frame_us(size: int, rate: int) -> float:
 def _example(title: str, given: Published) -> EvidenceSection:
     """Response times of some messages, and their load where the source has it."""
     rate = given["bit_rate_kbit_s"]
-    sources = [
+    senders = [
         Sender(_frame_us(size, rate), period_us)
         for size, period_us in zip(given["payload_bytes"], given["period_us"], strict=True)
     ]
     found = [
         Comparison(title, f"response of {name}", "us", given["response_us"][name], _WORST, own.us, given["grade"])
         for place, name in enumerate(given["names"])
-        if name in given["response_us"] and (own := _response(sources, place, rate))
+        if name in given["response_us"] and (own := _response(senders, place, rate))
     ]
     if "load" in given:
-        found.append(_load(title, given, sources))
+        found.append(_load(title, given, senders))
     return EvidenceSection(title, f"{given['source']}.", tuple(found), "can")
 
 
-def _response(sources: Sequence[Sender], place: int, rate: int) -> Response | None:
-    blocking_us = max((one.frames_us for one in sources[place + 1 :]), default=0.0)
-    return worst_response(sources[place], sources[:place], blocking_us=blocking_us, bit_us=plain(bit_us(rate)))
+def _response(senders: Sequence[Sender], place: int, rate: int) -> Response | None:
+    blocking_us = max((one.frames_us for one in senders[place + 1 :]), default=0.0)
+    return worst_response(senders[place], senders[:place], blocking_us=blocking_us, bit_us=plain(bit_us(rate)))
 
 
-def _load(title: str, given: Published, sources: Sequence[Sender]) -> Comparison:
-    return Comparison(title, "bus load", "1", given["load"], _WORST, sum(one.load for one in sources), given["grade"])
+def _load(title: str, given: Published, senders: Sequence[Sender]) -> Comparison:
+    return Comparison(title, "bus load", "1", given["load"], _WORST, sum(one.load for one in senders), given["grade"])
 
 
 def _axes(given: Published) -> EvidenceSection:

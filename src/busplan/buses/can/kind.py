@@ -121,6 +121,10 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         words = (f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network))
         return f"{', '.join(words)}, bus load {load:.1%}{none}"
 
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
+        """A response time ends when the frame has arrived, and begins when it is queued."""
+        return False
+
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """SYNC with its counter, and identifiers of 29 bits."""
         bus = network.profile.bus

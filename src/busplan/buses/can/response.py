@@ -99,20 +99,20 @@ def worst_response(own: Sender, higher: Sequence[Sender], *, blocking_us: float,
     return worst
 
 
-def settled_us(others_us: float, sources: Sequence[Sender]) -> float:
+def settled_us(others_us: float, senders: Sequence[Sender]) -> float:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
     ----------
     others_us
-        What takes time beside the sources [us].
-    sources
+        What takes time beside the senders [us].
+    senders
         What arrives within the span.
 
     Returns
     -------
     float
-        The smallest w = others + sum ceil((w + J) / T) C. With a load of the sources above 0.99 a bound of it in closed
+        The smallest w = others + sum ceil((w + J) / T) C. With a load of the senders above 0.99 a bound of it in closed
         form, and from `SATURATED` on one that says no more than that the bus is full.
 
     Examples
@@ -120,12 +120,12 @@ def settled_us(others_us: float, sources: Sequence[Sender]) -> float:
     >>> settled_us(900.0, [Sender(100, 500)])
     1200.0
     """
-    load = sum(one.load for one in sources)
+    load = sum(one.load for one in senders)
     if load > _NEARLY_FULL:
-        first_us = others_us + sum(one.frames_us + one.load * one.jitter_us for one in sources)
+        first_us = others_us + sum(one.frames_us + one.load * one.jitter_us for one in senders)
         return first_us / (1 - min(load, SATURATED))
-    start_us = others_us + sum(one.frames_us for one in sources)
-    return _settled(start_us, lambda span_us: others_us + sum(one.released_us(span_us) for one in sources))
+    start_us = others_us + sum(one.frames_us for one in senders)
+    return _settled(start_us, lambda span_us: others_us + sum(one.released_us(span_us) for one in senders))
 
 
 _NEARLY_FULL = 0.99

@@ -1,0 +1,75 @@
+"""The figures that only an EtherCAT bus has."""
+
+from typing import Final
+
+from busplan.buses.figure import NODES, NONPERIODIC, TIMING_MODEL, TRANSACTION, Figure, capacity_figures
+
+FRAME: Final = "IEEE 802.3, ETG.1000"
+
+FRAMES: Final = Figure("frames", "F", FRAME, "frames of process data in a cycle", "frames", sort="count", better="less")
+PROCESS: Final = Figure(
+    "process_bytes", "D", "profile", "process data of all devices", "process data", sort="count", better="less"
+)
+COMMAND: Final = Figure(
+    "command_us",
+    "t_cmd",
+    "profile",
+    "when the last device has taken its command, from the start of the cycle",
+    "last command taken",
+    better="less",
+)
+SYNC0: Final = Figure(
+    "sync0_us", "t_sync", "profile", "SYNC0 of the distributed clocks, from the start of the cycle", "SYNC0"
+)
+OWN: Final = (FRAMES, PROCESS, COMMAND, SYNC0)
+TERMS: Final = (
+    Figure("cycle_master_us", "T_master", "profile", "the master's own time", "master", ink="contention", letter="M"),
+    Figure(
+        "cycle_frames_us",
+        "frames",
+        FRAME,
+        "preambles, headers, checks, gaps and padding of the frames, and the datagram of the clocks",
+        "frame overhead",
+        ink="gap",
+        letter="F",
+    ),
+    Figure("cycle_data_us", "data", FRAME, "process data of all devices", "process data", ink="out", letter="D"),
+    Figure("cycle_mailbox_us", "mailbox", FRAME, "frames of mailbox polls", "mailbox", ink="request", letter="B"),
+    Figure(
+        "cycle_devices_us",
+        "devices",
+        "DC time stamps",
+        "delay of all devices, there and back",
+        "devices",
+        ink="work",
+        letter="H",
+    ),
+    Figure("cycle_cable_us", "cables", "SOEM", "delay of all cables, there and back", "cables", ink="sync", letter="L"),
+    Figure(
+        "cycle_receive_us",
+        "receive",
+        "acontis",
+        "the last frame once more, as vendors count its reception",
+        "receiving again",
+        ink="in",
+        letter="R",
+    ),
+    NONPERIODIC,
+)
+"""In the order of the wire."""
+CAPACITY: Final = capacity_figures(TERMS, own=OWN)
+
+LATENCY_TABLE: Final = (
+    Figure("drive_us", "T_exec", "profile", "the device's own time", "device"),
+    Figure("frame_wait_us", "wait", "profile", "wait of feedback for the next frame", "wait for a frame"),
+    Figure("pipeline_us", "n T_s", "profile", "cycles that the master computes in", "master's pipeline"),
+    Figure("master_us", "T_master", "profile", "the master's own time for a frame", "master"),
+    Figure("sending_us", "sending", FRAME, "all frames of process data on the wire", "sending"),
+    Figure("path_us", "path", "DC time stamps", "delay of devices and cables on the way", "devices and cables"),
+    Figure(
+        "sync_wait_us", "SYNC0", "profile", "wait of a command for SYNC0 of the distributed clocks", "wait for SYNC0"
+    ),
+    Figure("end_to_end_us", "L", "profile", "all of it", "end to end", better="less"),
+)
+"""In the order in which they add up."""
+LATENCY: Final = (TIMING_MODEL, TRANSACTION, NODES, *LATENCY_TABLE)

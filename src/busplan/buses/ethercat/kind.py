@@ -1,0 +1,192 @@
+"""EtherCAT, as a kind of bus."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.ethercat import figures, rules
+from busplan.buses.ethercat.constants import CONSTANTS, LRW, MAILBOX_BYTES, PIPELINE_CYCLES, SPLIT, SYNC_SHIFT
+from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
+from busplan.buses.ethercat.equations import room_bytes
+from busplan.buses.ethercat.latency import loop_periods
+from busplan.buses.ethercat.limits import LIMITS
+from busplan.buses.ethercat.traffic import arrivals_us, datagrams, is_shared
+from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.network import Network
+from busplan.buses.rule import Rule
+from busplan.elementwise import plain
+from busplan.sourced import Sourced
+
+if TYPE_CHECKING:
+    from busplan.buses.bus import BusCycle
+    from busplan.buses.ethercat.section import EthercatProfile
+    from busplan.buses.published import EvidenceSection
+
+_COMMAND = "bus.command"
+_MASTER_STEP_US = 10.0
+
+
+class Ethercat(Bus):
+    """EtherCAT: the master's frames pass all devices in every cycle."""
+
+    kind = "ethercat"
+    title = "EtherCAT"
+    timing_models = (
+        TimingModel(LAST_BYTE, "until the last byte of the last frame is back at the master"),
+        TimingModel(VENDORS, "as vendors count: sending, propagation, and reception of the last frame"),
+    )
+    deciding_model = LAST_BYTE
+    term_figures = figures.TERMS
+    capacity_figures = figures.CAPACITY
+    compared_figures = figures.OWN
+    table_figures = figures.OWN
+    latency_table_figures = figures.LATENCY_TABLE
+    has_many_transactions = True
+    planned_figures = ("frames",)
+    limits: ClassVar[tuple[Limit, ...]] = LIMITS
+    rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    starter = Starter(
+        """\
+[bus]
+kind = "ethercat"
+command = "LRW"            # assumed: inputs and outputs share their bytes; "LRD-LWR" where a device cannot
+distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift of the period
+master_us = 50             # assumed: the master's own time, from its task to the wire and back""",
+        slice_ratio="1            # assumed: the master computes in the next cycle with what it received in this one",
+        measure="measure both on a drive: SYNC0 to its feedback, frame to command taken; no frame waits for them",
+        base="from SYNC0 to feedback, and from the frame to a command that is taken",
+    )
+    event_kinds = (
+        EventKind("master", "master", "profile", "M", "contention"),
+        EventKind("overhead", "frame overhead", figures.FRAME, "f", "gap"),
+        EventKind("data", "process data", figures.FRAME, ">", "request"),
+        EventKind("mailbox", "mailbox poll", figures.FRAME, "b", "acknowledge"),
+        EventKind("cable", "cable", "SOEM", "-", "sync"),
+        EventKind("device", "device", "DC time stamps", "=", "work"),
+        EventKind("receive", "receiving again", "acontis", "<", "response"),
+        EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
+    )
+    stretch_kinds = (
+        EventKind("frame", "frames", "", "F", "out"),
+        EventKind("way", "way through the devices", "", "W", "in"),
+    )
+    constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
+    key_sources: ClassVar[Mapping[str, Sourced]] = {
+        "bus.sync_shift": SYNC_SHIFT,
+        "bus.mailbox_bytes": MAILBOX_BYTES,
+        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    }
+    key_symbols: ClassVar[Mapping[str, str]] = {
+        "bus.master_us": "T_master",
+        "bus.mailbox_polls": "polls",
+        "bus.mailbox_bytes": "B",
+        "bus.sync_shift": "shift",
+        "bus.pipeline_cycles": "n",
+        "node.cable_m": "L",
+        "node.delay_us": "t_d",
+        "node.execution.worst_extra_us": "T_extra",
+    }
+    change_meanings: ClassVar[Mapping[str, str]] = {
+        "bus.nodes": "the others on a second segment",
+        _COMMAND: "if all devices can",
+    }
+    change_words: ClassVar[Mapping[str, str]] = {_COMMAND: "command {}"}
+    term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
+        {"bus.master_us": 0.0},
+        {"bus.mailbox_polls": 0},
+    )
+    evidence_data = ("ethercat",)
+    evidence_profiles = ("ethercat-servo-8",)
+    untested = "the cycle"
+
+    def profile_model(self) -> "type[EthercatProfile]":
+        """The model of its profiles."""
+        from busplan.buses.ethercat.section import EthercatProfile  # the one module of the bus that loads pydantic
+
+        return EthercatProfile
+
+    def cycle(self, network: Network, *, model: str) -> EthercatCycle:
+        """The cycle of a network under one timing model."""
+        return EthercatCycle(network, model)
+
+    @property
+    def latency_figures(self) -> tuple[Figure, ...]:
+        """Of `latency`, in the order of its document."""
+        return figures.LATENCY
+
+    def latency_subject(self, network: Network) -> str:
+        """Say whose latency it is, and what the master and the clocks add."""
+        bus = network.profile.bus
+        clocks = f"SYNC0 at {bus.sync_shift:.0%} of the period" if bus.distributed_clocks else "no distributed clocks"
+        cycles = f"{bus.pipeline_cycles} cycle{'s' * (bus.pipeline_cycles != 1)} in the master"
+        return f"worst case of a command, of feedback and of a loop over both, {cycles}, {clocks}"
+
+    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - never
+        """No device keeps a frame waiting: their own time is in latencies alone."""
+        return False
+
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
+        """The nodes' time is in every latency."""
+        return True
+
+    def arrivals_us(self, cycle: "BusCycle") -> Mapping[int, float]:
+        """When the last byte of its frame has reached each device [us]."""
+        return arrivals_us(cycle.network)
+
+    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
+        """The master's pipeline, and the cycles that feedback and command wait for a frame and for SYNC0."""
+        return loop_periods(network, at_sync=at_sync)
+
+    def acts_at_once(self, network: Network) -> bool:
+        """Whether it has distributed clocks."""
+        return bool(network.profile.bus.distributed_clocks)
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:
+        """Inputs and outputs that share their bytes."""
+        values = () if is_shared(network) else ({_COMMAND: LRW},)
+        reason = "they share their bytes already" if is_shared(network) else ""
+        return (Setting("command", "command", Cost.SCHEDULE, (_COMMAND,), values, reason),)
+
+    def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
+        """A mailbox poll more, a slower master, commands that share no bytes, and distributed clocks."""
+        bus: Any = network.profile.bus
+        return (
+            Perturbation("one mailbox poll more", {"bus.mailbox_polls": bus.mailbox_polls + 1}),
+            Perturbation(f"master +{_MASTER_STEP_US:g} us", {"bus.master_us": bus.master_us + _MASTER_STEP_US}),
+            Perturbation(
+                "inputs and outputs apart", {_COMMAND: SPLIT}, why_not="" if is_shared(network) else "they are already"
+            ),
+            Perturbation(
+                "distributed clocks",
+                {"bus.distributed_clocks": True},
+                why_not="it has them already" if bus.distributed_clocks else "",
+            ),
+        )
+
+    def payloads(self, network: Network) -> PayloadRange:
+        """Whole bytes up to those of a frame."""
+        count = datagrams(network)
+        return PayloadRange(1, int(room_bytes(count) / count), "frame", carrier="a frame")
+
+    def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
+        """Say that the last byte passes all devices."""
+        return "the last byte through all devices and back"
+
+    def setup_words(self, network: Network) -> tuple[str, ...]:
+        """The commands, the frames, and the clocks."""
+        count = int(plain(self.cycle(network, model=LAST_BYTE).packing.frames))
+        clocks = ("distributed clocks",) if network.profile.bus.distributed_clocks else ()
+        return (network.profile.bus.command, f"{count} frame{'s' * (count != 1)}", *clocks)
+
+    def evidence(
+        self,
+        networks: Mapping[str, Network],
+        published: Mapping[str, Mapping[str, Any]],
+    ) -> "tuple[EvidenceSection, ...]":
+        """Compare what vendors and others publish with what the equations give."""
+        from busplan.buses.ethercat.evidence import sections  # one command alone asks for it
+
+        return sections(networks["ethercat-servo-8"], published["ethercat"])
+
+
+BUS = Ethercat()

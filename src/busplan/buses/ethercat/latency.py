@@ -1,0 +1,120 @@
+"""How long a command takes to a drive, feedback to the master, and a loop over both.
+
+A frame goes at the start of each cycle. SYNC0 of the distributed clocks lies at a share of the cycle: there drives
+sample, and commands that have arrived take effect. Without distributed clocks drives act when their frame has passed.
+"""
+
+from functools import reduce
+
+from busplan.buses.bus import BusLatency
+from busplan.buses.ethercat.figures import LATENCY_TABLE
+from busplan.buses.ethercat.traffic import arrivals_us, cables_us, devices_us, mailbox_us, process_us
+from busplan.buses.network import Group, Network
+from busplan.elementwise import Number, larger, named, plain, rounded_up, total
+
+_SUM = LATENCY_TABLE[-1].key
+
+
+def sync0_us(network: Network) -> Number:
+    """Where SYNC0 lies behind the start of a cycle; 0 without distributed clocks [us]."""
+    bus = network.profile.bus
+    return bus.sync_shift * network.period_us if bus.distributed_clocks else 0.0
+
+
+def latencies(network: Network) -> tuple[BusLatency, ...]:
+    """The worst case of a command, of feedback, and of a loop over both, for each group.
+
+    Parameters
+    ----------
+    network
+        The network; its numbers may be of any sort.
+    """
+    sent_us, way_us = process_us(network), _way_us(network)
+    found = []
+    for one in network.groups:
+        there, back = _command(one, network, sent_us, way_us), _feedback(one, network, sent_us, way_us)
+        # The master's pipeline begins with the cycle that brings the feedback.
+        both = {**there, "drive_us": back["drive_us"] + there["drive_us"], "frame_wait_us": back["frame_wait_us"]}
+        for name, phases in (("command", there), ("feedback", back), ("loop", both)):
+            found.append(BusLatency(name, None, phases | {_SUM: total(phases.values())}, one.name))
+    return tuple(found)
+
+
+def last_command_us(network: Network) -> Number:
+    """When the last device has taken its command, from the start of the cycle [us]."""
+    sent_us, way_us = process_us(network), _way_us(network)
+    return reduce(larger, (_taken_us(one, network, sent_us, way_us) for one in network.groups))
+
+
+def _way_us(network: Network) -> Number:
+    """Delay of devices and cables to the last device and back [us]."""
+    return named(devices_us(network) + cables_us(network), "way_us", "way")
+
+
+def _taken_us(group: Group, network: Network, sent_us: Number, way_us: Number) -> Number:
+    """When the last device of a group may have taken its command, from the start of the cycle [us]."""
+    taken_us = network.profile.bus.master_us + sent_us + way_us / 2 + group.write_execution_us + group.worst_extra_us
+    return named(taken_us, "command_us", "t_cmd")
+
+
+def _command(group: Group, network: Network, sent_us: Number, way_us: Number) -> dict[str, Number]:
+    """From the cycle whose feedback it rests on to its effect."""
+    bus = network.profile.bus
+    taken_us = _taken_us(group, network, sent_us, way_us)
+    wait_us: Number = 0.0
+    if bus.distributed_clocks:
+        late = larger(rounded_up((taken_us - sync0_us(network)) / network.period_us), 0)
+        wait_us = sync0_us(network) + late * network.period_us - taken_us
+    return {
+        "drive_us": group.write_execution_us + group.worst_extra_us,
+        "frame_wait_us": 0.0,
+        "pipeline_us": named(bus.pipeline_cycles * network.period_us, "pipeline_us", "n T_s"),
+        "master_us": bus.master_us,
+        "sending_us": sent_us,
+        "path_us": way_us / 2,
+        "sync_wait_us": wait_us,
+    }
+
+
+def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -> dict[str, Number]:
+    """From the sample to the start of the cycle whose frame takes it, and until the master has all frames."""
+    ready_us = group.read_execution_us + group.worst_extra_us
+    behind_us = sync0_us(network) + ready_us
+    wait_us = rounded_up(behind_us / network.period_us) * network.period_us - behind_us
+    return {
+        "drive_us": ready_us,
+        "frame_wait_us": wait_us,
+        "pipeline_us": 0.0,
+        "master_us": network.profile.bus.master_us,
+        "sending_us": sent_us + mailbox_us(network),
+        "path_us": way_us,
+        "sync_wait_us": 0.0,
+    }
+
+
+def loop_periods(network: Network, *, at_sync: bool) -> int:
+    """Whole periods between a sample and the start of the cycle, or the SYNC0, that its command takes effect in.
+
+    Parameters
+    ----------
+    network
+        The network, of plain numbers.
+    at_sync
+        Whether commands take effect at SYNC0; otherwise when they arrive.
+
+    Returns
+    -------
+    int
+        Of the slowest group [1].
+    """
+    bus, period_us = network.profile.bus, plain(network.period_us)
+    shift_us = plain(sync0_us(network)) if at_sync else 0.0
+    last_us = max(arrivals_us(network).values())
+
+    def of(group: Group) -> float:
+        extra_us = plain(group.worst_extra_us)
+        sampled = rounded_up((shift_us + plain(group.read_execution_us) + extra_us) / period_us)
+        late_us = last_us + plain(group.write_execution_us) + extra_us - shift_us
+        return plain(sampled) + (max(plain(rounded_up(late_us / period_us)), 0) if at_sync else 0)
+
+    return int(max(map(of, network.groups)) + plain(bus.pipeline_cycles))

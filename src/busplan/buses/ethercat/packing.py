@@ -1,0 +1,113 @@
+"""How devices share frames: in their order, each whole, a new frame where the next device has no room."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from busplan.buses.ethercat.constants import DATAGRAM_BYTES
+from busplan.buses.ethercat.equations import padding_bytes, room_bytes
+from busplan.elementwise import Number, alike, choose, is_off, larger, plain, rounded_down, rounded_up, smaller, total
+
+
+class Devices(NamedTuple):
+    """Devices that are alike, side by side. The numbers may be of any sort."""
+
+    number: Number
+    """How many [1]."""
+    data_bytes: Number
+    """Bytes of each in a frame [bytes]."""
+
+
+class Packing(NamedTuple):
+    """All frames of the process data. The numbers may be of any sort."""
+
+    frames: Number
+    """How many [1]."""
+    datagrams_bytes: Number
+    """All their datagrams, headers and data [bytes]."""
+    padding_bytes: Number
+    """What fills short frames [bytes]."""
+    last_bytes: Number
+    """Datagrams of the last frame [bytes]."""
+    before_bytes: Number
+    """Datagrams of the frame before it; 0 where there is none [bytes]."""
+
+
+def pack(devices: Sequence[Devices], *, datagrams: int, first_bytes: Number) -> Packing:
+    """Share out devices among frames.
+
+    Parameters
+    ----------
+    devices
+        Groups of devices in their order, one or more.
+    datagrams
+        Datagrams of process data in a frame that holds any: 1 of LRW, 2 of LRD and LWR [1].
+    first_bytes
+        A datagram of another sort that opens the first frame; 0 for none [bytes].
+
+    Returns
+    -------
+    Packing
+        A device that no frame has room for is taken to have one of its own: a limit is broken then.
+
+    Examples
+    --------
+    >>> pack([Devices(1000, 4)], datagrams=1, first_bytes=0.0)
+    Packing(frames=3, datagrams_bytes=4036.0, padding_bytes=0.0, last_bytes=1044.0, before_bytes=1496.0)
+    """
+    room = room_bytes(datagrams)
+    headers = total([alike(DATAGRAM_BYTES, devices[0].number)] * datagrams)
+    free: Number = 0.0
+    frames: Number = 0
+    present: Number = 0.0
+    whole: Number = first_bytes
+    padding: Number = 0.0
+    before: Number = 0.0
+    if not is_off(first_bytes):
+        # The first device may have no room beside it, and then it goes alone.
+        has_room = room - first_bytes - devices[0].data_bytes >= 0
+        free = choose(has_room, room - first_bytes, 0.0)
+        present = first_bytes + choose(has_room, headers, 0.0)
+        whole = present
+        frames = 1
+    for one in devices:
+        beside = smaller(one.number, rounded_down(free / one.data_bytes))
+        behind = one.number - beside
+        present, free = present + beside * one.data_bytes, free - beside * one.data_bytes
+        each = larger(rounded_down(room / one.data_bytes), 1)
+        new = rounded_up(behind / each)
+        in_last = (behind - (larger(new, 1) - 1) * each) * one.data_bytes
+        opens = behind > 0
+        before = choose(opens, choose(new > 1, headers + each * one.data_bytes, present), before)
+        padding = padding + choose(opens, padding_bytes(present), 0.0)
+        present, free = choose(opens, headers + in_last, present), choose(opens, larger(room - in_last, 0.0), free)
+        frames, whole = frames + new, whole + new * headers + one.number * one.data_bytes
+    return Packing(frames, whole, padding + padding_bytes(present), present, before)
+
+
+class Frame(NamedTuple):
+    """One frame of plain numbers."""
+
+    devices: tuple[int, ...]
+    """Devices whose data it holds, from 1; none where only the clocks' datagram had room."""
+    datagrams_bytes: float
+
+
+def frames_of(devices: Sequence[Devices], *, datagrams: int, first_bytes: float) -> Iterator[Frame]:
+    """The same frames one by one, of plain numbers.
+
+    Parameters
+    ----------
+    devices, datagrams, first_bytes
+        As `pack` takes them.
+    """
+    room, headers = room_bytes(datagrams), datagrams * float(DATAGRAM_BYTES)
+    held: list[int] = []
+    opened, filled = first_bytes, 0.0
+    sizes = [plain(one.data_bytes) for one in devices for _ in range(int(plain(one.number)))]
+    for device, size in enumerate(sizes, start=1):
+        if filled + size > room - opened and (held or opened):
+            yield Frame(tuple(held), opened + bool(held) * headers + filled)
+            held, opened, filled = [], 0.0, 0.0
+        held.append(device)
+        filled += size
+    yield Frame(tuple(held), opened + headers + filled)

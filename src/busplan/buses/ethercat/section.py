@@ -1,0 +1,112 @@
+"""The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from busplan.buses.ethercat.constants import LRW, MAILBOX_BYTES, PIPELINE_CYCLES, SYNC_SHIFT, Command, Port
+from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
+from busplan.buses.ethercat.equations import room_bytes
+from busplan.elementwise import Number
+from busplan.sections.base import MAX_COUNT, Count, TimeUs
+from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSection, PayloadSection
+from busplan.sections.execution import UNKNOWN_SHARE
+from busplan.sections.profile import Profile
+
+_LONGEST_CABLE_M = 1e5
+_MOST_CYCLES = 1000
+
+
+class EthercatBus(BusSection):
+    """Section [bus]: an EtherCAT segment at 100 Mbit/s."""
+
+    kind: Literal["ethercat"] = Field(description="Kind of bus", examples=["ethercat"])
+    nodes: Count | None = Field(default=None, description="Devices N, the master not counted", examples=[8])
+    command: Command = Field(
+        default=LRW,
+        description="Commands of the process data: LRW, inputs and outputs of a device share their bytes; LRD-LWR, "
+        "they do not",
+        examples=[LRW],
+    )
+    distributed_clocks: bool = Field(
+        default=False,
+        description="Whether devices have distributed clocks: a datagram of 8 bytes opens the first frame, and drives "
+        "act at SYNC0",
+        examples=[True],
+    )
+    sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
+        default=float(SYNC_SHIFT),
+        description="Where SYNC0 lies in the cycle, a share of the period from the start of the frames, 0..0.999; read "
+        "with distributed clocks",
+        examples=[0.5],
+    )
+    mailbox_polls: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
+        default=0, description="Mailbox polls in each cycle, each a frame of its own", examples=[1]
+    )
+    mailbox_bytes: Annotated[int, Field(ge=1, le=int(room_bytes(1)))] = Field(
+        default=int(MAILBOX_BYTES), description="Data of each mailbox poll [bytes]", examples=[int(MAILBOX_BYTES)]
+    )
+    master_us: TimeUs = Field(
+        default=0.0,
+        description="The master's own time in each cycle: from its task to the wire, and back behind the last byte "
+        "[us]",
+        examples=[30],
+    )
+    master_uncertainty_us: TimeUs | None = Field(
+        default=None, description="Standard uncertainty of master_us; without it 10 % of it [us]", examples=[5]
+    )
+    pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
+        default=int(PIPELINE_CYCLES),
+        description="Cycles from the frame that brings feedback to the one that takes the command computed from it; "
+        "of latency, and of a loop on the host",
+        examples=[1],
+    )
+    timing_model: TimingModelName = Field(
+        default=LAST_BYTE,
+        description="Timing model whose figures lead the tables, last-byte or vendors; the verdict is always by "
+        "last-byte",
+        examples=[LAST_BYTE],
+    )
+
+    @property
+    def master_doubt_us(self) -> Number:
+        """Standard uncertainty of the master's own time [us]."""
+        if self.master_uncertainty_us is not None:
+            return self.master_uncertainty_us
+        return UNKNOWN_SHARE * self.master_us
+
+
+class EthercatNode(NodeSection):
+    """Section [node]: one device, and the cable to it."""
+
+    port: Port = Field(
+        default="100BASE-TX",
+        description="Ports of the device, which say its delay: 100BASE-TX, or E-bus between the terminals of a block",
+        examples=["E-bus"],
+    )
+    delay_us: TimeUs | None = Field(
+        default=None,
+        description="Delay of the device one way, measured, as the time stamps of distributed clocks tell it less the "
+        "cable; without it by its port [us]",
+        examples=[0.7],
+    )
+    cable_m: Annotated[float, Field(ge=0, le=_LONGEST_CABLE_M, allow_inf_nan=False)] = Field(
+        default=0.0, description="Cable from the device before it, or from the master [m]", examples=[2]
+    )
+
+
+class EthercatGroup(EthercatNode, GroupSection):
+    """One of the sections [[group]]: devices that are alike, in the order of the segment."""
+
+    axes: GroupAxes = Field(examples=[4])
+
+
+class EthercatProfile(Profile):
+    """A whole profile: one motion network and its cycle."""
+
+    bus: EthercatBus = Field(description="The bus")
+    payload: PayloadSection | None = Field(default=None, description="What travels in a cycle, where nodes are alike")
+    node: EthercatNode | None = Field(default=None, description="One device, where nodes are alike")
+    group: Annotated[tuple[EthercatGroup, ...], Field(strict=False)] = Field(
+        default=(), description="Groups of unlike nodes, instead of bus.nodes, [node] and [payload]"
+    )

@@ -1,0 +1,79 @@
+"""What a network sends on SERCOS III: its MDT and AT, filled as the master does."""
+
+from typing import Final, NamedTuple
+
+from busplan.buses.network import Group, Network
+from busplan.buses.sercos3.constants import (
+    ALIGNED_BYTES,
+    CHANNEL_BYTES,
+    CONNECTION_BYTES,
+    DEVICE_BYTES,
+    EXTENDED_BYTES,
+    HOT_PLUG_BYTES,
+)
+from busplan.buses.sercos3.equations import Filling, Items, filled
+from busplan.elementwise import Number, alike
+from busplan.sections.transactions import TransactionKind
+
+SORTS: Final[dict[TransactionKind, str]] = {"write": "mdt", "read": "at"}
+"""Which telegrams carry a node's payloads, in the order of the cycle."""
+
+
+class Telegrams(NamedTuple):
+    """All telegrams of one sort, as a network says them. The numbers may be of any sort."""
+
+    first_bytes: Number
+    """What the first begins with [bytes]."""
+    next_bytes: Number
+    """What each other begins with [bytes]."""
+    items: tuple[Items, ...]
+    """What they carry: service channels, control or status, then the data of each group."""
+    name: str
+    """What a derivation calls them."""
+
+    @property
+    def filling(self) -> Filling:
+        """They, filled."""
+        return filled(self.items, first_bytes=self.first_bytes, next_bytes=self.next_bytes, name=self.name)
+
+
+def telegrams_of(network: Network, kind: TransactionKind) -> Telegrams:
+    """The telegrams that carry one of a node's payloads.
+
+    Parameters
+    ----------
+    network
+        The network.
+    kind
+        "write" for MDT, "read" for AT.
+    """
+    is_in_all = network.profile.bus.hot_plug_field == "all"
+    first_bytes = alike(HOT_PLUG_BYTES, network.nodes)
+    if kind == "write":
+        first_bytes = first_bytes + EXTENDED_BYTES + (ALIGNED_BYTES if is_in_all else 0)
+    return Telegrams(
+        first_bytes,
+        HOT_PLUG_BYTES if is_in_all else 0,
+        (
+            Items(network.nodes, CHANNEL_BYTES),
+            Items(network.nodes, DEVICE_BYTES),
+            *(Items(one.nodes, data_bytes(network, size)) for one, size in sizes(network, kind)),
+        ),
+        SORTS[kind].upper(),
+    )
+
+
+def sizes(network: Network, kind: TransactionKind) -> list[tuple[Group, Number]]:
+    """Each group of nodes with its payload [bytes]."""
+    return [(one, one.write_bytes if kind == "write" else one.read_bytes) for one in network.groups]
+
+
+def data_bytes(network: Network, payload_bytes: Number) -> Number:
+    """Cyclic data of a device, with the control of its connection [bytes]."""
+    return payload_bytes + CONNECTION_BYTES if has_connections(network) else payload_bytes
+
+
+def has_connections(network: Network) -> bool:
+    """Whether cyclic data are connections, each with its control."""
+    is_first: bool = network.profile.bus.version == "V1.0"
+    return not is_first

@@ -1,0 +1,132 @@
+"""Frames against a writer that puts them together byte by byte, and against published sizes."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.derivation.trace import Traced
+from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
+from busplan.buses.ethercat.packing import Devices, frames_of, pack
+
+MOST, LEAST = 1538, 84
+
+
+class Written(NamedTuple):
+    """A frame as bytes, and which devices have data in it."""
+
+    bytes: bytes
+    devices: tuple[int, ...]
+
+
+def datagram(data: bytes) -> bytes:
+    return b"command, " + b"i" + data + b"wc"
+
+
+def on_wire(datagrams: bytes) -> bytes:
+    """Preamble, Ethernet header, EtherCAT header, datagrams, padding of the Ethernet payload to 46, check, gap."""
+    payload = (b"ec" + datagrams).ljust(46, b"0")
+    return b"p" * 8 + b"e" * 14 + payload + b"c" * 4 + b"g" * 12
+
+
+def body(held: list[tuple[bytes, bytes]], *, is_shared: bool, clocks: bool) -> bytes:
+    found = datagram(b"t" * 8) if clocks else b""
+    if not held:
+        return found
+    if is_shared:
+        return found + datagram(b"".join(max(one, key=len) for one in held))
+    return found + datagram(b"".join(one for one, _ in held)) + datagram(b"".join(one for _, one in held))
+
+
+def written(devices: list[tuple[int, int]], *, is_shared: bool, clocks: bool) -> list[Written]:
+    """Put devices into a frame as long as the whole frame stays within the longest one."""
+    found: list[Written] = []
+    held: list[tuple[bytes, bytes]] = []
+    place: list[int] = []
+    for number, (read, write) in enumerate(devices, start=1):
+        own = b"r" * read, b"w" * write
+        more = on_wire(body([*held, own], is_shared=is_shared, clocks=clocks and not found))
+        if len(more) > MOST:
+            found.append(Written(on_wire(body(held, is_shared=is_shared, clocks=clocks and not found)), tuple(place)))
+            held, place = [], []
+        held.append(own)
+        place.append(number)
+    found.append(Written(on_wire(body(held, is_shared=is_shared, clocks=clocks and not found)), tuple(place)))
+    return found
+
+
+def sized(read: int, write: int, *, is_shared: bool) -> int:
+    return max(read, write) if is_shared else read + write
+
+
+GROUPS = st.lists(
+    st.tuples(
+        st.one_of(st.integers(1, 4), st.integers(1, 300)),
+        st.one_of(st.integers(1, 30), st.integers(1, 730), st.just(737)),
+        st.one_of(st.integers(1, 30), st.integers(1, 730), st.just(737)),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(GROUPS, st.booleans(), st.booleans())
+def test_frames_are_those_of_a_writer(groups: list[tuple[int, int, int]], is_shared: bool, clocks: bool) -> None:
+    each = [(read, write) for nodes, read, write in groups for _ in range(nodes)]
+    whole = written(each, is_shared=is_shared, clocks=clocks)
+    own = [Devices(nodes, sized(read, write, is_shared=is_shared)) for nodes, read, write in groups]
+    datagrams, first = 1 if is_shared else 2, 20.0 if clocks else 0.0
+    found = pack(own, datagrams=datagrams, first_bytes=first)
+    assert found.frames == len(whole)
+    assert found.frames * 40 + found.datagrams_bytes + found.padding_bytes == sum(len(one.bytes) for one in whole)
+    assert frame_bytes(found.last_bytes) == len(whole[-1].bytes)
+    assert found.before_bytes == 0 if len(whole) == 1 else frame_bytes(found.before_bytes) == len(whole[-2].bytes)
+    one_by_one = list(frames_of(own, datagrams=datagrams, first_bytes=first))
+    assert [(frame_bytes(one.datagrams_bytes), one.devices) for one in one_by_one] == [
+        (len(one.bytes), one.devices) for one in whole
+    ]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 1486), st.booleans(), st.integers(1, 200))
+def test_an_array_and_a_traced_number_pack_as_each_number(size: int, clocks: bool, other: int) -> None:
+    first, nodes = 20.0 if clocks else 0.0, np.arange(1, 60)
+    together = pack([Devices(nodes, size), Devices(3, other)], datagrams=1, first_bytes=first)
+    for index, count in enumerate(nodes.tolist()):
+        alone = pack([Devices(count, size), Devices(3, other)], datagrams=1, first_bytes=first)
+        assert [float(np.broadcast_to(np.asarray(one), nodes.shape)[index]) for one in together] == list(alone)
+    traced = pack([Devices(Traced(7.0), size), Devices(3, other)], datagrams=1, first_bytes=first)
+    plain = pack([Devices(7, size), Devices(3, other)], datagrams=1, first_bytes=first)
+    assert [one.value if isinstance(one, Traced) else one for one in traced] == list(plain)
+
+
+@pytest.mark.parametrize(("data", "wire"), [(1, 84), (32, 84), (33, 85), (125, 177), (1486, 1538)])
+def test_frames_have_published_lengths(data: int, wire: int) -> None:
+    assert frame_bytes(datagram_bytes(data)) == wire
+    assert sending_us(wire) == pytest.approx(0.08 * wire)
+
+
+def test_a_frame_has_room_for_1486_bytes_and_20_less_beside_the_clocks() -> None:
+    assert room_bytes(1) == 1486
+    assert pack([Devices(1, 1486)], datagrams=1, first_bytes=0.0).frames == 1
+    assert pack([Devices(2, 743)], datagrams=1, first_bytes=0.0).frames == 1
+    assert pack([Devices(2, 733)], datagrams=1, first_bytes=20.0).frames == 1
+    assert pack([Devices(2, 734)], datagrams=1, first_bytes=20.0).frames == 2
+
+
+def test_a_first_device_that_has_no_room_beside_the_clocks_leaves_them_alone() -> None:
+    found = list(frames_of([Devices(1, 1486)], datagrams=1, first_bytes=20.0))
+    assert [(one.devices, frame_bytes(one.datagrams_bytes)) for one in found] == [((), 84), ((1,), 1538)]
+
+
+def test_a_device_is_never_split() -> None:
+    found = list(frames_of([Devices(3, 800)], datagrams=1, first_bytes=0.0))
+    assert [one.devices for one in found] == [(1,), (2,), (3,)]
+
+
+def test_groups_share_a_frame_at_their_boundary() -> None:
+    found = list(frames_of([Devices(150, 10), Devices(2, 700), Devices(1, 100)], datagrams=1, first_bytes=0.0))
+    assert [one.devices[:1] + one.devices[-1:] for one in found] == [(1, 148), (149, 152), (153, 153)]

@@ -1,0 +1,135 @@
+"""Filling of the telegrams against telegrams that are written byte by byte, and against published numbers of drives."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.evidence import bus_evidence
+from busplan.analysis.network import network_of
+from busplan.buses import kind_named
+from busplan.buses.sercos3.constants import PERIODS
+from busplan.buses.sercos3.cycle import TELEGRAMS, Sercos3Cycle
+from busplan.buses.sercos3.evidence import most_drives
+from busplan.buses.sercos3.section import Sercos3Profile
+from busplan.elementwise import plain
+from busplan.profile.shipped import load
+
+SOME = settings(max_examples=150, deadline=None)
+BYTE_NS = 80
+
+
+class Device(NamedTuple):
+    """What a device takes and gives in a cycle [bytes]."""
+
+    mdt: int
+    at: int
+
+
+class Written(NamedTuple):
+    """What stands on the wire."""
+
+    telegrams: int
+    bytes_with_gaps: int
+
+
+def written(data: Sequence[int], *, is_mdt: bool, version: str, hot_plug: str, gap: int) -> Written:
+    """Write each telegram byte by byte: what is in it first, then the Ethernet frame around it."""
+    hot_plug_field = bytes(8)
+    first = bytearray(hot_plug_field)
+    if is_mdt:
+        first += bytes(4) if hot_plug == "first" else bytes(6)
+    fields = [first]
+
+    def put(piece: bytes) -> None:
+        if len(fields[-1]) + len(piece) > 1494:
+            fields.append(bytearray(hot_plug_field if hot_plug == "all" else b""))
+        fields[-1].extend(piece)
+
+    for _ in data:
+        put(b"service"[:6])
+    for _ in data:
+        put(b"DV")
+    for size in data:
+        put((b"CC" if version == "V1.1" else b"") + bytes(size))
+    wire = bytearray()
+    for one in fields:
+        wire += b"\x55" * 7 + b"\xd5" + bytes(6 + 6) + b"\x88\xcd" + bytes(6)
+        wire += bytes(one).ljust(40, b"\x00") + bytes(4) + bytes(gap)
+    return Written(len(fields), len(wire))
+
+
+def profile_of(devices: Sequence[Device], *, version: str, hot_plug: str, gap: int) -> Sercos3Profile:
+    """A profile with a group for each run of devices that are alike."""
+    runs: list[tuple[Device, int]] = []
+    for one in devices:
+        if runs and runs[-1][0] == one:
+            runs[-1] = (one, runs[-1][1] + 1)
+        else:
+            runs.append((one, 1))
+    group = [
+        {
+            "name": f"g{place}",
+            "nodes": count,
+            "axes": 1,
+            "read_bytes": one.at,
+            "write_bytes": one.mdt,
+            "execution": {"kind": "linear", "base_us": 1.0, "per_byte_us": 0.0},
+        }
+        for place, (one, count) in enumerate(runs)
+    ]
+    bus = {"kind": "sercos3", "version": version, "hot_plug_field": hot_plug, "gap_bytes": gap}
+    data = {"schema_version": 1, "name": "ring", "bus": bus, "cycle": {"period_us": 1000.0}, "group": group}
+    return Sercos3Profile.model_validate(data)
+
+
+SIZES = st.one_of(st.integers(1, 40), st.sampled_from([200, 700, 1400]))
+DEVICES = st.lists(st.tuples(st.builds(Device, SIZES, SIZES), st.integers(1, 60)), min_size=1, max_size=4).map(
+    lambda runs: [one for one, count in runs for _ in range(count)]
+)
+
+
+@SOME
+@given(DEVICES, st.sampled_from(["V1.0", "V1.1"]), st.sampled_from(["first", "all"]), st.integers(12, 60))
+def test_telegrams_are_those_that_are_written(devices: list[Device], version: str, hot_plug: str, gap: int) -> None:
+    profile = profile_of(devices, version=version, hot_plug=hot_plug, gap=gap)
+    cycle = Sercos3Cycle(network_of(profile), TELEGRAMS)
+    us = {term.key: plain(term.us) for term in cycle.terms}
+    for sort, kind in (("mdt", "write"), ("at", "read")):
+        sizes = [getattr(one, sort) for one in devices]
+        expected = written(sizes, is_mdt=sort == "mdt", version=version, hot_plug=hot_plug, gap=gap)
+        assert plain(cycle.fillings[kind].telegrams) == expected.telegrams  # type: ignore[index]
+        assert us[f"cycle_{sort}_us"] == pytest.approx(expected.bytes_with_gaps * BYTE_NS / 1000, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("size", "period_us", "drives"), [(8, 31.25, 8), (12, 250, 70), (32, 1000, 150), (16, 1000, 254)]
+)
+def test_published_numbers_of_drives_are_met_within_6_percent(size: int, period_us: float, drives: int) -> None:
+    base = network_of(load("sercos3-servo-8").profile)
+    assert most_drives(base, size, period_us=period_us, gap_bytes=12) == pytest.approx(drives, rel=0.06)
+
+
+def test_the_layout_gives_8_and_248_and_the_default_gap_7() -> None:
+    base = network_of(load("sercos3-servo-8").profile)
+    assert most_drives(base, 8, period_us=31.25, gap_bytes=12) == 8
+    assert most_drives(base, 8, period_us=31.25, gap_bytes=37) == 7
+    assert {most_drives(base, 16, period_us=1000, gap_bytes=gap) for gap in (12, 37)} == {248}
+
+
+def test_evidence_has_the_residual_of_each() -> None:
+    (section,) = bus_evidence(kind_named("sercos3"))
+    found = {(one.quantity, one.method): one.residual for one in section.comparisons}
+    assert found["drives, 8 bytes at 31.25 us", "telegrams, gap 12"] == 0
+    assert found["drives, 8 bytes at 31.25 us", "telegrams, gap 37"] == -1
+    assert found["drives, 16 bytes at 1000 us", "telegrams, gap 12"] == -6
+    assert "least gap" in section.note
+
+
+def test_periods_are_those_of_the_library() -> None:
+    # CSMD_TSCYC: three short ones, then multiples of 250 us up to 65 ms.
+    short = [31.25, 62.5, 125.0]
+    assert [one for one in PERIODS.us if one < 250] == short
+    assert set(PERIODS.us) - set(short) == {250.0 * n for n in range(1, 261)}
