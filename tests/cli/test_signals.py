@@ -187,7 +187,7 @@ def test_a_worker_that_is_killed_is_said(folder: Path, name: str) -> None:
 
 def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
     waiting = "import time; from busplan.cli.workers import workers\n"
-    waiting += "with workers(1) as map_:\n    map_(time.sleep, [60])"
+    waiting += "with workers(1) as crew:\n    crew.submit(time.sleep, 60).result()"
     with subprocess.Popen([sys.executable, "-c", waiting], cwd=tmp_path, text=True) as process:
         assert until(lambda: workers_of(process))
         started = workers_of(process)
@@ -198,8 +198,8 @@ def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
 
 
 def test_workers_answer_in_order_and_pass_on_what_went_wrong() -> None:
-    with workers(2) as map_:
-        assert map_(abs, [-3, -1, -2]) == [3, 1, 2]
-        assert map_(abs, []) == []
+    with workers(2) as crew:
+        assert list(crew.map(abs, [-3, -1, -2])) == [3, 1, 2]
+        assert list(crew.map(abs, [])) == []
         with pytest.raises(FileNotFoundError, match="nowhere"):
-            map_(os.stat, ["nowhere", "."])
+            list(crew.map(os.stat, ["nowhere", "."]))
