@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from busplan.analysis.sweep.blocks import SweepBlock
     from busplan.cli.sweep_job import SweepJob
+    from busplan.cli.sweep_parts import Parts
     from busplan.drawings.sweep_plot import FigureData
 
 
@@ -47,6 +48,7 @@ def run_sweep(job: "SweepJob") -> None:
     drawing = _drawing(job)
     if job.jobs is not None and not job.force:
         _require_few(job)
+    parts = _parts(job)
     tally = Tally(job.profile, job.grid, job.timing_models, seeds=job.tests)
     expected = tally.expected
     with ExitStack() as stack:
@@ -56,7 +58,7 @@ def run_sweep(job: "SweepJob") -> None:
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
             sink = sink_for(job, file, tally)
             takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-            lost = _work(job, takers, points=sink.points, stopped=lambda: noted() is not None)
+            lost = _work(job, takers, parts, points=sink.points, stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.form not in TOP_FORMS or file is not None:
@@ -64,6 +66,9 @@ def run_sweep(job: "SweepJob") -> None:
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
             say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
+            if parts is not None and parts.tests:
+                all_tests = expected * (job.tests or 1)
+                say(f"{parts.tests:,} of {all_tests:,} circle tests are in {parts.folder}: go on with --resume")
             signal = noted()
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_format is not None:
@@ -72,6 +77,8 @@ def run_sweep(job: "SweepJob") -> None:
                     ", ".join(filter(None, (job.profile.name, job.changes.words))), file_format=job.plot_format
                 )
             )
+    if parts is not None:
+        parts.remove()
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")
@@ -80,6 +87,7 @@ def run_sweep(job: "SweepJob") -> None:
 def _work(
     job: "SweepJob",
     takers: "Sequence[Callable[[SweepBlock], None]]",
+    parts: "Parts | None",
     *,
     points: int,
     stopped: Callable[[], bool],
@@ -91,7 +99,7 @@ def _work(
             raise _StoppedBetweenError
 
     try:
-        with progress_bar("sweep") as report, _blocks(job, points, report, watch) as blocks:
+        with progress_bar("sweep") as report, _blocks(job, parts, points, report, watch) as blocks:
             for block in blocks:
                 for take in takers:
                     take(block)
@@ -118,9 +126,17 @@ def _require_few(job: "SweepJob") -> None:
     require_few(job.grid, seeds=job.tests or 1, option="--circle", consent="--force")
 
 
+def _parts(job: "SweepJob") -> "Parts | None":
+    if job.jobs is None or job.output is None:
+        return None
+    from busplan.cli.sweep_parts import Parts
+
+    return Parts(job, job.output)
+
+
 @contextmanager
 def _blocks(
-    job: "SweepJob", points: int, report: Progress, watch: Callable[[], None]
+    job: "SweepJob", parts: "Parts | None", points: int, report: Progress, watch: Callable[[], None]
 ) -> "Iterator[Iterable[SweepBlock]]":
     """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
     from busplan.analysis.sweep.blocks import sweep
@@ -128,18 +144,40 @@ def _blocks(
     if job.jobs is None:
         yield _reported(sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=points), job, report)
         return
-    from busplan.analysis.sweep.circle_run import CircleTests, circle_blocks, require_circles
+    from busplan.analysis.sweep.circle_run import NOTHING_KEPT, CircleTests, circle_blocks, require_circles
 
     tests = CircleTests(job.profile, job.grid, job.seeds)
-    with executor(min(job.jobs, tests.number)) as where:
+    with ExitStack() as stack:
+        if parts is not None:
+            stack.callback(parts.flush)
+        where, watch = stack.enter_context(_where(job, tests.number, watch))
         yield circle_blocks(
             tests,
             where,
             timing_models=job.timing_models,
             cost=require_circles(tests, where, watch=watch),
+            kept=parts or NOTHING_KEPT,
             progress=lambda done: report(done, tests.number),
             watch=watch,
         )
+
+
+@contextmanager
+def _where(job: "SweepJob", tests: int, watch: Callable[[], None]) -> "Iterator[tuple[Executor, Callable[[], None]]]":
+    """Executor of circle tests, and what must be watched while it works."""
+    if job.cluster is None:
+        with executor(min(job.jobs or 1, tests)) as here:
+            yield here, watch
+        return
+    from busplan.cli.cluster import cluster
+
+    with cluster(job.cluster) as (there, look):
+
+        def watch_both() -> None:
+            watch()
+            look()
+
+        yield there, watch_both
 
 
 def _reported(blocks: "Iterable[SweepBlock]", job: "SweepJob", report: Progress) -> "Iterator[SweepBlock]":
