@@ -101,16 +101,17 @@ def rows(path: Path) -> int:
 def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int, whole_group: bool) -> None:
     with running(*SWEEP, "-o", "c.csv", folder=folder) as process:
         assert until(lambda: rows_written(process, folder))
+        assert until(lambda: len(workers_of(process)) == 2)
         started = workers_of(process)
-        assert len(started) == 2
         (os.killpg if whole_group else os.kill)(process.pid, getattr(signal, name))
         _, said = process.communicate(timeout=20)
     assert process.returncode == code
     assert "kept in c.partial.csv" in said
     assert "Traceback" not in said
     assert not any(map(alive, started))
-    assert sorted(path.name for path in folder.iterdir()) == ["c.partial.csv", "p.toml"]
+    assert sorted(path.name for path in folder.iterdir()) == ["c.csv.parts", "c.partial.csv", "p.toml"]
     assert rows(folder / "c.partial.csv") > 0
+    assert "circle tests are in c.csv.parts: go on with --resume" in said
 
 
 def test_a_hangup_that_nohup_ignores_stays_ignored(folder: Path) -> None:
@@ -133,7 +134,7 @@ def test_workers_and_files_end_with_a_process_that_is_killed(folder: Path, name:
         process.communicate(timeout=20)
         assert process.returncode == -signal.SIGKILL
         assert until(lambda: not any(map(alive, started)), seconds=5)
-    assert not [path for path in folder.iterdir() if path.suffix != ".toml"]
+    assert {path.name for path in folder.iterdir() if path.suffix != ".toml"} <= {"c.csv.parts"}
 
 
 def many_files(folder: Path) -> tuple[str, ...]:

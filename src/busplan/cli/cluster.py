@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
+from functools import partial
 from time import monotonic
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -19,6 +20,7 @@ from busplan.forms.numbers import nouns
 
 if TYPE_CHECKING:
     from distributed import Client
+    from distributed import Future as DaskFuture
 
 Result = TypeVar("Result")
 
@@ -121,16 +123,36 @@ def _ended(address: str) -> WorkerLostError:
 
 
 class _Cluster(Executor):
-    """The client's executor, with a check of versions in front of each call."""
+    """The workers, with a check of versions in front of each call.
+
+    The client's own executor takes a result for an error if its worker dies while it is fetched; the client's futures
+    fetch it again.
+    """
 
     def __init__(self, client: "Client") -> None:
-        # Not pure: a call has a new name, and nothing is hashed.
-        self._executor, self._versions = client.get_executor(pure=False), versions()
+        self._client, self._versions = client, versions()
 
     def submit(self, fn: Callable[..., Result], /, *args: object, **kwargs: object) -> "Future[Result]":
         """Let a worker call a function, without named arguments."""
-        future: Future[Result] = self._executor.submit(checked, self._versions, fn, *args, **kwargs)
+        future: Future[Result] = Future()
+        # Not pure: a call has a new name, and nothing is hashed.
+        there = self._client.submit(checked, self._versions, fn, *args, **kwargs, pure=False)
+        there.add_done_callback(partial(_fetch, future))
         return future
+
+
+def _fetch(future: "Future[Result]", there: "DaskFuture[Result]") -> None:
+    """Take over the outcome of a call; Dask has a thread for it."""
+    try:
+        result = there.result()
+    except CancelledError:
+        future.cancel()
+    except Exception as error:  # noqa: BLE001 - who asks for the result gets it
+        if future.set_running_or_notify_cancel():
+            future.set_exception(error)
+    else:
+        if future.set_running_or_notify_cancel():
+            future.set_result(result)
 
 
 class _Crew:

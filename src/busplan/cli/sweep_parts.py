@@ -135,7 +135,8 @@ class Parts:
             theirs = json.loads(manifest.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise BusplanError(f"{manifest}: cannot be read: {error}; delete the folder") from None
-        differing = [_difference(name, theirs.get(name), own) for name, own in self._facts.items()]
+        found = theirs if isinstance(theirs, dict) else {}
+        differing = [_difference(name, found.get(name), own) for name, own in self._facts.items()]
         if any(differing):
             raise BusplanError(
                 f"--resume: {self.folder} is of a sweep with {', '.join(filter(None, differing))}; repeat the "
