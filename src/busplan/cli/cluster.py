@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager
 from functools import partial
+from threading import Event
 from time import monotonic
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -55,9 +56,10 @@ def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], None]]]:
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     client = _connected(address)
+    there = _Cluster(client)
     try:
         _require_versions(client, address)
-        yield _Cluster(client), _Crew(client, address).look
+        yield there, _Crew(client, address).look
     except KilledWorker as error:
         raise WorkerLostError(f"--cluster: several workers died of the same tests (out of memory?): {error}") from None
     except CancelledError:
@@ -65,6 +67,7 @@ def cluster(address: str) -> Iterator[tuple[Executor, Callable[[], None]]]:
     except ImportError as error:
         raise BusplanError(f"--cluster {address}: a worker does not load busplan {__version__}: {error}") from None
     finally:
+        there.end()
         client.close(timeout=_PATIENCE_S)
 
 
@@ -130,29 +133,36 @@ class _Cluster(Executor):
     """
 
     def __init__(self, client: "Client") -> None:
-        self._client, self._versions = client, versions()
+        self._client, self._versions, self._is_over = client, versions(), Event()
 
     def submit(self, fn: Callable[..., Result], /, *args: object, **kwargs: object) -> "Future[Result]":
         """Let a worker call a function, without named arguments."""
         future: Future[Result] = Future()
         # Not pure: a call has a new name, and nothing is hashed.
         there = self._client.submit(checked, self._versions, fn, *args, **kwargs, pure=False)
-        there.add_done_callback(partial(_fetch, future))
+        there.add_done_callback(partial(self._fetch, future))
         return future
 
+    def end(self) -> None:
+        """Fetch no more results: Dask's thread for it does not end before they are there."""
+        self._is_over.set()
 
-def _fetch(future: "Future[Result]", there: "DaskFuture[Result]") -> None:
-    """Take over the outcome of a call; Dask has a thread for it."""
-    try:
-        result = there.result()
-    except CancelledError:
-        future.cancel()
-    except Exception as error:  # noqa: BLE001 - who asks for the result gets it
-        if future.set_running_or_notify_cancel():
-            future.set_exception(error)
-    else:
-        if future.set_running_or_notify_cancel():
-            future.set_result(result)
+    def _fetch(self, future: "Future[Result]", there: "DaskFuture[Result]") -> None:
+        """Take over the outcome of a call; it may be computed again while it is fetched."""
+        while not self._is_over.is_set():
+            try:
+                result = there.result(timeout=_LOOKS_S)
+            except CancelledError:
+                future.cancel()
+            except Exception as error:  # noqa: BLE001 - who asks for the result gets it
+                if isinstance(error, TimeoutError) and there.status != "error":
+                    continue
+                if future.set_running_or_notify_cancel():
+                    future.set_exception(error)
+            else:
+                if future.set_running_or_notify_cancel():
+                    future.set_result(result)
+            return
 
 
 class _Crew:
