@@ -22,6 +22,7 @@ __all__ = [
     "CapacityAnswer",
     "CheckAnswer",
     "CircleTestAnswer",
+    "CompareAnswer",
     "DiffAnswer",
     "EvidenceAnswer",
     "ExplainAnswer",
@@ -37,6 +38,7 @@ __all__ = [
     "capacity",
     "check",
     "circle_test",
+    "compare",
     "diff",
     "evidence",
     "explain",
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
     from busplan.api.capacity import CapacityAnswer, capacity
     from busplan.api.check import CheckAnswer, check
     from busplan.api.circle import CircleTestAnswer, circle_test
+    from busplan.api.compare import CompareAnswer, compare
     from busplan.api.diff import DiffAnswer, diff
     from busplan.api.evidence import EvidenceAnswer, evidence
     from busplan.api.explain import ExplainAnswer, explain
@@ -83,6 +86,8 @@ else:
         "check": "busplan.api.check",
         "CircleTestAnswer": "busplan.api.circle",
         "circle_test": "busplan.api.circle",
+        "CompareAnswer": "busplan.api.compare",
+        "compare": "busplan.api.compare",
         "DiffAnswer": "busplan.api.diff",
         "diff": "busplan.api.diff",
         "EvidenceAnswer": "busplan.api.evidence",

@@ -19,7 +19,7 @@ from busplan.answers.timeline import (
     totals_table,
 )
 from busplan.buses import kind_named
-from busplan.buses.bus import IDLE
+from busplan.buses.parts import IDLE
 from busplan.drawings.timeline import mermaid, png, svg
 from busplan.drawings.timeline.lanes import node_lanes, stretches
 from busplan.forms import html, markdown, terminal

@@ -11,6 +11,7 @@ from busplan.analysis.capacity.sensitivity import sensitivities
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.comparison.difference import difference
+from busplan.analysis.comparison.kinds import compare
 from busplan.analysis.derivation.explain import assumptions, explain
 from busplan.analysis.latency import latency
 from busplan.analysis.network import model_names
@@ -21,6 +22,7 @@ from busplan.analysis.timeline.schedule import schedule
 from busplan.answers.assumptions import assumptions_report
 from busplan.answers.capacity import capacity_report
 from busplan.answers.circle import circle_report
+from busplan.answers.compare import compare_report
 from busplan.answers.diff import diff_report
 from busplan.answers.explain import explain_report
 from busplan.answers.latency import latency_report
@@ -74,6 +76,7 @@ ANSWERS: dict[str, Callable[[Profile], Report]] = {
     "diff": lambda profile: diff_report(difference(load("paper-dma").profile, profile), arguments=("a.toml", "b.toml")),
     "timeline": lambda profile: timeline_report(schedule(profile)),
     "sweep": swept,
+    "compare": lambda profile: compare_report(compare(profile, with_circle=True)),
 }
 
 

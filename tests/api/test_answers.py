@@ -19,6 +19,7 @@ ANSWERS: dict[str, Callable[[busplan.Profile], Answer]] = {
     "check": lambda _profile: busplan.check("paper-1ms"),
     "sweep": lambda profile: busplan.sweep(profile, vary={"bus.gap_count": [63, "optimal"], "bus.nodes": "1:3"}),
     "map": busplan.map_,
+    "compare": lambda profile: busplan.compare(profile, buses=["ieee1394", "can"]),
     "diff": lambda profile: busplan.diff(profile, "paper-optimal-gap", circle=False),
     "explain": lambda profile: busplan.explain(profile, "margin_us"),
     "explain all": busplan.explain,
@@ -96,6 +97,7 @@ HEADLINES = {
     "sweep": "<SweepAnswer: paper-1ms: 6 points; 6 fit by the closed form of the paper model, 6 shown to fit (standard "
     "model).>",
     "map": "<MapAnswer: paper-1ms: 57 of 195 settings are shown to fit. This design (8 axes, period 1 ms): fits.>",
+    "compare": "<CompareAnswer: paper-1ms at 1 ms: shown to fit on 1 of 2 kinds of bus: IEEE 1394.>",
     "diff": "<DiffAnswer: B is better in 16 figures: corrected margin, safe nodes, safe axes, smallest safe period and "
     "12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",

@@ -22,6 +22,7 @@ EVERY: dict[str, Callable[[str], Answer]] = {
     "timeline": busplan.timeline,
     "check": busplan.check,
     "map": busplan.map_,
+    "compare": busplan.compare,
     "explain": busplan.explain,
     "report --no-circle": lambda profile: busplan.report(profile, circle=False),
     "sweep --vary bus.nodes=1:4 --vary bus.gap_count=63,optimal": lambda profile: busplan.sweep(
@@ -56,6 +57,12 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     ),
     "map paper-1ms --x axes=4:16:4 --y bus.gap_count=7,63,optimal": lambda: busplan.map_(
         "paper-1ms", x={"axes": range(4, 17, 4)}, y={"bus.gap_count": [7, 63, "optimal"]}
+    ),
+    "compare can-servo-8 --buses can,ieee1394 --circle": lambda: busplan.compare(
+        "can-servo-8", buses=["can", "ieee1394"], circle=True
+    ),
+    "compare paper-1ms --buses can --nodes 3": lambda: busplan.compare(
+        busplan.load_profile("paper-1ms", changes={"bus.nodes": 3}), buses="can"
     ),
     "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
     "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], circle=False),

@@ -51,6 +51,7 @@ def test_what_simulates_nothing_loads_no_numpy() -> None:
         "plan('paper-4ms', circle=False)",
         "check('paper-4ms', circle=False)",
         "diff('paper-4ms', 'paper-dma', circle=False)",
+        "compare('paper-4ms')",
         "explain('paper-4ms', 'required_us')",
         "calibrate('paper-two-node', 'table-1.csv')",
     ]

@@ -37,6 +37,7 @@ PICTURES: dict[str, Callable[[], Answer]] = {
     "timeline": lambda: busplan.timeline("paper-4ms"),
     "map": lambda: busplan.map_("paper-4ms", x={"axes": range(4, 41, 4)}),
     "capacity": lambda: busplan.capacity("paper-4ms", sensitivity=True),
+    "compare": lambda: busplan.compare("paper-4ms"),
 }
 
 

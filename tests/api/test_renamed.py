@@ -89,6 +89,7 @@ def options(command: str) -> set[str]:
         "calibrate",
         "capacity",
         "circle_test",
+        "compare",
         "diff",
         "explain",
         "latency",

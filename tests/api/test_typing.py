@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 import busplan
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.comparison.difference import KeyDifference
+from busplan.analysis.comparison.kinds import MachineOnKind, NotOnKind
 from busplan.analysis.derivation.explain import Step
 from busplan.analysis.map.cells import Cell
 from busplan.analysis.planning.option import Option
@@ -27,6 +28,7 @@ def test_the_types_are_seen_through_the_lazy_names() -> None:
     assert_type(busplan.check("paper-4ms", circle=False).findings, tuple[Located, ...])
     assert_type(busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})["max_axes"], NDArray[Any])
     assert_type(busplan.map_("paper-4ms").own, Cell | None)
+    assert_type(busplan.compare("paper-4ms").kinds, tuple[MachineOnKind | NotOnKind, ...])
     assert_type(busplan.diff("paper-4ms", "paper-1ms", circle=False).keys, tuple[KeyDifference, ...])
     assert_type(busplan.explain("paper-4ms", "margin_us").derivations[0].steps, tuple[Step, ...])
     assert_type(busplan.calibrate("paper-two-node", [(4, 48.7)]).payloads[0].execution_us, float)

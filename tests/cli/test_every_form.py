@@ -29,6 +29,8 @@ QUESTIONS = (
     ("explain", "paper-1ms", "period_us"),
     ("calibrate", "paper-two-node", "table-1.csv"),
     ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
+    ("compare", "paper-1ms"),
+    ("compare", "gantry-24", "--circle"),
     ("paper",),
     ("evidence", "ieee1394"),
     ("profiles",),
@@ -58,6 +60,7 @@ MEASUREMENTS = "<b>m `1` *c*.csv"
 HOSTILE = (
     ("diff", "hostile.toml", "paper-1ms", "--no-circle"),
     ("diff", "paper-1ms", "hostile.toml", "--no-circle"),
+    ("compare", "hostile.toml"),
     ("explain", "hostile.toml"),
     ("explain", "hostile.toml", "text"),
     ("explain", "hostile.toml", "required_us"),
@@ -162,6 +165,7 @@ def test_what_is_read_is_not_overwritten(refused: Refused, folder: Path) -> None
     for question in (
         ("diff", "hostile.toml", "paper-1ms"),
         ("diff", "paper-1ms", "hostile.toml"),
+        ("compare", "hostile.toml"),
         ("explain", "hostile.toml"),
         ("explain", "hostile.toml", "required_us"),
         ("calibrate", "hostile.toml", "measured.csv"),

@@ -49,7 +49,9 @@ def calls() -> Iterator[tuple[str, ...]]:
     for form in ("markdown", "html"):
         yield ("calibrate", PROFILE, MEASURED, "--format", form)
     for form in ("table", "json", "csv"):
-        yield from ((command, PROFILE, "--format", form) for command in ("capacity", "latency", "timeline", "map"))
+        yield from (
+            (command, PROFILE, "--format", form) for command in ("capacity", "latency", "timeline", "map", "compare")
+        )
         yield ("plan", PROFILE, "--no-circle", "--format", form)
         yield ("calibrate", PROFILE, MEASURED, "--format", form)
         yield ("sweep", PROFILE, "--vary", "bus.nodes=1:3", "--format", form)
@@ -60,7 +62,8 @@ def calls() -> Iterator[tuple[str, ...]]:
         yield from (("explain", PROFILE, *figure, "--format", form) for figure in ((), ("gaps_us",)))
     yield from (("report", PROFILE, OTHER, "--no-circle", "--format", form) for form in ("html", "markdown"))
     yield from (("timeline", PROFILE, "--format", form) for form in ("mermaid", "svg"))
-    yield ("map", PROFILE, "--format", "svg")
+    yield from ((command, PROFILE, "--format", "svg") for command in ("map", "compare"))
+    yield ("compare", PROFILE, "--buses", EVIL)
     yield ("map", PROFILE, "--x", f"{EVIL}=1")
     for form in GATE_FORMATS:
         yield ("check", ".", f"no-{EVIL}", "--verbose", "--no-circle", "--format", form)

@@ -21,23 +21,11 @@ import busplan
 from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes
 from busplan.buses import kind_names, registered
-from busplan.buses.bus import (
-    Bus,
-    BusCycle,
-    BusEvent,
-    Cost,
-    Doubt,
-    EventKind,
-    LeftOut,
-    Limit,
-    PayloadRange,
-    Perturbation,
-    Setting,
-    Term,
-    TimingModel,
-)
+from busplan.buses.bus import Bus
+from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Term
 from busplan.buses.figure import NONPERIODIC, Figure, capacity_figures
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, plain, rounded_up, total
 from busplan.profile.shipped import load
@@ -154,6 +142,7 @@ class Ring(Bus):
             way_out="a second ring has room",
         ),
     )
+    starter = Starter('[bus]\nkind = "ring"\nrate_mbit_s = 4.0')
     rules = (Rule("RG101", "slow-ring", "error", "the ring is slower than its stations", "Take a faster one.", slow),)
     event_kinds = (
         EventKind("token", "token", "ring", "T", "contention"),
@@ -254,6 +243,23 @@ def test_every_question_is_answered_in_every_form(run: Run, ring: Path, command:
         assert json.loads(done.stdout)["schema"] == 1
     if form == "csv":
         assert len(list(csv.DictReader(StringIO(done.stdout)))) >= 1
+
+
+@pytest.mark.parametrize("form", ["table", "markdown", "html", "csv", "json", "svg"])
+@pytest.mark.parametrize("name", ["ring.toml", "can-servo-8", "gantry-24"])
+def test_a_machine_is_compared_on_it(run: Run, ring: Path, name: str, form: str) -> None:
+    done = run("compare", name, "--buses", "ring,can", "--circle", "--format", form, cwd=ring.parent)
+    assert done.returncode == 0, done
+    if form == "json":
+        document = json.loads(done.stdout)
+        on_ring, on_can = document["buses"]
+        assert (on_ring["kind"], on_can["kind"], on_ring["is_own"]) == ("ring", "can", name == "ring.toml")
+        # Its nodes cannot be in groups.
+        assert [one.partition(":")[0] for one in on_ring["why_not"]] == ["bus.nodes"] * (name == "gantry-24")
+        if name == "can-servo-8":
+            assumed = {one["key"]: one["value"] for one in on_ring["assumed"] if one["source"] == "new profile"}
+            assert assumed == {"bus.rate_mbit_s": 4.0, "cycle.slice_ratio": 1}
+            assert "message" in on_ring["left_out"]
 
 
 @pytest.mark.parametrize("form", ["table", "markdown", "html", "csv", "json"])

@@ -104,7 +104,7 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
 
 
 def test_png_needs_matplotlib_and_says_so(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("busplan.drawings.circle_plot.find_spec", lambda _name: None)
+    monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
     said = refused("map", "paper-4ms", "-o", "map.png", cwd=tmp_path)
     assert said == "--format png needs matplotlib: install it with the extra, as in pip install 'busplan[plot]'"
 

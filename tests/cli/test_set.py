@@ -56,6 +56,7 @@ EVERY = {
     "explain": ("mine.toml", "required_us"),
     "timeline": ("mine.toml",),
     "map": ("mine.toml",),
+    "compare": ("mine.toml",),
     "report": ("mine.toml", "--no-circle"),
     "plan": ("mine.toml", "--no-circle"),
     "sweep": ("mine.toml", "--vary", "bus.nodes=1:3"),

@@ -231,6 +231,7 @@ DOCUMENTS = {
     "calibrate": "paper-two-node table-1.csv",
     "timeline": "paper-4ms",
     "map": "paper-4ms --x axes=4,6",
+    "compare": "paper-4ms --circle",
     "evidence": "ieee1394",
     "paper": "",
     "profiles": "",

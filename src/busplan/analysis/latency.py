@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
-from busplan.buses.bus import BusLatency
+from busplan.buses.cycle import BusLatency
 from busplan.elementwise import Number, plain
 from busplan.errors import BusplanError
 from busplan.sections.base import with_unchecked

@@ -19,6 +19,11 @@ def bus_of(profile: Profile) -> Bus:
     return kind_named(profile.bus.kind)
 
 
+def varied_nodes(profile: Profile) -> AlikeNodes:
+    """The nodes whose number axes are counted by: all where they are alike, otherwise the group of the most axes."""
+    return max(profile.alike_nodes, key=lambda one: int(one.nodes * one.node.axes))
+
+
 def network_of(profile: Profile) -> Network:
     """Network from which the cycle of a profile is computed.
 

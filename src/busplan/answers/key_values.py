@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from busplan.buses import bus
+from busplan.buses.parts import Value as BusValue
 from busplan.forms.blocks import Part, Sentence, ShownValue, joined
 from busplan.profile.write import value_text
 
-NewValues = Mapping[str, bus.Value]
+NewValues = Mapping[str, BusValue]
 """New values of a profile by dotted key."""
 
 

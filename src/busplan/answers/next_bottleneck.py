@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from busplan.analysis.capacity.bottleneck import NextBottleneck, NextLimit
 from busplan.analysis.network import bus_of
-from busplan.buses.bus import Term
+from busplan.buses.cycle import Term
 from busplan.buses.figure import SAFE_NODES, by_key
 from busplan.forms.blocks import Record, Sentence, ShownValue, count_value, joined, sentence
 from busplan.forms.columns import sentence_text

@@ -7,8 +7,8 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.option import Option
 from busplan.analysis.planning.plan import Plan
 from busplan.answers.key_values import NewValues, key_value, settings_sentence
-from busplan.buses import bus
 from busplan.buses.figure import BINDING_TERM, MARGIN_CORRECTED, SAFE_AXES, SAFE_NODES, UNCERTAINTY
+from busplan.buses.parts import Value as BusValue
 from busplan.forms.blocks import (
     Cell,
     ShownValue,
@@ -106,6 +106,6 @@ def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
     )
 
 
-def _short_value(key: str, value: bus.Value, *, at: str) -> ShownValue:
+def _short_value(key: str, value: BusValue, *, at: str) -> ShownValue:
     found = key_value(key, value, at=at)
     return found._replace(unit=period_value(float(value)).unit) if key == "cycle.period_us" else found

@@ -10,8 +10,8 @@ from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, T
 from busplan.answers.capacity import safety_record
 from busplan.answers.documents import document
 from busplan.answers.verdict import story, warnings
-from busplan.buses.bus import IDLE
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
+from busplan.buses.parts import IDLE
 from busplan.drawings.timeline.drawing import TimelineDrawing
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import charged, drawn_window, overruns

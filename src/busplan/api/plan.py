@@ -16,7 +16,7 @@ from busplan.answers.plan import plan_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, items, load_profile, plain, whole
 from busplan.api.renamed import renamed
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile

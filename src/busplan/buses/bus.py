@@ -6,304 +6,33 @@ alike. They branch on words, never on numbers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from enum import IntEnum
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from busplan.buses.figure import MARGIN, NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure, Ink
+from busplan.buses.figure import NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure
 from busplan.buses.network import Network
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
-from busplan.elementwise import Number, plain, total
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
     from busplan.sourced import Grade, Sourced
-
-Value = int | float | str
-"""A value of a profile's key."""
-
-
-class TimingModel(NamedTuple):
-    """One way to count the cycle of a kind of bus."""
-
-    name: str
-    meaning: str
-
-
-class Term(NamedTuple):
-    """A part of the cycle. All terms add up to what the cycle needs."""
-
-    key: str
-    """Of its figure."""
-    us: Number
-
-    @property
-    def name(self) -> str:
-        """What it is called beside the other terms."""
-        return self.key.removeprefix("cycle_").removesuffix("_us")
-
-
-class EventKind(NamedTuple):
-    """How one kind of event, or a stretch of several, is called and drawn."""
-
-    key: str
-    label: str
-    reference: str
-    """Number of the equation that its time comes from, or where else it comes from."""
-    mark: str
-    """Its character in a terminal."""
-    ink: Ink
-
-
-IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
-"""What is left of the slice."""
-
-
-class BusEvent(NamedTuple):
-    """A stretch of the cycle; it begins where the one before it ends. The events of a term add up to it."""
-
-    kind: str
-    """Key of its `EventKind`."""
-    term: str
-    """Key of the term that it is a part of."""
-    us: float
-    label: str
-    """What it is, and who is at work."""
-    node: int | None = None
-    """Whose it is, from 1; None for what belongs to all."""
-    transaction: str | None = None
-    """What it belongs to at a coarse look: the key of an `EventKind` for stretches."""
-    packet: str | None = None
-    """Which packet of the transaction it belongs to."""
-
-
-class Limit(NamedTuple):
-    """What must not be exceeded. Its value never falls with the number of nodes."""
-
-    key: str
-    over: str
-    """What is said of a broken one, a format of `value`, `most` and the profile's `bus`."""
-    value: Callable[[Network], Number]
-    most: Callable[[Network], Number]
-    way_out: str = ""
-    """What makes room where this limit keeps nodes out."""
-    failure: str = ""
-    """What a circle test calls a broken one, where not by its key."""
-    has_rule: bool = False
-    """A rule of the kind reports a broken one; otherwise the rule of the verdict does."""
-    is_safety: bool = False
-    """A cycle fits without it, but nothing is advised that breaks it."""
-    says: Callable[[Network], str] | None = None
-    """What is said of a broken one, where more than its value is: instead of `over`."""
-
-    is_of_period: bool = False
-    """The period alone breaks it: a plan takes no period that does."""
-    slice_us: Callable[[Network], float] | None = None
-    """The slice from which on plain numbers keep it, the slice ratio as it is, where a longer period is a cure [us];
-    without it no period is."""
-
-    def is_broken(self, network: Network) -> Number:
-        """Whether a network breaks it: a truth, or an array of them."""
-        return self.value(network) > self.most(network)
-
-    def words(self, network: Network) -> str:
-        """Say by how much a network breaks it."""
-        if self.says is not None:
-            return self.says(network)
-        return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
-
-
-class Starter(NamedTuple):
-    """What of a new profile is a matter of the kind."""
-
-    bus: str
-    """Section [bus], as TOML without its nodes."""
-    period: str = "1ms"
-    """Communication period, unless another is asked for."""
-    slice_ratio: str = "1            # the whole period is for communication"
-    """Value of cycle.slice_ratio, with a comment."""
-    measure: str = "measure it on a node"
-    """How execution times are found, a format of `file`, the profile, and `group`, an option of `calibrate`."""
-    base: str = "what a node does in each cycle"
-    """What execution.base_us is."""
-
-
-class Cost(IntEnum):
-    """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
-
-    REGISTER = 1
-    """A number in the nodes, such as a gap count."""
-    HOST_TIME = 2
-    """The slice ratio: the host computes in the rest of the period."""
-    RESPONSES = 3
-    """How nodes answer: their firmware."""
-    SCHEDULE = 4
-    """How the host asks them: the firmware of all."""
-    PAYLOAD = 5
-    """What travels in a cycle."""
-    PERIOD = 6
-    """A requirement of the machine."""
-    NODES = 7
-    """Nodes that go to a second bus."""
-
-
-class Setting(NamedTuple):
-    """What of the bus a plan may turn without new parts."""
-
-    name: str
-    """What a user calls it who lets a plan turn it: gap_count."""
-    label: str
-    """What it is called in a sentence: gap count."""
-    cost: Cost
-    keys: tuple[str, ...]
-    """Dotted keys that it turns."""
-    values: tuple[Mapping[str, Value], ...]
-    """What it may be for this very network and is not yet, safe and the smallest change first: new values by key."""
-    reason: str = ""
-    """Why there is none."""
-
-
-class Perturbation(NamedTuple):
-    """A small change of a profile, made to see what it does to the margin."""
-
-    label: str
-    changes: Mapping[str, Value]
-    """New value by dotted key."""
-    why_not: str = ""
-    """Why it cannot be made here; empty where it can."""
-    if_nothing: str = ""
-    """Why the margin stays as it is, where it does."""
-
-
-class PayloadRange(NamedTuple):
-    """Payloads that a plan may choose from: the largest, and the step between them."""
-
-    step_bytes: int
-    most_bytes: int
-    bound: str
-    """What keeps the largest from being larger."""
-    carrier: str = "a packet"
-    """What carries no more."""
-
-
-class Doubt(NamedTuple):
-    """Something that a cycle rests on and that is not known exactly."""
-
-    key: str
-    """Dotted key of the profile, or a name of its own."""
-    label: str
-    us: Number
-    """Standard uncertainty that it gives the cycle: its own, times the sensitivity [us]."""
-
-
-class LeftOut(NamedTuple):
-    """What a cycle could have and a profile does not say: no verdict has it."""
-
-    label: str
-    key: str
-    """The key that would say it."""
-
-
-class BusLatency(NamedTuple):
-    """How long one thing takes on the bus, part by part."""
-
-    name: str
-    payload_bytes: Number | None
-    phases: Mapping[str, Number]
-    """Figures by key, which are among the kind's `latency_figures`; an infinite one does not exist."""
-    group: str = ""
-    """Of which group of nodes; empty where all are alike."""
-
-    @property
-    def label(self) -> str:
-        """What it is called beside the others."""
-        return f"{self.group} {self.name}" if self.group else self.name
-
-
-class Halves(NamedTuple):
-    """What a measured latency holds beside the execution [us]."""
-
-    latency_us: float
-    """All of it."""
-    request_and_acknowledge_us: float
-    """Up to the first acknowledge."""
-    shortest_us: float = 0.0
-    """The bus waits so long whatever the node does: a shorter execution cannot be told from a latency."""
-
-    @property
-    def response_and_acknowledge_us(self) -> float:
-        """Behind the execution."""
-        return self.latency_us - self.request_and_acknowledge_us
-
-
-class BusCycle(ABC):
-    """One communication cycle of a network under one timing model.
-
-    What it needs rests on neither the period nor the slice ratio: these say what it is given. The smallest period and
-    ratio are computed from that.
-    """
-
-    network: Network
-
-    @abstractmethod
-    def computed_terms(self) -> tuple[Term, ...]:
-        """The cycle in the order of the wire: every term always, 0.0 where it is off."""
-
-    @cached_property
-    def terms(self) -> tuple[Term, ...]:
-        """The terms, computed once: a derivation names the very numbers that are added up."""
-        return self.computed_terms()
-
-    @property
-    def required_us(self) -> Number:
-        """What the whole cycle needs, the sum of its terms: N times (2) [us]."""
-        return total(term.us for term in self.terms)
-
-    @property
-    def most_required_us(self) -> Number:
-        """No less than it needs with any number of nodes up to its own, where one more can make it shorter [us]."""
-        return self.required_us
-
-    def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:  # noqa: ARG002 - most just grow by it
-        """What the whole cycle grows by if what it transmits takes longer [us].
-
-        Parameters
-        ----------
-        extra_us
-            By how much it takes longer [us].
-        after_us
-            By how much it took longer before [us].
-        """
-        return extra_us
-
-    def bias_us(self) -> Number | None:
-        """What the bus takes beyond the timing model, on the mean [us]; None where nobody has measured it."""
-        return None
-
-    def doubts(self) -> tuple[Doubt, ...]:
-        """What is not known exactly; different inputs are independent."""
-        return ()
-
-    def left_out(self) -> tuple[LeftOut, ...]:
-        """What the cycle could have and the profile does not say."""
-        return ()
-
-    @abstractmethod
-    def events(self) -> Iterator[BusEvent]:
-        """The same cycle laid out, of plain numbers only."""
-
-    def figures(self) -> Mapping[str, Number | None]:
-        """The kind's own figures beside the terms, by key; None for one that these groups of nodes do not have."""
-        return {}
-
-    def latencies(self) -> tuple[BusLatency, ...]:
-        """How long things take; a kind without transactions has its cycle."""
-        phases = {term.key: term.us for term in self.terms} | {REQUIRED.key: self.required_us}
-        return (BusLatency("cycle", None, phases),)
+from busplan.buses.cycle import BusCycle
+from busplan.buses.parts import (
+    IDLE,
+    EventKind,
+    Halves,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    Starter,
+    TimingModel,
+    Value,
+)
 
 
 class Bus(ABC):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.buses.bus import Limit
+from busplan.buses.parts import Limit
 from busplan.buses.periods import Periods
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import choose, plain

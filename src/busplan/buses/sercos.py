@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from functools import reduce
 from typing import Final, TypeAlias
 
-from busplan.buses.bus import BusLatency
+from busplan.buses.cycle import BusLatency
 from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, larger, total

@@ -41,7 +41,7 @@ GapCountOption = Annotated[
     typer.Option(
         "--gap-count",
         metavar="0..63|optimal",
-        help="Gap count of all nodes; optimal is the smallest safe one for the hops.  "
+        help="Gap count of all nodes of an IEEE 1394 bus; optimal is the smallest safe one for the hops.  "
         "[default: the profile's bus.gap_count]",
         show_default=False,
     ),

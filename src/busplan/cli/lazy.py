@@ -13,7 +13,7 @@ from busplan.cli.help import FAILURES, PlainCommand, PlainGroup
 SETTINGS: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 GROUPS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
-        "Design": ("init", "plan", "calibrate", "map", "sweep"),
+        "Design": ("init", "plan", "calibrate", "map", "sweep", "compare"),
         "Analyse": ("capacity", "latency", "circle-test", "timeline", "explain", "report"),
         "Gate": ("check", "diff", "rule", "schema"),
         "Learn": ("manual", "profiles", "evidence", "paper"),

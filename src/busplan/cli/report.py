@@ -60,7 +60,7 @@ def report_command(
 ) -> None:
     """Put all that busplan says of a profile on one page, for a screen, a machine's file or a repository.
 
-    Verdicts, both timing models, the cycle to scale, where the time goes, axes against period, the circle with its
+    Verdicts, each timing model, the cycle to scale, where the time goes, axes against period, the circle with its
     error sources, and what it all rests on; each figure names its command. Times are in us, contour errors in um.
     Several profiles are compared in front. The HTML needs no network and no script. A report: it exits 0 whatever the
     verdict is.

@@ -149,7 +149,7 @@ def sweep_command(
         bool, typer.Option("--force", help="Run more than 1,000 circle tests: --circle alone refuses so many.")
     ] = False,
 ) -> None:
-    """Compute capacity over a grid: any keys of the profile, every combination, both timing models.
+    """Compute capacity over a grid: any keys of the profile, every combination, each timing model.
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
     points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in

@@ -241,6 +241,18 @@ def _shortened(written: str, limit: int = 40) -> str:
     return line if len(line) <= limit else f"{line[:limit]}..."
 
 
+def refused_data(error: ValidationError | None, data: dict[str, Any]) -> BusplanError:
+    """Make the error for data of no file; each problem names its key.
+
+    Parameters
+    ----------
+    error, data
+        As for `refusal`.
+    """
+    found = _unknown_kind(data) if error is None else findings(error, data)
+    return BusplanError(*(f"{one.key}: {one.message}" for one in found))
+
+
 def refused_changes(
     error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:

@@ -5,7 +5,7 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
-from busplan.buses.bus import Starter
+from busplan.buses.parts import Starter
 from busplan.errors import BusplanError
 from busplan.nearest import did_you_mean
 from busplan.profile.shipped import locate, shipped_names

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
-from busplan.profile.document import Document, text_of
+from busplan.profile.document import Document, TomlTable, text_of
 from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
@@ -102,16 +102,43 @@ def validate(document: Document) -> Profile:
         Not TOML or not a profile; one message for each problem, in the order of their places.
     """
     data = document.data()
-    kind, problem = kind_of(data), None
-    try:
-        found = profile_model(kind).model_validate(data)
-    except ValidationError as error:
-        problem = error
-    if kind is not None and problem is None:
+    found = _checked(data)
+    if isinstance(found, Profile):
         return found
     from busplan.profile.problems import refusal  # loaded only for an invalid profile
 
-    raise refusal(problem, data, document)
+    raise refusal(found, data, document)
+
+
+def profile_of(data: TomlTable) -> Profile:
+    """Validate plain data that stands in no file.
+
+    Parameters
+    ----------
+    data
+        What a file would hold, with a kind of bus that is known.
+
+    Raises
+    ------
+    BusplanError
+        No profile of its kind; each problem names its key.
+    """
+    found = _checked(data)
+    if isinstance(found, Profile):
+        return found
+    from busplan.profile.problems import refused_data  # as above
+
+    raise refused_data(found, data)
+
+
+def _checked(data: TomlTable) -> Profile | ValidationError | None:
+    """The profile of some data, or what is wrong with it: an error of pydantic, or None for an unknown kind alone."""
+    kind = kind_of(data)
+    try:
+        found = profile_model(kind).model_validate(data)
+    except ValidationError as error:
+        return error
+    return None if kind is None else found
 
 
 def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, str] | None = None) -> Profile:
@@ -138,13 +165,9 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     for key, value in changes.items():
         table, last = holder(data, key, name=origin.get(key))
         table[last] = value
-    kind, problem = kind_of(data), None
-    try:
-        found = profile_model(kind).model_validate(data)
-    except ValidationError as error:
-        problem = error
-    if kind is not None and problem is None:
+    found = _checked(data)
+    if isinstance(found, Profile):
         return found
     from busplan.profile.problems import refused_changes  # as above
 
-    raise refused_changes(problem, data, changes, origin)
+    raise refused_changes(found, data, changes, origin)

@@ -13,7 +13,7 @@ from busplan.analysis.calibration.execution_fit import (
 )
 from busplan.analysis.calibration.outliers import DEVIATION_PER_MAD, Sample, Screening, screen
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.bus import Halves, Value
+from busplan.buses.parts import Halves, Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.measurements import Measurement

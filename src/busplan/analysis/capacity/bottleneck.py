@@ -7,7 +7,7 @@ from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.node_limit import safe_nodes
 from busplan.analysis.capacity.perturbations import without_execution
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.bus import BusCycle, Term
+from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.network import Network
 from busplan.elementwise import plain
 from busplan.profile.toml import override

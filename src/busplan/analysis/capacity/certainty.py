@@ -9,9 +9,10 @@ from typing import Final, Literal, NamedTuple
 
 from busplan.analysis.capacity.cycle import FIT_ROUNDING, available_us, fits_in, time_limit
 from busplan.analysis.network import bus_of
-from busplan.buses.bus import BusCycle, Doubt, Limit
+from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number, choose, named, square_root, total
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]

@@ -4,8 +4,9 @@ from collections.abc import Callable
 from typing import Final
 
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.bus import BusCycle, Limit
+from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number
 from busplan.sections.profile import Profile

@@ -11,7 +11,7 @@ from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
-from busplan.buses.bus import BusCycle, Doubt, Term
+from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.figure import CERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us

@@ -8,8 +8,8 @@ from busplan.analysis.capacity.certainty import limits_to_be_safe
 from busplan.analysis.capacity.cycle import limits_with_time
 from busplan.analysis.capacity.polynomial import NODES, NoPolynomialError, Polynomial, least
 from busplan.analysis.network import network_of
-from busplan.buses.bus import Limit
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number, choose, larger, smaller, total
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile

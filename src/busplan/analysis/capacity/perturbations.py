@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.network import bus_of, network_of, with_execution, with_payloads
-from busplan.buses.bus import Perturbation
 from busplan.buses.network import Network
+from busplan.buses.parts import Perturbation
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.alike_nodes import AlikeNodes

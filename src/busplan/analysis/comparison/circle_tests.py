@@ -11,20 +11,22 @@ if TYPE_CHECKING:
     from busplan.sections.profile import Profile
 
 
-def circle_tests(progress: Progress | None = None) -> ComputeCircleFigures:
-    """Make the function that runs the circle test of each of two profiles, with one progress for both.
+def circle_tests(progress: Progress | None = None, *, of: int = 2) -> ComputeCircleFigures:
+    """Make the function that runs the circle test of each of some profiles, with one progress for all.
 
     Parameters
     ----------
     progress
         Called from time to time with the work done and the total work.
+    of
+        How many profiles [1].
     """
     number = count()
 
     def run(profile: "Profile") -> "CircleFigures":
         from busplan.analysis.circle.roundness import circle_test
 
-        part = None if progress is None else part_of(progress, number=next(number), of=2)
+        part = None if progress is None else part_of(progress, number=next(number), of=of)
         return circle_test(profile, explain=False, progress=part).results[0]
 
     return run

@@ -22,7 +22,8 @@ from busplan.analysis.derivation.origin import short
 from busplan.analysis.derivation.trace import Traced, found, value_of
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.advice import changeable
-from busplan.buses.bus import Bus, BusCycle, Term
+from busplan.buses.bus import Bus
+from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.figure import CERTAINTY, MAX_NODES, SAFE_NODES, by_key
 from busplan.buses.network import Network
 from busplan.elementwise import Number

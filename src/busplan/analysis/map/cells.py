@@ -6,7 +6,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, VerdictWord
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.sections.profile import Profile
 
 State = Literal["fits", "circle fails", "circle not judged", "not shown to fit", "unsafe", "does not fit"]

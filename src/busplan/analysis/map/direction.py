@@ -2,12 +2,11 @@
 
 from typing import Any, Final, NamedTuple
 
-from busplan.analysis.network import network_of
+from busplan.analysis.network import network_of, varied_nodes
 from busplan.analysis.sweep.grid import Values, require_keys
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
-from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -25,11 +24,6 @@ class Direction(NamedTuple):
     """Dotted key of the profile, or `AXES`."""
     values: tuple[Value, ...]
     """In the unit of the key; numbers ascend."""
-
-
-def varied_nodes(profile: Profile) -> AlikeNodes:
-    """The nodes whose number `AXES` sets: all where they are alike, otherwise the group of the most axes."""
-    return max(profile.alike_nodes, key=lambda one: int(one.nodes * one.node.axes))
 
 
 def profile_key(key: str, profile: Profile) -> str:

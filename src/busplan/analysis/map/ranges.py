@@ -5,8 +5,8 @@ from typing import Final
 
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps, telling_periods
 from busplan.analysis.circle.setup import loop_timing
-from busplan.analysis.map.direction import AXES, PERIOD, Direction, own_value, varied_nodes
-from busplan.analysis.network import bus_of
+from busplan.analysis.map.direction import AXES, PERIOD, Direction, own_value
+from busplan.analysis.network import bus_of, varied_nodes
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US

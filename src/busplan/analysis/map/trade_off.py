@@ -12,7 +12,7 @@ from busplan.analysis.map.ranges import default_direction
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Grid, Listed
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress

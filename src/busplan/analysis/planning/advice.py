@@ -10,7 +10,7 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.freedoms import freed
 from busplan.analysis.planning.machine import with_nodes
 from busplan.analysis.planning.search import Search
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile

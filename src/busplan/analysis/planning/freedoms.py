@@ -26,7 +26,7 @@ from busplan.analysis.planning.short_numbers import (
     NumberGrid,
     ShortNumbers,
 )
-from busplan.buses.bus import Cost
+from busplan.buses.parts import Cost
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_TIME_US

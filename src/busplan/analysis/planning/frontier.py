@@ -9,7 +9,7 @@ from busplan.analysis.planning.freedoms import PERIOD, Freedom, longest_period_u
 from busplan.analysis.planning.machine import with_nodes, with_payload
 from busplan.analysis.planning.option import Impossible, Option, option
 from busplan.analysis.planning.search import Search
-from busplan.buses.bus import Cost
+from busplan.buses.parts import Cost
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US
 from busplan.sections.profile import Profile
 

@@ -6,8 +6,8 @@ from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.analysis.network import network_of
-from busplan.buses.bus import Value
 from busplan.buses.network import Network
+from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS

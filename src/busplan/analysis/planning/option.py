@@ -7,7 +7,7 @@ from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.network import bus_of, model_names
 from busplan.analysis.planning.machine import Changes
 from busplan.analysis.planning.search import Search
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.sections.profile import Profile
 
 

@@ -9,7 +9,7 @@ from busplan.analysis.planning.frontier import frontier
 from busplan.analysis.planning.option import Impossible, Option, option
 from busplan.analysis.planning.relaxations import Relaxation, relaxations
 from busplan.analysis.planning.search import MAX_CIRCLES, FindCircleFailures, Search
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.profile.keys import flat
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from busplan.analysis.planning.constraints import CIRCLE
 from busplan.analysis.planning.freedoms import Freedom, freedoms
 from busplan.analysis.planning.search import MAX_CIRCLES, FindCircleFailures, Search
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 

@@ -9,7 +9,7 @@ from busplan.analysis.planning.constraints import CIRCLE, Need, needs, refused_p
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
 from busplan.analysis.planning.machine import Changes
 from busplan.analysis.planning.short_numbers import MOST_RATIO
-from busplan.buses.bus import Cost, Value
+from busplan.buses.parts import Cost, Value
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile

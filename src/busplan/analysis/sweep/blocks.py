@@ -16,9 +16,10 @@ from busplan.analysis.capacity.figures import COUNTS, certainty_numbers, numeric
 from busplan.analysis.capacity.node_limit import most_nodes
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
-from busplan.buses.bus import BusCycle, Limit
+from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, Sort
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from busplan.analysis.network import known_model, model_names
-from busplan.buses.bus import Value
+from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys

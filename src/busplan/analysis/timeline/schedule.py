@@ -12,8 +12,9 @@ from typing import Final, NamedTuple
 from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.network import bus_of, leading_model, network_of
-from busplan.buses.bus import IDLE, BusEvent
+from busplan.buses.cycle import BusEvent
 from busplan.buses.figure import Figure
+from busplan.buses.parts import IDLE
 from busplan.errors import BusplanError
 from busplan.sections.profile import Profile
 

@@ -35,6 +35,9 @@ _TYPES: Final[Mapping[Sort, pa.DataType]] = MappingProxyType(
     {"number": pa.float64(), "count": pa.int64(), "truth": pa.bool_(), "word": _WORDS, "words": _WORDS}
 )
 
+_NUMPY: Final = MappingProxyType({pa.float64(): np.float64, pa.int64(): np.int64, pa.bool_(): np.bool_})
+"""NumPy's types; older versions of pyarrow name them only where pandas is installed."""
+
 
 def table_schema(table: SweepTable) -> pa.Schema:
     """Types of the columns, with their units; metadata say what the rows are of.
@@ -94,7 +97,7 @@ def _array(columns: list[Column], shape: tuple[int, ...], kind: pa.DataType) -> 
     parts = [_numbers(one) for one in columns]
     missing = _rows([np.isnan(one) for one in parts], shape)
     values = _rows(parts, shape)
-    return pa.array(np.where(missing, 0, values).astype(kind.to_pandas_dtype()), mask=missing)
+    return pa.array(np.where(missing, 0, values).astype(_NUMPY[kind]), mask=missing)
 
 
 def _words(columns: list[Column], shape: tuple[int, ...]) -> pa.Array:

@@ -4,8 +4,10 @@ For speed, whole columns are written at a time, and a value once for all rows th
 with padding, which is left out at the end.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from io import BytesIO
 from itertools import groupby
+from math import prod
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -21,8 +23,10 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.sections.profile import Profile
 
 Style = Literal["csv", "jsonl"]
-TEXT_POINTS: Final = 4096
+TEXT_POINTS: Final = 8192
 """Points of a block written as text: all its cells are in memory at once."""
+_ROWS_AT_ONCE: Final = 256
+"""Rows that are joined at once."""
 _RANGE: Final = 4
 """Whole numbers within this many times their count are written by their range."""
 
@@ -94,11 +98,15 @@ def block_rows(block: SweepBlock, columns: Sequence[str], *, style: Style) -> by
         "csv" or "jsonl"; values are written as in `capacity --format csv` and `json`.
     """
     texts = [_texts_by_model(block.columns(name), style) for name in columns]
-    models = [_rows(own, columns, style, shape=block.chunk.shape) for own in zip(*texts, strict=True)]
-    rows = np.empty((block.chunk.points, len(models)), dtype=max(own.dtype for own in models))
-    for number, own in enumerate(models):
-        rows[:, number] = own
-    return unpadded(rows.tobytes())
+    cells = (cell for own in zip(*texts, strict=True) for cell in _cells(own, columns, style))
+    # Neighbouring cells of the same shape, smaller than the block, are joined once.
+    joined: list[_Cells] = []
+    for shape, group in groupby(cells, key=lambda one: one.texts.shape):
+        alike = list(group)
+        joined += alike if shape == block.chunk.shape else [_trimmed(alike)]
+    written = BytesIO()
+    written.writelines(_joined(joined, shape=block.chunk.shape))
+    return written.getvalue()
 
 
 class _Cells(NamedTuple):
@@ -109,46 +117,45 @@ class _Cells(NamedTuple):
     """In the column's own shape."""
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        return self.texts.shape
+    def widths(self) -> tuple[tuple[str, int], ...]:
+        """Parts with their widths [bytes]."""
+        return ("front", len(self.front)), ("text", self.texts.itemsize)
 
 
-def _rows(texts: Sequence[Texts], columns: Sequence[str], style: Style, *, shape: tuple[int, ...]) -> Texts:
-    """Rows of one timing model, shape (points,)."""
+def _cells(texts: Sequence[Texts], columns: Sequence[str], style: Style) -> Iterator[_Cells]:
+    """Cells of one timing model, the last one with the line end."""
     separator, opening, closing = (", ", "{", "}\n") if style == "jsonl" else (",", "", "\n")
-    cells = []
     for number, (name, own) in enumerate(zip(columns, texts, strict=True)):
         key = f"{json_text(name)}: " if style == "jsonl" else ""
-        cells.append(_Cells(_encoded((separator if number else opening) + key), own))
-    # Neighbouring cells of the same shape, smaller than the block, are joined once.
-    joined: list[_Cells] = []
-    for own_shape, group in groupby(cells, key=lambda one: one.shape):
-        alike = list(group)
-        joined += alike if own_shape == shape else [_Cells(b"", _trimmed(_joined(alike)))]
-    end = _Cells(_encoded(closing), np.full((1,) * len(shape), b""))
-    return _joined([*joined, end], shape=shape).ravel()
+        yield _Cells(_encoded((separator if number else opening) + key), own)
+    yield _Cells(_encoded(closing), np.full((1,) * texts[0].ndim, b""))
 
 
-def _joined(cells: Sequence[_Cells], *, shape: tuple[int, ...] | None = None) -> Texts:
-    """Join cells, one behind the other, in their own or a larger shape."""
-    layout = np.dtype(
-        [
-            (f"{part}_{number}", f"S{max(1, width)}")
-            for number, one in enumerate(cells)
-            for part, width in (("front", len(one.front)), ("text", one.texts.itemsize))
-        ]
-    )
-    records = np.empty(shape or cells[0].shape, dtype=layout)
+def _trimmed(cells: Sequence[_Cells]) -> _Cells:
+    """Join cells of one shape."""
+    shape = cells[0].texts.shape
+    return _Cells(b"", np.array([*_joined(cells, shape=shape, at_once=1)]).reshape(shape))
+
+
+def _joined(cells: Sequence[_Cells], *, shape: tuple[int, ...], at_once: int = _ROWS_AT_ONCE) -> Iterator[bytes]:
+    """Join cells, one behind the other, some rows at a time: a small record stays in the processor's cache."""
+    points = prod(shape)
+    layout = [
+        (f"{part}_{number}", f"S{max(1, width)}") for number, one in enumerate(cells) for part, width in one.widths
+    ]
+    records = np.empty(min(points, at_once), dtype=layout)
+    varying = {}
     for number, one in enumerate(cells):
         records[f"front_{number}"] = one.front
-        records[f"text_{number}"] = one.texts
-    texts: Texts = records.view(f"S{layout.itemsize}")
-    return texts
-
-
-def _trimmed(texts: Texts) -> Texts:
-    """Leave out the padding inside of texts."""
-    return np.array([unpadded(one) for one in texts.ravel().tolist()], dtype=bytes).reshape(texts.shape)
+        if one.texts.size == 1:
+            records[f"text_{number}"] = one.texts.item()
+        else:
+            varying[f"text_{number}"] = np.broadcast_to(one.texts, shape).ravel()
+    for start in range(0, points, at_once):
+        part = records[: points - start]
+        for name, texts in varying.items():
+            part[name] = texts[start : start + at_once]
+        yield unpadded(part.tobytes())
 
 
 def _texts_by_model(columns: Sequence[Column], style: Style) -> list[Texts]:

@@ -5,11 +5,11 @@ from functools import cached_property, partial, reduce
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.can.equations import frame_us, payload_us
 from busplan.buses.can.response import Sender, settled_us
 from busplan.buses.can.streams import frame_sizes, response, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Message, Pdos, Traffic, traffic_of
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, choose, larger, named, plain, pointwise, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind

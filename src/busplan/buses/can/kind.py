@@ -3,15 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import (
-    Bus,
-    EventKind,
-    Limit,
-    PayloadRange,
-    Perturbation,
-    Starter,
-    TimingModel,
-)
+from busplan.buses.bus import Bus
 from busplan.buses.can import figures, rules
 from busplan.buses.can.constants import (
     BASE_BITS,
@@ -25,6 +17,7 @@ from busplan.buses.can.cycle import NONE, WORST, CanCycle
 from busplan.buses.can.limits import LIMITS
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.sourced import Sourced

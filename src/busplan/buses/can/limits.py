@@ -5,12 +5,12 @@ from functools import partial
 from math import inf
 from typing import Final
 
-from busplan.buses.bus import Limit
 from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.streams import Stream, collisions, load_before, response, streams
 from busplan.buses.can.traffic import Traffic, traffic_of
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number, larger, plain, pointwise, total
 from busplan.sections.base import MAX_TIME_US
 

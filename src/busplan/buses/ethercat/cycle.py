@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.ethercat.equations import frame_bytes, overhead_bytes, sending_us
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.bus import Bus
 from busplan.buses.ethercat import figures, rules
 from busplan.buses.ethercat.constants import CONSTANTS, LRW, MAILBOX_BYTES, PIPELINE_CYCLES, SPLIT, SYNC_SHIFT
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
@@ -13,12 +13,13 @@ from busplan.buses.ethercat.limits import LIMITS
 from busplan.buses.ethercat.traffic import arrivals_us, datagrams, is_shared
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
-    from busplan.buses.bus import BusCycle
+    from busplan.buses.cycle import BusCycle
     from busplan.buses.ethercat.section import EthercatProfile
     from busplan.buses.published import EvidenceSection
 

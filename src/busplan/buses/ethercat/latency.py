@@ -6,7 +6,7 @@ sample, and commands that have arrived take effect. Without distributed clocks d
 
 from functools import reduce
 
-from busplan.buses.bus import BusLatency
+from busplan.buses.cycle import BusLatency
 from busplan.buses.ethercat.figures import LATENCY_TABLE
 from busplan.buses.ethercat.traffic import arrivals_us, cables_us, devices_us, mailbox_us, process_us
 from busplan.buses.network import Group, Network

@@ -3,11 +3,11 @@
 from functools import reduce
 from typing import Final
 
-from busplan.buses.bus import Limit
 from busplan.buses.ethercat.constants import MOST_CABLE_M, MOST_DEVICES
 from busplan.buses.ethercat.equations import room_bytes
 from busplan.buses.ethercat.traffic import datagrams, devices
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number, larger
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from busplan.buses.bus import BusEvent, BusLatency
+from busplan.buses.cycle import BusEvent, BusLatency
 from busplan.buses.ieee1394 import figures
 from busplan.buses.ieee1394.broadcast_terms import BroadcastTerms, Idle, hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (

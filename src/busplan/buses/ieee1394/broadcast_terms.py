@@ -14,7 +14,7 @@ mechatronics-firmware and mechatronics-software.
 from functools import cached_property
 from typing import NamedTuple
 
-from busplan.buses.bus import Doubt, Term
+from busplan.buses.cycle import Doubt, Term
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import (
     BASE_RATE_MBIT_S,

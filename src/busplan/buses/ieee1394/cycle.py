@@ -5,7 +5,7 @@ from functools import cached_property, reduce
 from itertools import repeat
 from typing import Final
 
-from busplan.buses.bus import BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.figure import AVAILABLE
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import SYNC_PACKET_BYTES

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 
-from busplan.buses.bus import BusCycle, BusEvent, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Term
 from busplan.buses.ieee1394 import equations
 from busplan.buses.ieee1394.constants import (
     CYCLE_START_BYTES,

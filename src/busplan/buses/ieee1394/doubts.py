@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from math import sqrt
 from typing import Any, Final
 
-from busplan.buses.bus import Doubt
+from busplan.buses.cycle import Doubt
 from busplan.buses.ieee1394.constants import (
     ARBITRATION_GAP_TICKS,
     BASE_RATE_MBIT_S,

@@ -3,18 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import (
-    Bus,
-    EventKind,
-    Halves,
-    Limit,
-    PayloadRange,
-    Perturbation,
-    Setting,
-    Starter,
-    TimingModel,
-    Value,
-)
+from busplan.buses.bus import Bus
 from busplan.buses.figure import NONPERIODIC, Figure, Ink, by_key
 from busplan.buses.ieee1394 import figures, rules
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
@@ -37,6 +26,17 @@ from busplan.buses.ieee1394.settings import gap_count, responses, schedule
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
+from busplan.buses.parts import (
+    EventKind,
+    Halves,
+    Limit,
+    PayloadRange,
+    Perturbation,
+    Setting,
+    Starter,
+    TimingModel,
+    Value,
+)
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.errors import BusplanError

@@ -3,7 +3,6 @@
 from math import inf
 from typing import Final
 
-from busplan.buses.bus import Limit
 from busplan.buses.ieee1394.broadcast_terms import hub_block_bytes, write_block_bytes
 from busplan.buses.ieee1394.constants import (
     CYCLE_US,
@@ -18,6 +17,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.elementwise import Number
 
 

@@ -2,10 +2,10 @@
 
 from typing import Final
 
-from busplan.buses.bus import Cost, Setting
 from busplan.buses.ieee1394.constants import REFERENCE_CABLE_M, safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, is_broadcast
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, Setting
 from busplan.elementwise import plain
 
 SCHEDULE: Final = "cycle.schedule"

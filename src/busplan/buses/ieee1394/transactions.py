@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-from busplan.buses.bus import BusEvent
+from busplan.buses.cycle import BusEvent
 from busplan.buses.ieee1394 import figures
 from busplan.buses.ieee1394.constants import DATA_RATE_MBIT_S, safe_gap_count
 from busplan.buses.ieee1394.timing import (

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.bus import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Network
 from busplan.buses.sercos import delays
 from busplan.buses.sercos2.constants import GAP_SHARE, MST_BYTES, RECORD_BYTES

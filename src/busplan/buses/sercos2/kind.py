@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.bus import Bus
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
+from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, DELAYS, LATENCY, MEASURE, WHOLE_PERIOD, subject
 from busplan.buses.sercos2 import figures, rules

@@ -2,8 +2,8 @@
 
 from typing import Final
 
-from busplan.buses.bus import Limit
 from busplan.buses.known_period import period_limit
+from busplan.buses.parts import Limit
 from busplan.buses.sercos2.constants import MOST_DRIVES, MOST_MDT_BYTES, PERIODS
 from busplan.buses.sercos2.cycle import NONE, Sercos2Cycle
 

@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus, Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
+from busplan.buses.bus import Bus
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
+from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.buses.sercos import BASE, DELAYS, LATENCY, MEASURE, WHOLE_PERIOD, subject
 from busplan.buses.sercos3 import figures, rules

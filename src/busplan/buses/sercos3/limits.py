@@ -3,9 +3,9 @@
 from functools import reduce
 from typing import Final
 
-from busplan.buses.bus import Limit
 from busplan.buses.known_period import period_limit
 from busplan.buses.network import Network
+from busplan.buses.parts import Limit
 from busplan.buses.sercos3.constants import MOST_BYTES, MOST_DEVICES, MOST_TELEGRAMS, PERIODS
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
 from busplan.elementwise import Number, larger

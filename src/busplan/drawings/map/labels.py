@@ -7,11 +7,12 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.map.cells import Cell, Region, State
-from busplan.analysis.map.direction import AXES, PERIOD, Direction, varied_nodes
+from busplan.analysis.map.direction import AXES, PERIOD, Direction
 from busplan.analysis.map.trade_off import TradeOff
-from busplan.analysis.network import bus_of
-from busplan.buses.bus import Term, Value
+from busplan.analysis.network import bus_of, varied_nodes
+from busplan.buses.cycle import Term
 from busplan.buses.figure import Ink
+from busplan.buses.parts import Value
 from busplan.forms.blocks import ShownValue, Swatch
 from busplan.forms.blocks import State as Tone
 from busplan.forms.numbers import period_value, with_unit

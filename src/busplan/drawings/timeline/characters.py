@@ -5,7 +5,7 @@ from typing import Final
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Event, Schedule
-from busplan.buses.bus import IDLE
+from busplan.buses.parts import IDLE
 from busplan.drawings.legend import legend_lines
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import (

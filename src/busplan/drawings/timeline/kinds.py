@@ -2,7 +2,7 @@
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import Event
-from busplan.buses.bus import EventKind
+from busplan.buses.parts import EventKind
 from busplan.sections.profile import Profile
 
 

@@ -1,0 +1,231 @@
+"""Answer of `busplan compare`."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Final
+
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
+from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind, fitting
+from busplan.analysis.network import bus_of
+from busplan.answers.compare_document import compare_document, compare_records
+from busplan.answers.compare_notes import notes
+from busplan.answers.verdict import execution_sentence
+from busplan.buses import kind_named
+from busplan.buses.figure import SAFE_AXES, VERDICT, by_key
+from busplan.drawings.compare.drawing import KindsDrawing
+from busplan.elementwise import plain
+from busplan.errors import BusplanError
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Chart,
+    Code,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+    Words,
+    count_value,
+    sentence,
+    state_of,
+)
+from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import nouns, period_value
+from busplan.profile.write import short_text
+
+_COLUMNS: Final = (
+    TableColumn("bus", kind="words", wraps=True),
+    TableColumn(VERDICT.label, kind="words", wraps=True),
+    TableColumn("margin", "us"),
+    TableColumn("U", "us"),
+    TableColumn("smallest period", "us"),
+    TableColumn("binds", kind="words", rank=1, leaves="below", wraps=True),
+    TableColumn("most", group="safe axes"),
+    TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
+    TableColumn("assumed", rank=2),
+)
+_CIRCLE: Final = (
+    TableColumn("", kind="words", group="circle"),
+    TableColumn("step", "us", group="circle"),
+)
+_CIRCLE_WORDS: Final = {
+    True: Words("PASSED", "passes"),
+    False: Words("FAILED", "fails"),
+    None: Words("NOT JUDGED", "warns"),
+}
+_ASSUMED: Final = (
+    TableColumn("bus", kind="words"),
+    TableColumn("key", kind="words", wraps=True),
+    TableColumn("value", wraps=True),
+    TableColumn("from", kind="words"),
+)
+
+
+def compare_report(found: KindComparison) -> Report:
+    """Report of `compare`."""
+    return Report(
+        Sentence((Code(found.profile.name), " on each kind of bus")),
+        lambda: tuple(_blocks(found)),
+        partial(compare_document, found),
+        lambda: compare_records(found),
+    )
+
+
+def _blocks(found: KindComparison) -> Iterator[Block]:
+    """How many kinds carry the machine, their figures, the picture, and what each rests on."""
+    yield headline(found)
+    yield from _best(found)
+    yield from _remarks(found)
+    yield kinds_table(found)
+    if found.compared:
+        yield compare_chart(found)
+    yield from notes(found)
+    yield from execution_sentence(found.profile)
+    if any(one.assumed for one in found.compared):
+        yield assumed_table(found)
+
+
+def headline(found: KindComparison) -> Sentence:
+    """Say on how many kinds of bus the machine is shown to fit its period, and on which."""
+    carrying = [bus_of(one.profile).title for one in fitting(found)]
+    of = len(found.kinds)
+    where = f": {', '.join(carrying)}" if carrying else ""
+    return sentence(
+        f"{{}} at {{}}: shown to fit on {{}} of {{}} {nouns(of, 'kind')} of bus{where}.",
+        Code(found.profile.name),
+        period_value(found.profile.cycle.period_us, at="/period_us"),
+        count_value(len(carrying)),
+        count_value(of),
+        state=state_of(carrying),
+    )
+
+
+def _best(found: KindComparison) -> Iterator[Sentence]:
+    """Say which kind has the smallest period, and which the most axes."""
+    placed = [(number, one) for number, one in enumerate(found.kinds) if isinstance(one, MachineOnKind)]
+    shortest = [(one.smallest.us, number, one) for number, one in placed if one.smallest.us is not None]
+    if shortest:
+        us, number, one = min(shortest, key=lambda each: each[:2])
+        value = ShownValue(us, "smallest_period_us", "us", 3, at=f"/buses/{number}/smallest_period_us")
+        yield sentence(f"The smallest period is {{}} on {bus_of(one.profile).title}.", value)
+    most = [(one.safe.axes, -number, one) for number, one in placed if one.safe.axes]
+    if most:
+        axes, number, one = max(most, key=lambda each: each[:2])
+        value = count_value(axes, SAFE_AXES.key, at=f"/buses/{-number}/{SAFE_AXES.key}")
+        yield sentence(
+            f"The most axes at {{}} are {{}} on {bus_of(one.profile).title}.",
+            period_value(found.profile.cycle.period_us, at="/period_us"),
+            value,
+        )
+
+
+def _remarks(found: KindComparison) -> Iterator[Sentence]:
+    """Say how axes are counted, and what the figures of other kinds rest on."""
+    if found.counted:
+        yield sentence("Axes are counted with more nodes of {}, the other groups as they are.", Code(found.counted))
+    if any(not one.is_own for one in found.kinds if isinstance(one, MachineOnKind)):
+        words = "On another kind than its own the machine has the bus of a new profile, which is assumed."
+        yield Sentence((words,), "warns")
+
+
+def kinds_table(found: KindComparison) -> Table:
+    """A row for each kind of bus.
+
+    Parameters
+    ----------
+    found
+        The comparison.
+    """
+    columns = (*_COLUMNS, *(_CIRCLE if found.with_circle else ()))
+    rows = (_row(found, number, columns=len(columns)) for number in range(len(found.kinds)))
+    caption = "The machine on each kind of bus"
+    at = " and its circle at the smallest period" if found.with_circle else ""
+    return Table(columns, tuple(rows), Sentence((f"{caption}{at}",)))
+
+
+def _row(found: KindComparison, number: int, *, columns: int) -> TableRow:
+    one, at = found.kinds[number], f"/buses/{number}"
+    if isinstance(one, NotOnKind):
+        empty = (ShownValue(None),) * (columns - 2)
+        return TableRow((kind_named(one.kind).title, Words("not compared", "warns"), *empty))
+    figures = one.figures
+    cells: tuple[Cell, ...] = (
+        f"{bus_of(one.profile).title}{', as it is' if one.is_own else ''}",
+        _verdict(one),
+        *(
+            ShownValue(getattr(figures, key), key, "us", 3, at=f"{at}/{key}")
+            for key in ("margin_corrected_us", "uncertainty_us")
+        ),
+        ShownValue(one.smallest.us, "smallest_period_us", "us", 3, at=f"{at}/smallest_period_us"),
+        _binds(one),
+        ShownValue(one.safe.axes, SAFE_AXES.key, at=f"{at}/{SAFE_AXES.key}"),
+        one.safe.limited_by,
+        count_value(len(one.assumed)),
+    )
+    return TableRow((*cells, *(_circle(one, at=at) if found.with_circle else ())))
+
+
+def _verdict(one: MachineOnKind) -> Words:
+    figures = one.figures
+    is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
+    unsafe = f", unsafe {bus_of(one.profile).safety}" if is_unsafe else ""
+    return Words(f"{figures.verdict}{unsafe}", state_of(figures.verdict == FITS and figures.safe))
+
+
+def _binds(one: MachineOnKind) -> str:
+    """The limits that are broken; without one the largest term."""
+    broken = [key for key in one.figures.exceeded if key != TIME]
+    if broken:
+        return ", ".join(broken)
+    largest = max(one.figures.terms, key=lambda term: plain(term.us))
+    return by_key(bus_of(one.profile).term_figures)[largest.key].label
+
+
+def _circle(one: MachineOnKind, *, at: str) -> tuple[Cell, ...]:
+    if one.circle is None:
+        return Words("NOT RUN", "warns"), ShownValue(None, "step_us", "us")
+    step = ShownValue(one.circle.step_us, "step_us", "us", 3, at=f"{at}/circle/step_us")
+    if one.circle.figures is None:
+        return Words("NOT RUN", "warns"), step
+    return _CIRCLE_WORDS[one.circle.figures.passed], step
+
+
+def compare_chart(found: KindComparison) -> Chart:
+    """The most axes over the period, a line for each kind of bus."""
+    caption = "Most axes that are shown to fit over the period, both logarithmic"
+    return Chart(KindsDrawing(found, title=sentence_text(headline(found))), Sentence((caption,)))
+
+
+def require_drawn(found: KindComparison) -> None:
+    """Refuse a picture without a line.
+
+    Raises
+    ------
+    BusplanError
+        No kind of bus that was asked for can have the machine.
+    """
+    if not found.compared:
+        raise BusplanError("there is nothing to draw: no kind of bus that was asked for can have this machine")
+
+
+def assumed_table(found: KindComparison) -> Table:
+    """What each kind needs and the machine does not say; defaults are details.
+
+    Parameters
+    ----------
+    found
+        The comparison.
+    """
+    rows = [
+        TableRow(
+            (bus_of(one.profile).title, Code(assumed.key), short_text(assumed.value), assumed.source),
+            is_detail=assumed.source == "default",
+        )
+        for one in found.compared
+        for assumed in one.assumed
+    ]
+    words = "Assumed, as a new profile of the kind has it or by default, until somebody knows better"
+    return Table(_ASSUMED, tuple(rows), Sentence((words,)))

@@ -1,0 +1,130 @@
+"""A profile as one of another kind of bus: the same machine, on a bus as a new profile of that kind has it.
+
+The machine is what profiles of every kind say: nodes, axes, payloads, execution times, the period, the servo and the
+circle. What only its own kind has is left out, and what the other kind needs is assumed.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final, Literal, NamedTuple
+
+from pydantic import BaseModel
+
+from busplan.buses import kind_named
+from busplan.buses.parts import Starter
+from busplan.profile.document import TomlTable
+from busplan.profile.keys import dotted_keys, flat, named_tables
+from busplan.profile.kinds import models_of
+from busplan.profile.toml import profile_of
+from busplan.sections.profile import Profile
+
+_KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
+_RATIO: Final = "slice_ratio"
+"""The share that a kind of bus needs for communication is a matter of the kind, though all have the key."""
+
+
+class AssumedKey(NamedTuple):
+    """A key that the machine says nothing of."""
+
+    key: str
+    value: Any
+    source: Literal["new profile", "default"]
+    """Where its value comes from: what `init` writes, or the default of the kind."""
+
+
+class Conversion(NamedTuple):
+    """A machine on a kind of bus."""
+
+    profile: Profile
+    assumed: tuple[AssumedKey, ...]
+    """Keys of that kind; empty on the profile's own."""
+    left_out: tuple[str, ...]
+    """Keys and sections that the profile sets and the kind does not have."""
+
+
+def converted(profile: Profile, kind: str) -> Conversion:
+    """Put the machine of a profile on a kind of bus; on its own kind it stays as it is.
+
+    Its execution times are as long there, which is assumed.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    kind
+        The kind of bus.
+
+    Raises
+    ------
+    BusplanError
+        No profile of that kind can say this machine; each problem names its key.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> found = converted(load("paper-4ms").profile, "can")
+    >>> found.profile.bus.kind, found.profile.bus.nodes, found.profile.node.axes
+    ('can', 2, 4)
+    """
+    if kind == profile.bus.kind:
+        return Conversion(profile, (), ())
+    data = profile.model_dump(exclude_unset=True)
+    machine, left_out = _common(data)
+    for nodes in (machine.get("node"), *machine.get("group", ())):
+        if nodes and "execution" in nodes:
+            # Whoever measured it did so on the other bus.
+            nodes["execution"]["grade"] = "assumed"
+    new = _new_bus(kind_named(kind).starter)
+    found = profile_of(_merged(machine, new))
+    given = [AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}"]
+    return Conversion(found, (*given, *_defaults(found)), left_out)
+
+
+def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
+    """What profiles of every kind say; and the keys of the rest, a section by its name."""
+    rest: list[str] = []
+    found = _part(data, [Profile], "", rest)
+    nodes = data["bus"].get(_NODES)
+    found["bus"] = {} if nodes is None else {_NODES: nodes}
+    said = {f"bus.{one}" for one in (_NODES, _SHOWN_FIRST)}
+    return found, tuple(one for one in rest if one not in said)
+
+
+def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: str, rest: list[str]) -> TomlTable:
+    """The keys of a table that one of some models has; those of the others are added to the rest."""
+    found: TomlTable = {}
+    for name, value in table.items():
+        fields = [one.model_fields[name] for one in models if name in one.model_fields]
+        inner = [model for field in fields for model in models_of(field.annotation)]
+        tables = named_tables(value)
+        if not fields:
+            rest.append(f"{prefix}{name}")
+        elif isinstance(value, Mapping):
+            found[name] = _part(value, inner, f"{prefix}{name}.", rest)
+        elif tables is not None:
+            found[name] = [_part(one, inner, f"{prefix}{name}.{own}.", rest) for own, one in tables.items()]
+        else:
+            found[name] = value
+    return found
+
+
+def _new_bus(starter: Starter) -> TomlTable:
+    """The sections of a new profile that are a matter of its kind."""
+    found = tomllib.loads(starter.bus)
+    ratio = tomllib.loads(f"{_RATIO} = {starter.slice_ratio}")
+    return {**found, "cycle": {**found.get("cycle", {}), **ratio}}
+
+
+def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:
+    """Both, section by section; a key of both is that of the new bus."""
+    return {**machine, **{name: {**machine.get(name, {}), **section} for name, section in new.items()}}
+
+
+def _defaults(profile: Profile) -> Iterator[AssumedKey]:
+    """Keys that only the kind of a profile has, and that the profile leaves to their defaults."""
+    _, own = _common(profile.model_dump())
+    for key, one in dotted_keys(profile).items():
+        is_own = any(key == name or key.startswith(f"{name}.") for name in own)
+        # A key without a value, or an array without an element, is none.
+        if is_own and one.source == "default" and one.value is not None and one.value != ():
+            yield AssumedKey(key, one.value, "default")

@@ -1,0 +1,199 @@
+"""`busplan sweep` into Parquet, and its summary over seeds, through the command line."""
+
+import csv
+import json
+import os
+import signal
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+Refused = Callable[..., str]
+LOSSY = ("sweep", "paper-4ms", "--set", "circle.radius_mm=20", "--set", "delivery.loss_probability=0.001", "--circle")
+SEEDS = ("--vary", "delivery.seed=1:12", "--jobs", "1")
+
+
+def parquet(path: Path) -> Any:
+    return pytest.importorskip("pyarrow.parquet").ParquetFile(path)
+
+
+def test_the_ending_chooses_parquet_and_a_pipe_gets_the_same_bytes(run: Run, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    grid = ("sweep", "paper-4ms", "--vary", "bus.gap_count=7,optimal", "--vary", "cycle.period_us=300:400:#3")
+    done = run(*grid, "-o", "rows.parquet", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr.endswith("wrote rows.parquet\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.parquet"]
+    run(*grid, "-o", "rows.jsonl", cwd=tmp_path)
+    _, *rows = map(json.loads, (tmp_path / "rows.jsonl").read_text(encoding="utf-8").splitlines())
+    found = parquet(tmp_path / "rows.parquet").read().to_pylist()
+    assert [row["margin_us"] for row in found] == [row["margin_us"] for row in rows]
+    with (tmp_path / "piped").open("wb") as pipe:
+        program = [sys.executable, "-m", "busplan", *grid, "--format", "parquet"]
+        subprocess.run(program, stdout=pipe, stderr=subprocess.DEVNULL, check=True)
+    assert (tmp_path / "piped").read_bytes() == (tmp_path / "rows.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "option"),
+    [(("-o", "rows.parquet"), "--output rows.parquet"), (("--format", "parquet"), "--format parquet")],
+)
+def test_without_pyarrow_the_extra_is_named_before_any_work(
+    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...], option: str
+) -> None:
+    monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
+    said = refused("sweep", "paper-4ms", "--vary", "cycle.period_us=1:900000000", *options, cwd=tmp_path)
+    assert said == f"{option} needs pyarrow: install it with the extra, as in pip install 'busplan[table]'"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_forms_and_help_do_not_load_pyarrow(tmp_path: Path) -> None:
+    program = (
+        "import sys; from busplan.__main__ import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "sys.exit('pyarrow' in sys.modules)"
+    )
+    for line in ("--help", "paper-4ms --vary bus.nodes=1:3 --format csv"):
+        done = subprocess.run(
+            [sys.executable, "-c", program, "sweep", *line.split()], cwd=tmp_path, capture_output=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+
+
+def has_opened(pid: int, folder: Path) -> bool:
+    """Whether a process has a file of a folder open, be it one without a name: then it listens to Ctrl-C."""
+    with suppress(OSError):
+        return any(str(path.readlink()).startswith(f"{folder}/") for path in Path(f"/proc/{pid}/fd").iterdir())
+    return False
+
+
+def interrupted(*arguments: str, folder: Path) -> tuple[int, str]:
+    """Interrupt a process at its work."""
+    program = "import signal; signal.signal(2, signal.default_int_handler); from busplan.__main__ import main; main()"
+    call = [sys.executable, "-c", program, *arguments]
+    with subprocess.Popen(call, cwd=folder, stderr=subprocess.PIPE, text=True) as run:
+        deadline = time.monotonic() + 60
+        while not has_opened(run.pid, folder) and time.monotonic() < deadline:
+            time.sleep(0.02)
+        run.send_signal(signal.SIGINT)
+        _, errors = run.communicate(timeout=60)
+    return run.returncode, errors
+
+
+def test_ctrl_c_leaves_a_parquet_file_that_says_it_is_a_part(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    (tmp_path / "rows.parquet").write_text("old", encoding="utf-8")
+    code, errors = interrupted(
+        "sweep", "paper-4ms", "--vary", "cycle.period_us=100:900000000", "-o", "rows.parquet", folder=tmp_path
+    )
+    assert code == 130
+    assert "kept in rows.partial.parquet" in errors
+    assert (tmp_path / "rows.parquet").read_text(encoding="utf-8") == "old"
+    part = parquet(tmp_path / "rows.partial.parquet")
+    assert part.metadata.metadata[b"busplan.complete"] == b"false"
+    facts = json.loads(part.metadata.metadata[b"busplan.sweep"])
+    assert part.read(["margin_us"]).num_rows == part.metadata.num_rows < facts["rows"]
+
+
+def test_ctrl_c_among_the_seeds_of_a_point_leaves_it_out(tmp_path: Path) -> None:
+    many = ("--vary", "delivery.seed=1:100000", "--vary", "delivery.jitter_us=1,2", "--summary", "--force")
+    code, errors = interrupted(*LOSSY, *many, "--jobs", "1", "-o", "rows.jsonl", folder=tmp_path)
+    assert code == 130
+    assert "interrupted after 0 of 2 points; kept in rows.partial.jsonl" in errors
+    header, *rows = (tmp_path / "rows.partial.jsonl").read_text(encoding="utf-8").splitlines()
+    assert (json.loads(header)["rows"], json.loads(header)["seeds"], rows) == (4, 100_000, [])
+
+
+def test_a_summary_is_that_of_the_single_rows(run: Run, tmp_path: Path) -> None:
+    over = ("--vary", "cycle.period_us=500,4000")
+    single = run(*LOSSY, *SEEDS, *over, "--format", "jsonl", cwd=tmp_path)
+    summed = run(*LOSSY, *SEEDS, *over, "--summary", "--format", "jsonl", cwd=tmp_path)
+    assert (single.returncode, summed.returncode) == (0, 0), single.stderr + summed.stderr
+    header, *rows = map(json.loads, summed.stdout.splitlines())
+    assert (header["seeds"], header["points"], header["varied"]) == (12, 2, {"cycle.period_us": 2})
+    _, *each = map(json.loads, single.stdout.splitlines())
+    assert [(row["cycle.period_us"], row["timing_model"], row["seeds"]) for row in rows] == [
+        (period, model, 12) for period in (500, 4000) for model in ("paper", "standard")
+    ]
+    for row in rows:
+        own = [one for one in each if all(one[key] == row[key] for key in ("cycle.period_us", "timing_model"))]
+        assert len(own) == 12
+        assert row["margin_us"] == own[0]["margin_us"]
+        assert row["failed_share"] == sum(not one["passed"] for one in own) / 12
+        errors = [one["max_contour_error_mm"] for one in own]
+        if None in errors:
+            # What does not fit is not simulated, and always fails.
+            assert (row["failed_share"], row["max_contour_error_mean_mm"]) == (1.0, None)
+            continue
+        assert row["max_contour_error_worst_mm"] == max(errors)
+        assert row["max_contour_error_mean_mm"] == pytest.approx(statistics.fmean(errors))
+        assert row["max_contour_error_std_mm"] == pytest.approx(statistics.stdev(errors), rel=1e-6)
+    assert {row["failed_share"] for row in rows} - {0.0, 1.0}, "some seeds fail and some do not"
+    assert (
+        "The circle holds every tolerance with each of 12 seeds at 0 of 2 points, fails with some at" in summed.stderr
+    )
+
+
+def test_every_form_has_the_summary(run: Run, tmp_path: Path) -> None:
+    forms = ["rows.txt", "rows.md", "rows.html", "rows.csv", "rows.json"]
+    if find_spec("pyarrow"):
+        forms.append("rows.parquet")
+    few = ("--vary", "delivery.seed=1,2", "--jobs", "1", "--summary")
+    for name in forms:
+        done = run(*LOSSY, *few, "-o", name, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    (row, _) = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
+    assert next(iter(row)) == "timing_model"
+    for name in forms[:3]:
+        assert "failed" in (tmp_path / name).read_text(encoding="utf-8")
+    (line, _) = csv.DictReader((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines())
+    assert float(line["max_contour_error_p95_mm"]) == row["max_contour_error_p95_mm"]
+    if "rows.parquet" in forms:
+        assert parquet(tmp_path / "rows.parquet").read().to_pylist()[0]["failed_share"] == row["failed_share"]
+
+
+def test_seeds_that_draw_nothing_are_said_to(run: Run, tmp_path: Path) -> None:
+    still = ("sweep", "paper-two-node", "--set", "circle.radius_mm=10", "--circle", *SEEDS, "--summary")
+    done = run(*still, "--columns", "failed_share,max_contour_error_std_mm", cwd=tmp_path)
+    assert "The circle is not judged at 1: no contour tolerance is asked for." in done.stdout
+    assert "At 1 point all seeds gave the same circle: a seed draws for delivery.jitter_us and" in done.stdout
+    assert done.stdout.splitlines()[-1].split() == ["standard", "-", "0.000000"]
+
+
+REFUSALS = {
+    "--vary delivery.seed=1:9 --summary": "--summary: goes with --circle",
+    "--vary bus.nodes=1:9 --circle --summary": "--summary: is over seeds, and none vary; add delivery.seed",
+    "--vary delivery.seed=1:9 --vary bus.nodes=1:200 --circle --summary": "200 points with 9 seeds each are",
+    "--vary delivery.seed=1:9 --circle --summary --columns passed": "--columns passed: no such column",
+    "--vary delivery.seed=1:9 --circle --summary --plot x.svg": "none varies but the seed",
+    "--vary bus.nodes=1:9 --format parquet --top 3": "--top: goes with --format table, markdown or html; parquet has",
+}
+
+
+@pytest.mark.parametrize("line", REFUSALS)
+def test_refusals(refused: Refused, line: str, tmp_path: Path) -> None:
+    if "parquet" in line:
+        pytest.importorskip("pyarrow")
+    assert REFUSALS[line] in refused("sweep", "paper-4ms", *line.split(), cwd=tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_terminal_gets_no_parquet(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    ours, theirs = os.openpty()
+    call = [sys.executable, "-m", "busplan", "sweep", "paper-4ms", "--vary", "bus.nodes=1:2", "--format", "parquet"]
+    done = subprocess.run(call, stdout=theirs, stderr=subprocess.PIPE, cwd=tmp_path, check=False, text=True)
+    os.close(theirs)
+    os.close(ours)
+    assert done.returncode == 2
+    assert "--format parquet: is not text for a terminal; give -o FILE.parquet, or use a pipe" in done.stderr
