@@ -202,7 +202,8 @@ def _within(number: int, bounds: range) -> int:
 
 
 def _points(grid: Grid) -> Iterator[dict[str, object]]:
-    return (chunk.point(0) for chunk in grid.chunks(1))
+    # Some at a time: an axis that is a list is looked through for each chunk.
+    return (chunk.point(index) for chunk in grid.chunks(_BLOCK_TESTS[-1]) for index in range(chunk.points))
 
 
 def _chunks(profile: Profile, points: Iterable[tuple[int, dict[str, object]]], most: int) -> Iterator[CircleChunk]:
