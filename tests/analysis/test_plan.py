@@ -172,7 +172,7 @@ def test_a_payload_stays_inside_the_execution_table_which_need_not_ascend(make: 
     assert table([30.0, 60.0, 90.0], period=1e4) == (200, "execution")
     # 100 bytes take longer than 200: a search that takes the time for monotone stops below them.
     assert table([30.0, 500.0, 40.0], period=1000.0) == (200, "execution")
-    assert table([30.0, 60.0, 90.0], period=10.0) == "not even the smallest fits"
+    assert table([30.0, 60.0, 90.0], period=10.0).startswith("not even the smallest fits: the cycle needs a slice of ")
     assert table([9.0, 9.1, 9.2], sizes=(9, 10, 11), period=1e4) == (
         "the execution table holds no whole step of the payload"
     )
@@ -198,3 +198,10 @@ def test_most_nodes_are_safe_for_their_gap_count(
         return hops <= 16 and gap_count >= safe(hops) and in_time and is_carried
 
     assert safe_nodes(profile)[0] == max(filter(good, range(1, 63)), default=0)
+
+
+def test_values_that_need_each_other_are_asked_together() -> None:
+    result = plan(load("dvrk").profile, wanted={"bus.cycle_master": True, "bus.isochronous_us": 120.0})
+    assert result.wanted == {"bus.cycle_master": True, "bus.isochronous_us": 120.0}
+    assert result.binding is not None
+    assert result.binding.key == "cycle starts"

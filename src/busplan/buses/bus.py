@@ -13,7 +13,7 @@ from busplan.buses.figure import NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Fig
 from busplan.buses.network import Network
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
-from busplan.elementwise import plain
+from busplan.elementwise import Number, plain
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -203,6 +203,20 @@ class Bus(ABC):
     def acts_at_once(self, network: Network) -> bool:  # noqa: ARG002 - most have a synchronous packet
         """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
         return True
+
+    def shortest_period_us(self, network: Network, needed_us: Number) -> Number:
+        """The shortest period that gives a cycle its time, of those that the bus knows; infinite where none does [us].
+
+        A kind with a limit that a longer period keeps adds what that asks for, where operators alone give it.
+
+        Parameters
+        ----------
+        network
+            The network; its own period plays no part. Its numbers may be of any sort.
+        needed_us
+            What the cycle needs [us].
+        """
+        return self.periods.from_us(needed_us / network.slice_ratio)
 
     def latency_has_execution(self, network: Network) -> bool:
         """Whether a latency holds an execution time of the nodes."""

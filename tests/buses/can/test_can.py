@@ -292,3 +292,29 @@ def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None
 
 def test_constants_have_sources() -> None:
     assert all(one.source and one.grade for one in kind_named("can").constants.values())
+
+
+@pytest.mark.parametrize("nodes", [12, 20, 28])
+def test_a_plan_holds_load_deadlines_and_time(nodes: int) -> None:
+    many = override(load("can-servo-8").profile, {"bus.nodes": nodes})
+    found = busplan.plan(many, circle=False)
+    assert found.recommended_changes is not None
+    planned, _ = busplan.capacity(override(many, dict(found.recommended_changes))).results
+    assert (planned.verdict, planned.exceeded) == ("fits", ())
+
+
+def test_no_plan_is_made_where_no_period_keeps_a_deadline() -> None:
+    many = override(load("can-servo-8").profile, {"bus.nodes": 40})
+    found = busplan.plan(many, circle=False)
+    assert found.recommended_changes is None
+    assert "its worst-case response time is" in str(found)
+
+
+@pytest.mark.parametrize("nodes", [8, 12, 20])
+def test_the_smallest_period_keeps_the_load(nodes: int) -> None:
+    many = override(load("can-servo-8").profile, {"bus.nodes": nodes})
+    smallest_us = busplan.capacity(many).results[0].safe_min_period_us or 0.0
+    at, _ = busplan.capacity(override(many, {"cycle.period_us": smallest_us})).results
+    assert (at.verdict, at.exceeded) == ("fits", ())
+    below, _ = busplan.capacity(override(many, {"cycle.period_us": smallest_us * (1 - 1e-6)})).results
+    assert below.verdict != "fits"

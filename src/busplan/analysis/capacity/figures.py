@@ -286,4 +286,4 @@ def _existing(number: Number) -> float | None:
 
 def _shortest_us(network: Network, needed_us: Number) -> Number:
     """The shortest period that gives a cycle its time, and that the bus knows; infinite where it knows none [us]."""
-    return bus_of(network.profile).periods.from_us(needed_us / network.slice_ratio)
+    return bus_of(network.profile).shortest_period_us(network, needed_us)

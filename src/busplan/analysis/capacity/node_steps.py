@@ -68,8 +68,8 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     counts = np.arange(1, most + 1)
     cycle = bus.cycle(network.with_nodes(counts), model=model)
     needed_us = np.asarray(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us)
-    said, ratio = network.asked_nodes, profile.cycle.slice_ratio
-    from_us = np.broadcast_to(np.asarray(bus.periods.from_us(needed_us / ratio)), counts.shape).tolist()
+    said = network.asked_nodes
+    from_us = np.broadcast_to(np.asarray(bus.shortest_period_us(cycle.network, needed_us)), counts.shape).tolist()
     return NodeSteps(model, said.node.axes, tuple(from_us), limit, is_safe, int(said.nodes))
 
 

@@ -9,6 +9,8 @@ from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
+from busplan.elementwise import plain
+from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
 from busplan.servo.checks import no_multiple
 
@@ -38,12 +40,28 @@ class Need(NamedTuple):
 def shown(network: Network) -> Need:
     """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely."""
     bus = bus_of(network.profile)
+    found = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
     for limit in bus.limits:
-        if not limit.is_of_period and limit.is_broken(network):
-            way_out = f" ({limit.way_out})" if limit.way_out else ""
-            slice_us = inf if limit.slice_us is None else limit.slice_us(network)
-            return Need(slice_us, limit.key, f"{limit.words(network)}{way_out}")
-    return Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
+        if limit.is_of_period:
+            continue
+        # A limit that a period cures is asked at the one that all before it need, whatever the profile's own is.
+        at = network if limit.slice_us is None else network._replace(period_us=_period_us(network, found.us))
+        if limit.is_broken(at):
+            slice_us = inf if limit.slice_us is None else limit.slice_us(at)
+            if slice_us == inf:
+                way_out = f" ({limit.way_out})" if limit.way_out else ""
+                return Need(inf, limit.key, f"{limit.words(at)}{way_out}")
+            found = Need(slice_us, limit.key)
+    return found
+
+
+def _period_us(network: Network, slice_us: float) -> float:
+    return max(slice_us / float(plain(network.slice_ratio)), MIN_STEP_US)
+
+
+def keeps_limits(network: Network) -> bool:
+    """Whether a network keeps the limits that its period plays a part in, at its own period and slice ratio."""
+    return not any(one.slice_us is not None and one.is_broken(network) for one in bus_of(network.profile).limits)
 
 
 def verdict(profile: Profile) -> Iterator[Need]:

@@ -73,7 +73,7 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
         tried = one
     if tried is None:
         return Impossible(title, "the execution table holds no whole step of the payload")
-    return Impossible(title, "not even the smallest fits")
+    return Impossible(title, f"not even the smallest fits: {search.binding(cheap, tried).why}")
 
 
 def _most_nodes(search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:

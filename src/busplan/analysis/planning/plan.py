@@ -105,7 +105,7 @@ def plan(
     return Plan(
         profile=profile,
         goal=goal,
-        wanted={key: value for key, value in asked.items() if override(profile, {key: value}) != profile},
+        wanted={key: value for key, value in asked.items() if _differs(profile, goal, key)},
         free=tuple(one.name for one in levels),
         options=tuple(one for one in found if isinstance(one, Option)),
         impossible=tuple(one for one in found if isinstance(one, Impossible)),
@@ -114,6 +114,13 @@ def plan(
         if has_plan
         else tuple(relaxations(goal, levels, kept=kept, circle=circle, max_circles=max_circles)),
     )
+
+
+def _differs(profile: Profile, goal: Profile, key: str) -> bool:
+    """Whether two profiles differ in a key, or in one of a section; other changes may be needed for either alone."""
+    own, asked = (dict(flat(one.model_dump())) for one in (profile, goal))
+    keys = [one for one in {**own, **asked} if one == key or one.startswith(f"{key}.")]
+    return any(own.get(one) != asked.get(one) for one in keys)
 
 
 def _steps(search: Search, levels: Sequence[Freedom]) -> Iterator[Option | Impossible]:

@@ -5,7 +5,8 @@ from math import inf
 from typing import Final
 
 from busplan.analysis.capacity.cycle import fits_in
-from busplan.analysis.planning.constraints import CIRCLE, Need, needs, refused_period
+from busplan.analysis.network import network_of
+from busplan.analysis.planning.constraints import CIRCLE, Need, keeps_limits, needs, refused_period
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
 from busplan.analysis.planning.machine import Changes
 from busplan.analysis.planning.short_numbers import MOST_RATIO
@@ -91,6 +92,8 @@ class Search:
         return (
             self._fits(changes)
             and not refused_period(self._own, self.period_us(changes))
+            # What a limit needs of the slice was asked with the profile's own slice ratio.
+            and keeps_limits(network_of(self.profile(changes)))
             and not self.circle_failures(changes)
         )
 

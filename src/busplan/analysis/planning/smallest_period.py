@@ -4,9 +4,9 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
+from busplan.analysis.capacity.cycle import available_us, fits_in
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.constraints import Need, shown
+from busplan.analysis.planning.constraints import Need, keeps_limits, shown
 from busplan.analysis.planning.freedoms import PERIOD, longest_period_us
 from busplan.buses.bus import Bus
 from busplan.elementwise import plain
@@ -65,7 +65,7 @@ def _need(profile: Profile, period_us: float) -> Need | None:
     """What a profile lacks at a period; None where it is shown to fit."""
     network = network_of(override(profile, {PERIOD: period_us}))
     need = shown(network)
-    return None if need.key == TIME and fits_in(need.us, available_us=available_us(network)) else need
+    return None if fits_in(need.us, available_us=available_us(network)) and keeps_limits(network) else need
 
 
 def _between(profile: Profile, short_us: float, long_us: float) -> float:

@@ -17,6 +17,7 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
+_ROUNDING: Final = 1e-9
 
 
 class CanCycle(BusCycle):
@@ -164,8 +165,22 @@ class CanCycle(BusCycle):
     @cached_property
     def load(self) -> Number:
         """Share of the bus that all messages take, 0..1 [1]."""
-        in_cycle_us = self.sync_us + self._all_us("read") + self._all_us("write")
-        return in_cycle_us / self.traffic.period_us + total(us / one.period_us for one, us in self._messages)
+        return self._in_cycle_us / self.traffic.period_us + self._messages_load
+
+    @property
+    def _in_cycle_us(self) -> Number:
+        return self.sync_us + self._all_us("read") + self._all_us("write")
+
+    @property
+    def _messages_load(self) -> Number:
+        return total(us / one.period_us for one, us in self._messages)
+
+    @property
+    def load_period_us(self) -> Number:
+        """The shortest period that keeps `limits.max_load`; infinite where the other messages take all of it [us]."""
+        left = self.network.profile.limits.max_load - self._messages_load
+        # By a billionth longer, so that rounding does not break the limit.
+        return choose(left > 0, (1 + _ROUNDING) * self._in_cycle_us / larger(left, _ROUNDING), inf)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""

@@ -19,7 +19,7 @@ from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.elementwise import plain
+from busplan.elementwise import Number, larger, plain
 from busplan.sourced import Sourced
 
 if TYPE_CHECKING:
@@ -113,6 +113,10 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         none = "; from a load of 1 on, messages of low priority have no response time" if load >= 1 else ""
         words = (f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network))
         return f"{', '.join(words)}, bus load {load:.1%}{none}"
+
+    def shortest_period_us(self, network: Network, needed_us: Number) -> Number:
+        """The shortest period that gives a cycle its time and keeps the load; deadlines may ask for more [us]."""
+        return larger(super().shortest_period_us(network, needed_us), CanCycle(network, WORST).load_period_us)
 
     def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
         """A response time ends when the frame has arrived, and begins when it is queued."""

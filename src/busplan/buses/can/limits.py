@@ -132,11 +132,6 @@ def _load(network: Network) -> Number:
     return CanCycle(network, WORST).load
 
 
-def _is_overloaded(network: Network) -> Number:
-    over: Number = _load(network) > network.profile.limits.max_load
-    return over
-
-
 LIMITS: Final = (
     Limit(
         "nodes",
@@ -176,7 +171,7 @@ LIMITS: Final = (
         lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
-        slice_us=partial(_kept_from_us, _is_overloaded),
+        slice_us=lambda network: plain(CanCycle(network, WORST).load_period_us * network.slice_ratio),
     ),
     Limit(
         "deadline",
