@@ -159,6 +159,16 @@ def test_a_cell_writes_what_its_option_sets(paper: Profile) -> None:
     ]
 
 
+def test_a_term_is_called_as_in_capacity() -> None:
+    assert {row.cells[3] for row in rows(report(load("sercos3-servo-8").profile))} == {"non-periodic T_npd"}
+
+
+def test_one_byte_is_singular() -> None:
+    sizes = {"payload.read_bytes": 2, "payload.write_bytes": 2}
+    full = override(load("can-servo-8").profile, {"bus.nodes": 10, "cycle.period_us": 2500.0, **sizes})
+    assert "payload 1 byte" in [cell_text(row.cells[2]) for row in rows(report(full))]
+
+
 def test_settings_are_written_as_a_profile_has_them(paper: Profile) -> None:
     written = settings(paper, {"cycle.period_us": 900.0, "bus.speed": "S400"})
     assert written.startswith('cycle.period_us = 900, bus.speed = "S400" (')

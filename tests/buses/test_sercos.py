@@ -238,3 +238,15 @@ def test_a_profile_of_it_alone_loads_it(kind: str) -> None:
 @KINDS
 def test_constants_have_sources(kind: str) -> None:
     assert all(one.source and one.grade for one in kind_named(kind).constants.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "nodes", "has_doubts"),
+    [("sercos3-servo-8", 8, False), ("sercos2-servo-8", 1, False), ("sercos2-servo-8", 2, True)],
+)
+def test_a_margin_without_doubts_says_that_no_uncertainty_is_known(
+    run: Run, name: str, nodes: int, has_doubts: bool
+) -> None:
+    said = run("capacity", name, "--nodes", str(nodes)).stdout.splitlines()[0]
+    assert ("so no bias and no uncertainty are in it" in said) == (not has_doubts)
+    assert ("+/-" in said) == has_doubts

@@ -114,6 +114,12 @@ def test_without_a_figure_all_are_listed(run: Run) -> None:
     assert rows == registry["figures"]
 
 
+@pytest.mark.parametrize(("name", "has_bias"), [("sercos2-servo-8", False), ("paper-4ms", True)])
+def test_a_bias_that_nobody_knows_is_not_listed(run: Run, name: str, has_bias: bool) -> None:
+    listed = [one["figure"] for one in json.loads(run("explain", name, "--format", "json").stdout)["figures"]]
+    assert ("bias_us" in listed) == has_bias
+
+
 def test_the_rows_of_csv_are_the_steps_of_json(run: Run) -> None:
     question = ("explain", "paper-4ms", "required_us", "--timing", "both")
     rows = list(csv.DictReader(StringIO(run(*question, "--format", "csv").stdout)))
@@ -172,6 +178,7 @@ def test_a_circle_that_is_not_simulated_says_why(run: Run) -> None:
         (("paper-4ms", "required_us", "--period", "4"), "with its unit"),
         (("no-such", "required_us"), "no such file"),
         (("paper-4ms", "--period", "1ms", "--timing", "both"), "--period and --timing: goes with a FIGURE"),
+        (("can-servo-8", "bias_us"), "bias_us: no bias is known for this bus, CAN"),
         (("paper-4ms", "max_contour_error_mm", "--period", "1050us"), "multiple"),
     ],
 )

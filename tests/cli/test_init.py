@@ -56,6 +56,13 @@ def test_init_writes_a_profile_of_ones_own_machine_with_its_verdict(run: Run, tm
     assert (data["node"]["execution"]["grade"], data["servo"]["grade"]) == ("assumed", "assumed")
 
 
+def test_comments_are_in_line_whatever_the_values(run: Run, tmp_path: Path) -> None:
+    run("init", "gantry", "--nodes", 2, "--axes", 2, "--period", "31.25us", cwd=tmp_path)
+    written = (tmp_path / "gantry.toml").read_text(encoding="utf-8")
+    servo = [line for line in written.splitlines() if line.startswith(("step_us = 31.25 ", "loop", "drive_lag_us"))]
+    assert [line.index("#") for line in servo] == [27, 27, 27]
+
+
 def test_a_profile_of_ones_own_is_neutral_and_no_command_stumbles_over_it(run: Run, tmp_path: Path) -> None:
     run("init", "gantry", *GANTRY, cwd=tmp_path)
     text = (tmp_path / "gantry.toml").read_text(encoding="utf-8")

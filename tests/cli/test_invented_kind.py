@@ -496,11 +496,11 @@ def test_its_verdict_says_that_no_residual_is_known(run: Run, ring: Path) -> Non
     said = run("capacity", ring.name, cwd=ring.parent).stdout
     assert said.splitlines()[0] == (
         "ring at 1.5 ms: fits. Margin 100.000 us of 750.000 us; how far the bus is from this timing model is not "
-        "known, so no bias is in it."
+        "known, so no bias and no uncertainty are in it."
     )
     assert "Not in it" not in said
     ring.write_text(TEXT.replace("period_us = 1500", "period_us = 1200"), encoding="utf-8")
-    assert "no bias known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
+    assert "no bias or uncertainty known; cheapest cure" in run("check", ring.name, cwd=ring.parent).stdout
     document = json.loads(run("capacity", ring.name, "--format", "json", cwd=ring.parent).stdout)
     assert document["results"][0]["bias_us"] is None
     rows = list(csv.DictReader(StringIO(run("capacity", ring.name, "--format", "csv", cwd=ring.parent).stdout)))

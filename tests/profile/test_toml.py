@@ -580,6 +580,18 @@ def test_a_change_that_changes_nothing_gives_an_equal_profile() -> None:
         pytest.param(
             {"bus.speed": "S800"}, {"bus.speed": "--speed S800"}, ["--speed S800: S800 arbitrates by BOSS"], id="S800"
         ),
+        pytest.param(
+            {"bus.bit_rate": 5},
+            {"bus.bit_rate": "--bit-rate 5"},
+            ["--bit-rate 5: a bus of kind ieee1394 has no bit rate"],
+            id="an option for a key of another kind",
+        ),
+        pytest.param(
+            {"bus.bit_rate": 5},
+            {"bus.bit_rate": "--set bus.bit_rate=5"},
+            ["--set bus.bit_rate=5: unknown key; known here: "],
+            id="a key of another kind",
+        ),
     ],
 )
 def test_a_change_that_is_refused_is_called_by_its_option(

@@ -40,6 +40,8 @@ class LatencyResult(NamedTuple):
 
     profile: str
     transactions: tuple[Transaction, ...]
+    payloads_bytes: tuple[int, ...] = ()
+    """Payloads asked for [bytes]; empty for the profile's own."""
 
 
 def latency(
@@ -85,6 +87,7 @@ def latency(
             for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
             for model, one in zip(models, alike, strict=True)
         ),
+        tuple(payloads_bytes or ()),
     )
 
 

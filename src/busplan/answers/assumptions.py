@@ -1,16 +1,15 @@
 """Answer of `busplan explain PROFILE`: its assumptions, and all figures, equations and constants."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
+from busplan.analysis.derivation.explain import explained_figures
 from busplan.analysis.derivation.formulas import formula_of
 from busplan.analysis.derivation.origin import DIGITS, Input
 from busplan.analysis.network import bus_of
-from busplan.analysis.register import CommandName, figures_of
 from busplan.answers.documents import document
 from busplan.buses.bus import Bus
-from busplan.buses.figure import Figure
 from busplan.forms.blocks import (
     Cell,
     Code,
@@ -58,10 +57,10 @@ def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report
         Sentence(("The figures of ", Code(profile.name))),
         lambda: (
             assumptions_table(assumptions)._replace(caption=caption),
-            _figure_table(bus_of(profile)),
+            _figure_table(profile),
         ),
         partial(assumptions_document, profile, assumptions),
-        lambda: figure_rows(bus_of(profile)),
+        lambda: figure_rows(profile),
     )
 
 
@@ -79,12 +78,12 @@ def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions")
     return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
 
 
-def figure_rows(bus: Bus) -> list[Record]:
+def figure_rows(profile: Profile) -> list[Record]:
     """One row for each figure that can be explained."""
     return [
         {"command": command, "figure": one.key, "symbol": one.symbol, "unit": one.unit}
         | {"reference": one.reference, "meaning": one.meaning}
-        for command, one in _all_figures(bus)
+        for command, one in explained_figures(profile)
     ]
 
 
@@ -116,7 +115,7 @@ def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Json
         "explain",
         profile=profile.name,
         assumptions=[one._asdict() for one in assumptions],
-        figures=figure_rows(bus_of(profile)),
+        figures=figure_rows(profile),
         equations=equation_rows(),
         constants=constant_rows(bus_of(profile)),
     )
@@ -128,12 +127,9 @@ def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
     return Code(one.name), value, one.unit, one.grade, one.source
 
 
-def _figure_table(bus: Bus) -> Table:
+def _figure_table(profile: Profile) -> Table:
     rows = (
-        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning)) for command, one in _all_figures(bus)
+        TableRow((command, Code(one.key), one.reference, one.unit, one.meaning))
+        for command, one in explained_figures(profile)
     )
     return Table(_FIGURES, tuple(rows), Sentence(("Figures to explain",)), stacks=True)
-
-
-def _all_figures(bus: Bus) -> Iterator[tuple[CommandName, Figure]]:
-    yield from ((command, one) for command, figures in figures_of(bus).items() for one in figures.values())

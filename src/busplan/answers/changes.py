@@ -10,6 +10,7 @@ from busplan.forms.blocks import Cell, Code, JsonDocument, Sentence, ShownValue,
 from busplan.forms.numbers import MISSING, figure_text
 from busplan.printable import json_text
 from busplan.profile.keys import KeyValue
+from busplan.profile.write import value_text
 
 _COLUMNS: Final = (
     TableColumn("key", kind="words", wraps=True),
@@ -62,8 +63,8 @@ def shown_value(value: object, other: object = None) -> str:
 
     Examples
     --------
-    >>> shown_value(4000.0), shown_value(None), shown_value("S400")
-    ('4000', 'none', '"S400"')
+    >>> shown_value(4000.0), shown_value(None), shown_value("S400"), shown_value(False), shown_value(["sdo"])
+    ('4000', 'none', '"S400"', 'false', '["sdo"]')
     >>> shown_value((1, 2, 3, 4, 5, 6, 7, 8, 10), (1, 2, 3, 4, 5, 6, 7, 9, 10))
     '[7 alike, 8, 1 alike]'
     """
@@ -72,8 +73,10 @@ def shown_value(value: object, other: object = None) -> str:
             return "none"
         case str():
             return _text(value, other if isinstance(other, str) else "")
-        case tuple():
-            return _list(value, other if isinstance(other, tuple) else ())
+        case tuple() | list():
+            return _list(tuple(value), tuple(other) if isinstance(other, tuple | list) else ())
+        case bool():
+            return value_text(value)
         case float():
             return repr(value).removesuffix(".0")
     return str(value)

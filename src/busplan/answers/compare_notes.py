@@ -71,6 +71,6 @@ def _execution(one: MachineOnKind, profile: Profile) -> Iterator[Sentence]:
         if owns_any:
             yield Sentence(("No execution time is in its cycle.",))
         return
-    said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}."
-    none = "" if owns_any else f" The cycle of {own.title} has none as this profile sets it."
-    yield Sentence((f"{said}{none}",))
+    said = f"Execution times are assumed to be as long as on {own.title}; here they are: {bus.starter.base}"
+    none = "" if owns_any else f"; no execution time is in the cycle of {own.title} as this profile sets it"
+    yield Sentence((f"{said}{none}.",))

@@ -101,9 +101,8 @@ def _name(one: Transaction) -> str:
 
 
 def _over(result: LatencyResult, profile: Profile) -> list[str]:
-    """Limits of the bus that the profile breaks with any of the payloads."""
-    sizes = sorted({one.payload_bytes for one in result.transactions if one.payload_bytes is not None})
-    networks = [network_of(with_payload(profile, size)) for size in sizes] or [network_of(profile)]
+    """Limits of the bus that the profile breaks with any of the payloads asked for, or with its own."""
+    networks = [network_of(with_payload(profile, size)) for size in result.payloads_bytes] or [network_of(profile)]
     broken = (limit.words(network) for network in networks for limit in bus_of(profile).broken(network))
     return list(dict.fromkeys(broken))
 

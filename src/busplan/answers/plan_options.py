@@ -7,7 +7,7 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.planning.option import Option
 from busplan.analysis.planning.plan import Plan
 from busplan.answers.key_values import NewValues, key_value, settings_sentence
-from busplan.buses.figure import BINDING_TERM, MARGIN_CORRECTED, SAFE_AXES, SAFE_NODES, UNCERTAINTY
+from busplan.buses.figure import MARGIN_CORRECTED, SAFE_AXES, SAFE_NODES, UNCERTAINTY
 from busplan.buses.parts import Value as BusValue
 from busplan.forms.blocks import (
     Cell,
@@ -17,7 +17,6 @@ from busplan.forms.blocks import (
     TableRow,
     Words,
     attribute_value,
-    figure_value,
     joined,
     sentence,
 )
@@ -50,7 +49,7 @@ def _row(option: Option, *, at: str) -> TableRow:
         option.title,
         "*" * option.recommended + "?" * (not option.proven),
         _short(option.profile, option.changes, at=f"{at}/changes"),
-        figure_value(BINDING_TERM, option.deciding.binding_term, at=f"{at}/{BINDING_TERM.key}"),
+        bus_of(option.profile).term_label(option.deciding.binding_term),
         ShownValue(option.held_by, "held_by", at=f"{at}/held_by"),
         circle,
         *option_margin(option, at=at),
@@ -97,13 +96,18 @@ def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
     words = {**_SHORT, **bus_of(profile).change_words, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(
-            sentence(words[key], _short_value(key, value, at=at))
+            sentence(_counted(words[key], value), _short_value(key, value, at=at))
             if key in words
             else settings_sentence({key: value}, meanings={}, at=at)
             for key, value in shown.items()
         ),
         by=", ",
     )
+
+
+def _counted(words: str, value: BusValue) -> str:
+    """The words of a value, of one byte or node in the singular."""
+    return words.replace(" bytes", " byte").replace(" nodes", " node") if value == 1 else words
 
 
 def _short_value(key: str, value: BusValue, *, at: str) -> ShownValue:

@@ -157,7 +157,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     """
     limits = _broken_limits(figures, profile)
     safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
-    why = "".join(f", {words}" for words in limits)
+    why = f", {'; '.join(limits)}" if limits else ""
     state = state_of(figures.verdict == FITS and figures.safe)
     said = sentence(f"{{}}{{}}{why}.", _figure(VERDICT, figures, at=at)._replace(state=state), Words(safe, state))
     if limits:
@@ -196,10 +196,10 @@ def _margin(figures: CapacityFigures, *, at: str) -> Sentence:
     if figures.bias_us is not None:
         bias = _figure(BIAS, figures, at=at)
         return sentence("Margin {} +/- {} of {}, less a bias of {}.", margin, uncertainty, of, bias)
-    unknown = "how far the bus is from this timing model is not known, so no bias is in it"
-    if figures.doubts:
-        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown}.", margin, uncertainty, of)
-    return sentence(f"Margin {{}} of {{}}; {unknown}.", margin, of)
+    unknown = "how far the bus is from this timing model is not known, so no bias"
+    if figures.uncertainty_us:
+        return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
+    return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)
 
 
 def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:
@@ -334,7 +334,8 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
-    return Sentence((*way, margin, " +/- ", doubt, "."))
+    either_way = (" +/- ", doubt) if change.figures.uncertainty_us else ()
+    return Sentence((*way, margin, *either_way, "."))
 
 
 def period_must_change(profile: Profile) -> str:

@@ -24,10 +24,13 @@ class LatencyAnswer(Answer):
         The network.
     transactions
         One for each payload, kind and timing model, nested in this order, with its `phases`.
+    payloads_bytes
+        Payloads asked for [bytes]; empty for the profile's own.
     """
 
     profile: Profile
     transactions: tuple[Transaction, ...]
+    payloads_bytes: tuple[int, ...] = ()
 
     def _report(self) -> Report:
         return latency_report(self._found, self.profile)
@@ -37,7 +40,7 @@ class LatencyAnswer(Answer):
 
     @property
     def _found(self) -> analysis.LatencyResult:
-        return analysis.LatencyResult(self.profile.name, self.transactions)
+        return analysis.LatencyResult(self.profile.name, self.transactions, self.payloads_bytes)
 
 
 @renamed(payloads_bytes="payload_bytes", timing_models="timing_model")
@@ -88,4 +91,4 @@ def latency(
         payloads_bytes=sizes and [whole(size, name="payload_bytes") for size in sizes],
         timing_models=checked_models(timing_model, network),
     )
-    return LatencyAnswer(network, found.transactions)
+    return LatencyAnswer(network, found.transactions, found.payloads_bytes)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
     from busplan.sections.profile import Profile
     from busplan.sourced import Grade, Sourced
-from busplan.buses.cycle import BusCycle
+from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.parts import (
     IDLE,
     EventKind,
@@ -120,6 +120,10 @@ class Bus(ABC):
     @abstractmethod
     def cycle(self, network: Network, *, model: str) -> BusCycle:
         """The cycle of a network under one timing model."""
+
+    def term_label(self, name: str | None) -> str:
+        """What tables call a term, by its name beside the other terms; empty without one."""
+        return next((one.label for one in self.term_figures if Term(one.key, 0.0).name == name), "")
 
     @property
     def latency_figures(self) -> tuple[Figure, ...]:

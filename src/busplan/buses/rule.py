@@ -168,5 +168,8 @@ def margin(one: RuleFigures) -> str:
     """Say how large the margin is, as far as it is known."""
     if one.uncertainty_us is None or one.margin_corrected_us is None:
         return f"margin {told_apart(one.margin_us, 0.0)[0]} us under the {one.timing_model} timing"
-    said = f"{told_apart(one.margin_corrected_us, 0.0)[0]} +/- {one.uncertainty_us:.1f} us"
-    return f"corrected margin {said}" if one.bias_us is not None else f"margin {said}, no bias known"
+    value = told_apart(one.margin_corrected_us, 0.0)[0]
+    said = f"{value} +/- {one.uncertainty_us:.1f} us"
+    if one.bias_us is not None:
+        return f"corrected margin {said}"
+    return f"margin {said}, no bias known" if one.uncertainty_us else f"margin {value} us, no bias or uncertainty known"

@@ -66,7 +66,8 @@ def explain_command(
         typer.Option(
             "--transaction",
             metavar="NAME|both",
-            help="Which transaction, for a figure of latency, as read or write.  [default: both]",
+            help="Which transaction or message, for a figure of latency, by its name there: as read, SYNC or loop; a "
+            "wrong one lists them; both is all of them.  [default: both]",
         ),
     ] = None,
     all_: AllOption = False,

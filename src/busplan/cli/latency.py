@@ -42,8 +42,8 @@ def latency_command(
 
     On IEEE 1394 it is one read and one write of the farthest node, by the broadcast schedule the data of all nodes and
     the commands to them; on CAN the worst-case response time of every message; on EtherCAT a command, feedback, and a
-    loop over both. Times are in us, sizes in bytes; each phase has its equation or source. A report: it exits 0
-    whatever the figures are.
+    loop over both; on SERCOS feedback and commands of all nodes. Times are in us, sizes in bytes; each
+    phase has its equation or source. A report: it exits 0 whatever the figures are.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """

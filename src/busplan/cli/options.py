@@ -44,8 +44,8 @@ TimingOption = Annotated[
     typer.Option(
         "--timing",
         metavar="MODEL|both",
-        help="Timing model to report, or both. IEEE 1394 has paper, the paper's equations as published, and standard, "
-        "the standard's clock and packets.",
+        help="Timing model of the profile's kind of bus to report, by its name, or both. IEEE 1394 has paper, the "
+        "paper's equations as published, and standard, the standard's clock and packets.",
     ),
 ]
 

@@ -66,8 +66,9 @@ def timeline_command(
         typer.Option(
             "--transaction",
             metavar="NAME:N",
-            help="Show one transaction of one node (from 1) with its gaps, as read:1 or write:1, on CAN feedback:1 or "
-            "command:1; --from and --to may narrow it further.  [default: all of them]",
+            help="Show one transaction of one node (from 1) with its gaps. NAME is what the bus calls it, as read:1, "
+            "feedback:1, frame:1 or mdt:1; a wrong one lists them. --from and --to may narrow it further.  "
+            "[default: all of them]",
             show_default=False,
         ),
     ] = None,
@@ -77,8 +78,8 @@ def timeline_command(
         typer.Option(
             "--timing",
             metavar="MODEL",
-            help="Timing model: the paper's equations as published, or the standard's clock and packets. "
-            "A cycle has one.  [default: the profile's bus.timing_model, where it is applicable]",
+            help="Timing model of the profile's kind of bus, by its name; on IEEE 1394 paper or standard. A cycle has "
+            "one.  [default: the profile's bus.timing_model, where it is applicable]",
             show_default=False,
         ),
     ] = None,

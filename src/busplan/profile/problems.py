@@ -261,12 +261,16 @@ def refused_changes(
     sources: dict[KeyPath, str] = {
         path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
-    return BusplanError(*(_of_changes(one, sources) for one in found))
+    return BusplanError(*(_of_changes(one, sources, kind=kind_of(data)) for one in found))
 
 
-def _of_changes(found: KeyFinding, sources: dict[KeyPath, str]) -> str:
+def _of_changes(found: KeyFinding, sources: dict[KeyPath, str], *, kind: str | None) -> str:
     """Message for a problem of a changed key, of one around or inside it, or of one that the changes do not suit."""
     if found.path in sources:
+        if found.kind == "unknown-key" and found.key not in sources[found.path]:
+            # The option stands for a key that its user did not write.
+            what = str(found.path[-1]).replace("_", " ")
+            return f"{sources[found.path]}: a bus of kind {kind} has no {what}"
         return f"{sources[found.path]}: {found.message}"
     near = [source for path, source in sources.items() if all(map(eq, path, found.path))]
     if near:

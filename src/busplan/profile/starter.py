@@ -21,6 +21,8 @@ _SUPPRESSION: Final = re.compile(r"^# busplan: ignore\[.*\n|[ \t]+# busplan: ign
 
 _LONGEST_STEP_US: Final = 100.0
 """Longest position-loop period of a new profile."""
+_COMMENTS_AT: Final = 27
+"""Column of the comments of a new profile."""
 _MACHINE: Final = """\
 schema_version = 1
 name = {name}
@@ -40,7 +42,7 @@ reserve = 0.15             # share of the slice that must stay free for a plan t
 grade = "assumed"
 loop = "node"              # assumed: where the position loop is closed; "host" needs servo.update
 interpolation = "linear"   # assumed: what a node does between set-points
-step_us = {step}              # assumed: period of the position loop; it divides cycle.period_us
+{step}# assumed: period of the position loop; it divides cycle.period_us
 position_gain_per_s = 50   # assumed: the Kv factor of the drives, 1/s; 1 m/min per mm is 16.7
 velocity_feedforward = 1   # assumed
 drive_lag_us = 1000        # assumed: time constant of the velocity loop, from its step response
@@ -146,7 +148,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
         each=each,
         period=value_text(_whole(machine.period_us)),
         bytes=machine.bytes_per_axis,
-        step=value_text(_whole(step_us)),
+        step=f"step_us = {value_text(_whole(step_us))} ".ljust(_COMMENTS_AT),
     )
     return _checked(text, name=name)
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from busplan.analysis.circle.check import MOST_STEPS
 from busplan.buses.rule import Rule, RuleProblem
+from busplan.errors import BusplanError
 from busplan.rules.finding import Subject
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -44,10 +45,15 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
         result = circle_test(subject.profile).results[0]
     except ParameterError as error:
         for refused in error.refused:
-            key = _key_of(refused.name, subject.profile)
-            # The key says the name already.
-            words, _, way_out = refused.message.removeprefix(f"{key.rpartition('.')[2]} = ").partition("; ")
+            name = refused.name.rpartition(".")[2]
+            key = _key_of(name, subject.profile)
+            # A key that is the parameter says its name already.
+            message = f"{refused.value}: {refused.right}" if key.endswith(f".{name}") else refused.message
+            words, _, way_out = message.partition("; ")
             yield "BP203", RuleProblem(key, words, way_out)
+        return
+    except BusplanError as error:
+        yield from (("BP203", RuleProblem(_key_of("", subject.profile), words)) for words in error.problems)
         return
     first = to_attack(result)
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
@@ -103,7 +109,8 @@ RULES: Final = (
         "error",
         "the circle test cannot be run",
         "The values of [servo] and [circle] do not go together: the period is no multiple of the step, the drive "
-        "cannot reach the feed, or the circle is too short for its ramps.",
+        "cannot reach the feed, the circle is too short for its ramps, or the bus puts more than one period into a "
+        "loop on the host.",
     ),
     Rule(
         "BP204",

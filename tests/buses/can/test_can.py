@@ -15,6 +15,7 @@ import busplan
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.buses import kind_named
+from busplan.buses.can.limits import shared_identifiers
 from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
 from busplan.buses.can.streams import response, streams
@@ -90,6 +91,34 @@ def test_identifiers_follow_those_of_the_pre_defined_connection_set() -> None:
     ]
 
 
+def test_a_payload_beyond_all_pdos_has_no_more_streams_than_it_takes_to_break_the_limit() -> None:
+    huge = profile(payload__read_bytes=100_000)
+    each = streams(traffic_of_profile(huge), is_stuffed=True)
+    assert [one.first for one in each if one.name == "feedback"] == [0x181, 0x281, 0x381, 0x481, 0x581]
+    assert terms(huge)["feedback"] == 3 * 12_500 * 135 * BIT_US
+    (found,) = busplan.capacity(huge, timing_model=["worst-stuffing"]).results
+    assert "payload" in found.exceeded
+
+
+def test_a_latency_says_nothing_of_the_profiles_own_load_with_another_payload(run: Run) -> None:
+    said = run("latency", "can-servo-8", "--payload", "4").stdout
+    assert "worst case of SYNC" in said
+    assert "load" not in said
+
+
+@pytest.mark.parametrize(
+    ("payload", "said"),
+    [
+        ("33", "a PDO of 33 bytes is over the 32 bytes of four frames"),
+        ("25", "feedback and sdo-response share the identifier 0x481"),
+    ],
+)
+def test_a_latency_says_what_a_payload_breaks(run: Run, payload: str, said: str) -> None:
+    changed = ("--set", "message.sdo-response.identifier=0x481")
+    assert said in run("latency", "can-servo-8", *changed, "--payload", payload).stdout
+    assert "Warning" not in run("latency", "can-servo-8", *changed).stdout
+
+
 def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> None:
     node = {**DATA["node"], "axes": 1}
     groups = [
@@ -109,6 +138,25 @@ def test_groups_follow_each_other_and_may_have_identifiers_of_their_own() -> Non
     one, _ = busplan.capacity(found).results
     assert [group.name for group in one.groups] == ["drives", "io"]
     assert one.required_us == sum(event.duration_us for event in busplan.timeline(found).cycle_events if event.term)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"bus.nodes": 120, "payload.feedback_identifier": 0x1F0},
+            "feedback and command share 103 identifiers from 0x201",
+        ),
+        (
+            {"bus.nodes": 257, "payload.read_bytes": 32},
+            "frames of feedback PDOs share the identifier 0x281, and 2 more",
+        ),
+    ],
+)
+def test_collisions_of_one_key_are_one_finding(changes: dict[str, Any], words: str) -> None:
+    found = shared_identifiers(traffic_of_profile(override(profile(), changes)))
+    assert len({key for key, _ in found}) == len(found)
+    assert words in [said for _, said in found]
 
 
 @pytest.mark.parametrize(
@@ -178,8 +226,8 @@ def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path
     path = tmp_path / "press.toml"
     path.write_text(profile_text(profile(cycle__period_us=2000.0, message__alarm__identifier=0x600)), encoding="utf-8")
     done = run("latency", path.name, cwd=tmp_path)
-    assert "from a load of 1 on, messages of low priority have no response time" in done.stdout
-    assert "alarm: it has no worst-case response time, for with it the bus has a load of 110.5%" in done.stdout
+    assert "from 100% on messages of low priority have no worst-case response time" in " ".join(done.stdout.split())
+    assert "alarm has no worst-case response time." in done.stdout
     document = json.loads(run("latency", path.name, "--format", "json", cwd=tmp_path).stdout)
     by_name = {(one["timing_model"], one["transaction"]): one["worst_response_us"] for one in document["transactions"]}
     assert by_name["worst-stuffing", "SYNC"] == 110 + 270
@@ -307,7 +355,7 @@ def test_no_plan_is_made_where_no_period_keeps_a_deadline() -> None:
     many = override(load("can-servo-8").profile, {"bus.nodes": 40})
     found = busplan.plan(many, circle=False)
     assert found.recommended_changes is None
-    assert "its worst-case response time is" in str(found)
+    assert "the worst-case response time of sdo-response is" in str(found)
 
 
 @pytest.mark.parametrize("nodes", [8, 12, 20])

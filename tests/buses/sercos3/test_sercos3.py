@@ -96,9 +96,23 @@ def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[st
 def test_delays_are_those_by_hand() -> None:
     found = {one.transaction: one for one in busplan.latency(profile(), timing_model=["window"]).transactions}
     assert found["feedback"].delay_us == pytest.approx(50 + AT_US + RING_US)
-    assert found["command"].delay_us == pytest.approx(46 + MDT_US + RING_US)
-    (alone, _) = busplan.latency(profile(), timing_model=["telegrams"]).transactions
+    # CoSeMa: commands are valid at t3 = MDT - header + ring, counted from the end of the first header.
+    t3_us = MDT_US - HEADER_US + RING_US
+    assert found["command"].delay_us == pytest.approx(46 + MASTER_US + t3_us)
+    assert (found["feedback"].before_us, found["command"].before_us) == pytest.approx((0.0, 0.32))
+    (alone, command) = busplan.latency(profile(), timing_model=["telegrams"]).transactions
     assert alone.delay_us == pytest.approx(50 + AT_US)
+    assert command.delay_us == pytest.approx(46 + MDT_US)
+
+
+def test_a_slow_master_delays_its_commands_and_a_quick_one_never_hurries_them() -> None:
+    def before_us(master_delay_us: float) -> float:
+        changed = profile(bus__master_delay_us=master_delay_us)
+        (_, command) = busplan.latency(changed, timing_model=["window"]).transactions
+        return float(command.before_us)
+
+    assert before_us(50.0) == pytest.approx(50.0 - HEADER_US)
+    assert before_us(0.0) == 0.0
 
 
 def test_a_command_has_come_with_the_last_mdt() -> None:

@@ -7,11 +7,10 @@ from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
 from busplan.analysis.circle.delays import loop_delays_us, skew_us
 from busplan.analysis.network import bus_of
-from busplan.errors import BusplanError
 from busplan.sections.base import Section
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import ParameterError, parameters
+from busplan.servo.checks import ParameterError, Refused, parameters
 from busplan.servo.circle import check_circle
 from busplan.servo.measured_part import REST_MM, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
@@ -88,10 +87,9 @@ def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
     x_us, y_us = loop_delays_us(profile)
     period_us = profile.cycle.period_us
     if max(x_us, y_us) > period_us:
-        raise BusplanError(
-            f'servo.loop = "host": the bus puts {max(x_us, y_us):g} us into a loop over it, and the circle test knows '
-            f'one period, {period_us:g} us, at most; close the loop on the node, servo.loop = "node"'
-        )
+        why = f"the bus puts {max(x_us, y_us):g} us into a loop over it, and the circle test knows one period"
+        right = f'{why}, {period_us:g} us, at most; close the loop on the node, servo.loop = "node"'
+        raise ParameterError(Refused("servo.loop", '"host"', right))
     servo = profile.servo
     return Axis(**servo.axis_keys("x"), delay_us=x_us), Axis(**servo.axis_keys("y"), delay_us=y_us)
 

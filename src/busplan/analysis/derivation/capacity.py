@@ -115,7 +115,7 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
     network, bus, known = cycle.network, bus_of(profile), by_key(CERTAINTY)
     weighed = certainty(cycle)
     for doubt in weighed.doubts:
-        remembered(doubt.us, doubt.key, f"u({doubt.label})")
+        remembered(doubt.us, f"{doubt.key}.uncertainty_us", f"u({doubt.label})")
     numbers = certainty_numbers(weighed, cycle)
     named = {
         key: remembered(if_finite(number), key, known[key].symbol)

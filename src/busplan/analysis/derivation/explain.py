@@ -12,9 +12,9 @@ from busplan.analysis.derivation.formulas import formula_text
 from busplan.analysis.derivation.latency import latency_figures, latency_names
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
-from busplan.analysis.network import bus_of, leading_model, model_names
+from busplan.analysis.network import bus_of, leading_model, model_names, network_of
 from busplan.analysis.register import CommandName, figure_named, figures_of
-from busplan.buses.figure import CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure
+from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress
@@ -125,6 +125,8 @@ def explain(
         There is no such figure, an option does not apply to it, or the command fails.
     """
     command, one = figure_named(figure, bus=bus_of(profile))
+    if (command, one) not in explained_figures(profile):
+        raise BusplanError(f"{one.key}: no bias is known for this bus, {bus_of(profile).title}")
     deciding = bus_of(profile).deciding_model
     is_decided = command == "circle-test" or one in CERTAINTY
     of_one = is_decided or one.key in VERDICT_KEYS
@@ -148,6 +150,20 @@ def explain(
                         Derivation(command, each, model, kind, period_us, traced.value, steps, tuple(inputs(traced)))
                     )
     return Explanation(profile, tuple(found))
+
+
+def explained_figures(profile: Profile) -> Iterator[tuple[CommandName, Figure]]:
+    """Every figure that can be derived for a profile, with its command: no bias where nobody has measured one.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    """
+    bus = bus_of(profile)
+    has_bias = bus.cycle(network_of(profile), model=bus.deciding_model).bias_us() is not None
+    for command, figures in figures_of(bus).items():
+        yield from ((command, one) for one in figures.values() if has_bias or one != BIAS)
 
 
 def assumptions(profile: Profile) -> tuple[Input, ...]:

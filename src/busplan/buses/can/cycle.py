@@ -197,11 +197,12 @@ class CanCycle(BusCycle):
             phase = partial(_phase, self.traffic, self.is_stuffed, place, key)
             return pointwise(phase, *self.traffic.numbers(), words=words)
 
-        words = f"busy period of {name}: every instance of it"
-        jitter_us, frame_us_ = (found(key, f"{key} of {name}") for key in ("jitter_us", "frame_us"))
-        blocking_us, interference_us = (found(key, words) for key in ("blocking_us", "interference_us"))
-        instance = found("instance", words)
-        period_us = found("period_us", f"period of {name}")
+        jitter_us = found("jitter_us", f"how late {name} may be queued")
+        frame_us_ = found("frame_us", f"the last frame of {name}")
+        blocking_us = found("blocking_us", f"the longest frame of a lower priority than {name}")
+        interference_us = found("interference_us", f"frames of higher priorities before {name}, in its worst instance")
+        instance = found("instance", f"the worst instance of {name} in the busy period, from 0")
+        period_us = named(found("period_us", f"period of {name}"), "period_us", "T")
         backlog_us = choose(instance < inf, instance * frame_us_ - instance * period_us, instance)
         parts_us = {
             "jitter_us": named(jitter_us, "jitter_us", "J"),

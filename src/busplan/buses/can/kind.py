@@ -108,11 +108,8 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         return figures.LATENCY
 
     def latency_subject(self, network: Network) -> str:
-        """Say whose response time it is, and from which load on there is none."""
-        load = plain(CanCycle(network, WORST).load)
-        none = "; from a load of 1 on, messages of low priority have no response time" if load >= 1 else ""
-        words = (f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network))
-        return f"{', '.join(words)}, bus load {load:.1%}{none}"
+        """Say whose response time it is."""
+        return ", ".join((f"worst case of SYNC, of the last PDO of {_all_nodes(network)}", *self.setup_words(network)))
 
     def shortest_period_us(self, network: Network, needed_us: Number) -> Number:
         """The shortest period that gives a cycle its time and keeps the load; deadlines may ask for more [us]."""

@@ -1,6 +1,6 @@
 """What a CAN bus and the CANopen identifiers forbid, the load of the bus, and deadlines."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from math import inf
 from typing import Final
@@ -17,11 +17,28 @@ from busplan.sections.base import MAX_TIME_US
 
 def late_messages(traffic: Traffic) -> tuple[str, ...]:
     """Say of each message that misses its deadline by how much, with its name first; of plain numbers."""
+    return tuple(f"{one.name}: {_late(one, share, traffic)}" for one, share in _late_streams(traffic))
+
+
+def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
+    """Messages that miss their deadline, each with its response over its deadline."""
     each = streams(traffic, is_stuffed=True)
-    return tuple(
-        f"{one.name}: {_late(one, share, traffic)}"
-        for one in each
-        if one.is_message and (share := _deadline_share(one, each, traffic)) > 1
+    for one in each:
+        if one.is_message and (share := _deadline_share(one, each, traffic)) > 1:
+            yield one, share
+
+
+def _all_late(traffic: Traffic) -> str:
+    """Say of all messages that miss their deadline in one clause, the worst first."""
+    late = sorted(_late_streams(traffic), key=lambda pair: -pair[1])
+    endless = [one.name for one, share in late if share == inf]
+    if endless:
+        more = len(endless) - 1
+        others = f" and {more} more message{'s' * (more > 1)} have" if more else " has"
+        return f"{endless[0]}{others} no worst-case response time"
+    times = ((one.name, share * one.deadline_us, one.deadline_us) for one, share in late)
+    return _and_more(
+        [f"the worst-case response time of {one} is {us:g} us, over its {most:g} us" for one, us, most in times]
     )
 
 
@@ -53,12 +70,22 @@ def _deadline(network: Network) -> Number:
 
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
-    """Say which messages share identifiers, each with the key of one of the two; of plain numbers."""
-    each = streams(traffic, is_stuffed=True)
-    return tuple(
-        (_identifier_key(other), f"{one.label} and {other.label} share {_from(first, shared)}")
-        for one, other, first, shared in collisions(each)
-    )
+    """Say which messages share identifiers, once for each key that sets those of the second one; of plain numbers."""
+    found: dict[str, list[str]] = {}
+    for key, words in _collisions_in_words(traffic):
+        found.setdefault(key, []).append(words)
+    return tuple((key, _and_more(each)) for key, each in found.items())
+
+
+def _collisions_in_words(traffic: Traffic) -> Iterator[tuple[str, str]]:
+    """Each pair of messages that shares identifiers, with the key of the second."""
+    for one, other, first, shared in collisions(streams(traffic, is_stuffed=True)):
+        pair = f"{one.label} and {other.label}" if one.label != other.label else f"frames of {one.label} PDOs"
+        yield _identifier_key(other), f"{pair} share {_from(first, shared)}"
+
+
+def _and_more(clauses: Sequence[str]) -> str:
+    return f"{clauses[0]}, and {len(clauses) - 1} more" if len(clauses) > 1 else clauses[0]
 
 
 def _identifier_key(one: Stream) -> str:
@@ -132,6 +159,16 @@ def _load(network: Network) -> Number:
     return CanCycle(network, WORST).load
 
 
+def when_full(load: float) -> str:
+    """Say of a load what comes of it, where it is 1 or more."""
+    return "; from 100% on messages of low priority have no worst-case response time" if load >= 1 else ""
+
+
+def _load_words(network: Network) -> str:
+    load, most = plain(_load(network)), network.profile.limits.max_load
+    return f"the bus load is {load:.1%}, over limits.max_load, {most:.1%}{when_full(load)}"
+
+
 LIMITS: Final = (
     Limit(
         "nodes",
@@ -162,15 +199,16 @@ LIMITS: Final = (
         lambda _network: 0,
         way_out="identifiers further apart have room",
         has_rule=True,
-        says=lambda network: "; ".join(words for _, words in shared_identifiers(traffic_of(network))),
+        says=lambda network: _and_more([words for _, words in _collisions_in_words(traffic_of(network))]),
     ),
     Limit(
         "load",
-        "the bus load is {value:.1%}, over limits.max_load, {most:.1%}",
+        "the bus load is {value:.1%}, over the {most:.1%} of limits.max_load",
         _load,
         lambda network: network.profile.limits.max_load,
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
+        says=_load_words,
         slice_us=lambda network: plain(CanCycle(network, WORST).load_period_us * network.slice_ratio),
     ),
     Limit(
@@ -180,7 +218,7 @@ LIMITS: Final = (
         lambda _network: 1,
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         has_rule=True,
-        says=lambda network: "; ".join(late_messages(traffic_of(network))),
+        says=lambda network: _all_late(traffic_of(network)),
         slice_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
     ),
 )

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.buses.can.limits import late_messages, shared_identifiers
+from busplan.buses.can.limits import late_messages, shared_identifiers, when_full
 from busplan.buses.can.traffic import traffic_of_profile
 from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 
@@ -13,8 +13,9 @@ def load_over_limit(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "load" in subject.deciding.exceeded:
         most: float = getattr(subject.profile.limits, "max_load")  # noqa: B009 - a key of this kind alone
         load = subject.deciding.bus_load
-        full = "; from 100% on messages have no worst-case response time" if load >= 1 else ""
-        yield RuleProblem("limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{full}", *subject.cure())
+        yield RuleProblem(
+            "limits.max_load", f"the bus load is {load:.1%}, {most:.1%} allowed{when_full(load)}", *subject.cure()
+        )
 
 
 def identifiers_collide(subject: RuleSubject) -> Iterator[RuleProblem]:

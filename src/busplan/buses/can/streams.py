@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from busplan.buses.can.constants import FRAME_BYTES, PDO_STEP
+from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
 from busplan.buses.can.equations import bit_us, frame_us
 from busplan.buses.can.response import Response, Sender, worst_response
 from busplan.buses.can.traffic import FOLLOWS, SYNC, Pdos, Traffic
@@ -88,7 +88,7 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
         if said != FOLLOWS:
             block[one.kind] = said
         free[one.kind] = first + count
-        sizes = frame_sizes(one)
+        sizes = frame_sizes(one)[:_MOST_FRAMES]
         for number, size in enumerate(sizes):
             step = number * int(PDO_STEP)
             own = sent(one.name, first + step, size)
@@ -105,6 +105,10 @@ def frame_sizes(one: Pdos) -> list[int]:
     """Data of each frame of a PDO of plain numbers [bytes]."""
     full, rest = divmod(_int(one.payload_bytes), int(FRAME_BYTES))
     return [int(FRAME_BYTES)] * full + [rest] * (rest > 0)
+
+
+_MOST_FRAMES: Final = int(MOST_PDOS) + 1
+"""Frames of one PDO that have streams: with one more than a bus allows, its limit is broken already."""
 
 
 def _int(number: Number) -> int:

@@ -98,12 +98,19 @@ class Sercos3Cycle(BusCycle):
         """How many telegrams there are."""
         return {f"{sort}_telegrams": self.fillings[kind].telegrams for kind, sort in SORTS.items()}
 
+    def _start_us(self) -> Number:
+        """From the start of a cycle in the master to the first byte: its delay ends with the first header [us]."""
+        if not self.is_window:
+            return 0.0
+        delay_us: Number = self.network.profile.bus.master_delay_us
+        return larger(delay_us - HEADER_US, 0.0)
+
     def latencies(self) -> tuple[BusLatency, ...]:
         """How old feedback is when the host has it, and how late a command takes effect."""
         return delays(
             self.network,
             feedback_us=(0.0, self._telegrams_us("read")),
-            command_us=(0.0, self._telegrams_us("write")),
+            command_us=(self._start_us(), self._telegrams_us("write")),
             ring_us=self.ring_us,
         )
 

@@ -10,7 +10,6 @@ from busplan.analysis.map.cells import Cell, Region, State
 from busplan.analysis.map.direction import AXES, PERIOD, Direction
 from busplan.analysis.map.trade_off import TradeOff
 from busplan.analysis.network import bus_of, varied_nodes
-from busplan.buses.cycle import Term
 from busplan.buses.figure import Ink
 from busplan.buses.parts import Value
 from busplan.forms.blocks import ShownValue, Swatch
@@ -102,9 +101,7 @@ def limit_words(region: Region | Cell, profile: Profile) -> str:
     words = " and ".join(region.limited_by)
     if region.limited_by != (TIME,):
         return words
-    labels = {Term(one.key, 0.0).name: one.label for one in bus_of(profile).term_figures}
-    term = region.binding_term or ""
-    return f"{words}, largest term {labels.get(term, term)}"
+    return f"{words}, largest term {bus_of(profile).term_label(region.binding_term)}"
 
 
 def title_of(direction: Direction, profile: Profile) -> str:
