@@ -15,7 +15,8 @@ from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import figure_names, sweep
-from busplan.analysis.sweep.circles import require_circles
+from busplan.analysis.sweep.circle_run import CircleTests, require_circles
+from busplan.analysis.sweep.execution import Here
 from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid, grid_models
 from busplan.buses.ieee1394.timing import TimingModelName
 from busplan.errors import BusplanError
@@ -227,10 +228,11 @@ def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
         servo={"step_us": 50.0},
     )
     # 25,133,560 steps of each axis at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
-    require_circles(big, checked_grid(big, {"cycle.period_us": Listed((2000, 100))}, with_circle=True))
+    two = checked_grid(big, {"cycle.period_us": Listed((2000, 100))}, with_circle=True)
+    require_circles(CircleTests(big, two), Here())
     assert caplog.messages == []
     three = checked_grid(big, {"delivery.seed": Listed((1, 2, 3))}, with_circle=True)
-    require_circles(big, three)
+    require_circles(CircleTests(big, three), Here())
     (said,) = caplog.messages
     assert said.startswith("circle test: 150,801,360 steps, about ")
     # The memory of one: they run one behind the other.

@@ -70,7 +70,7 @@ ALONE = {
     "circle-test": {"plot", "trace", "feed", "radius", "every", "nodes", "gap-count", "direction", "seed"},
     "diff": {"fail-on-regression", "tolerance"},  # both are answer.regressions(tolerance_percent=)
     "plan": {"apply", "force"},
-    "sweep": {"columns", "sort", "top", "plot", "figure"},
+    "sweep": {"columns", "sort", "top", "plot", "figure", "resume", "cluster"},  # cluster is executor=
 }
 """Options without a parameter."""
 SHORT_FORMS = {"period", "nodes", "gap-count"}
@@ -110,4 +110,4 @@ def test_a_parameter_is_called_as_its_option(name: str) -> None:
     named = {
         one for one in own if any(one == f"{option.replace('-', '_')}{end}" for option in asked for end in SUFFIXES)
     }
-    assert own - named <= {"profile", "profiles", "a", "b", "figure", "measurements", "progress"}
+    assert own - named <= {"profile", "profiles", "a", "b", "figure", "measurements", "progress", "executor"}

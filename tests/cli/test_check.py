@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 from ruamel.yaml import YAML
 
-from busplan.cli.workers import Map, workers
+from busplan.cli.workers import Workers, workers
 
 ROOT = Path(__file__).resolve().parents[2]
 CLEAN = (ROOT / "tests/rules/examples/BP001/valid.toml").read_text(encoding="utf-8")
@@ -297,7 +297,7 @@ def test_any_number_of_jobs_gives_the_same_bytes(
     # The same two workers for every form: their start is most of the time of a process.
     with workers(2) as shared:
 
-        def again(number: int) -> AbstractContextManager[Map]:
+        def again(number: int) -> AbstractContextManager[Workers]:
             asked.append(number)
             return nullcontext(shared)
 

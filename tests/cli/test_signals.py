@@ -78,7 +78,8 @@ def rows_written(process: "subprocess.Popen[str]", folder: Path) -> bool:
     """Whether bytes stand in the file in the making."""
     with suppress(OSError):
         for path in Path(f"/proc/{process.pid}/fd").iterdir():
-            if str(path.readlink()).startswith(f"{folder}/") and path.stat().st_size:
+            # Parts are written in a folder of their own.
+            if path.readlink().parent == folder and path.stat().st_size:
                 return True
     return False
 
@@ -101,16 +102,17 @@ def rows(path: Path) -> int:
 def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int, whole_group: bool) -> None:
     with running(*SWEEP, "-o", "c.csv", folder=folder) as process:
         assert until(lambda: rows_written(process, folder))
+        assert until(lambda: len(workers_of(process)) == 2)
         started = workers_of(process)
-        assert len(started) == 2
         (os.killpg if whole_group else os.kill)(process.pid, getattr(signal, name))
         _, said = process.communicate(timeout=20)
     assert process.returncode == code
     assert "kept in c.partial.csv" in said
     assert "Traceback" not in said
     assert not any(map(alive, started))
-    assert sorted(path.name for path in folder.iterdir()) == ["c.partial.csv", "p.toml"]
+    assert sorted(path.name for path in folder.iterdir()) == ["c.csv.parts", "c.partial.csv", "p.toml"]
     assert rows(folder / "c.partial.csv") > 0
+    assert "circle tests are in c.csv.parts: go on with --resume" in said
 
 
 def test_a_hangup_that_nohup_ignores_stays_ignored(folder: Path) -> None:
@@ -133,7 +135,7 @@ def test_workers_and_files_end_with_a_process_that_is_killed(folder: Path, name:
         process.communicate(timeout=20)
         assert process.returncode == -signal.SIGKILL
         assert until(lambda: not any(map(alive, started)), seconds=5)
-    assert not [path for path in folder.iterdir() if path.suffix != ".toml"]
+    assert {path.name for path in folder.iterdir() if path.suffix != ".toml"} <= {"c.csv.parts"}
 
 
 def many_files(folder: Path) -> tuple[str, ...]:
@@ -187,7 +189,7 @@ def test_a_worker_that_is_killed_is_said(folder: Path, name: str) -> None:
 
 def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
     waiting = "import time; from busplan.cli.workers import workers\n"
-    waiting += "with workers(1) as map_:\n    map_(time.sleep, [60])"
+    waiting += "with workers(1) as crew:\n    crew.submit(time.sleep, 60).result()"
     with subprocess.Popen([sys.executable, "-c", waiting], cwd=tmp_path, text=True) as process:
         assert until(lambda: workers_of(process))
         started = workers_of(process)
@@ -198,8 +200,8 @@ def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
 
 
 def test_workers_answer_in_order_and_pass_on_what_went_wrong() -> None:
-    with workers(2) as map_:
-        assert map_(abs, [-3, -1, -2]) == [3, 1, 2]
-        assert map_(abs, []) == []
+    with workers(2) as crew:
+        assert list(crew.map(abs, [-3, -1, -2])) == [3, 1, 2]
+        assert list(crew.map(abs, [])) == []
         with pytest.raises(FileNotFoundError, match="nowhere"):
-            map_(os.stat, ["nowhere", "."])
+            list(crew.map(os.stat, ["nowhere", "."]))

@@ -202,6 +202,7 @@ REFUSALS = {
     "--vary cycle.period_us=1:900000 --plot x.svg": "--plot: 900,000 points",
     "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",
     "--vary cycle.period_us=1000,1050 --circle": "at cycle.period_us = 1050: step_us = 100.0",
+    "--vary cycle.period_us=1000,1050 --circle --format csv": "at cycle.period_us = 1050: step_us = 100.0",
     "--vary bus.nodes=1:9 -o no/such/folder.csv": "there is no folder",
     "--vary bus.nodes=1:9 -o rows.npz": "gives arrays, and FILE.csv, FILE.jsonl or FILE.parquet holds",
     "--vary bus.nodes=1:9 --format npz": "'npz' is not one of",

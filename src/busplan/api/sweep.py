@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,18 +11,12 @@ import numpy as np
 from busplan.analysis.sweep import blocks as analysis
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.circles import (
-    CircleTask,
-    Figures,
-    all_columns,
-    require_circles,
-    require_few,
-    run_task,
-    with_circles,
-)
+from busplan.analysis.sweep.circle_run import CircleTests, circle_blocks, require_circles
+from busplan.analysis.sweep.circles import all_columns, require_few
 from busplan.analysis.sweep.columns import circle_columns
+from busplan.analysis.sweep.execution import Here
 from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
-from busplan.analysis.sweep.seeds import with_seeds, without_seed
+from busplan.analysis.sweep.seeds import without_seed
 from busplan.answers.sweep.rows import SweepTable
 from busplan.answers.sweep.top import Tally, TopRows, default_columns, sweep_report
 from busplan.answers.sweep.writers import rows_writer
@@ -139,6 +134,7 @@ def sweep(
     circle: bool = False,
     summary: bool = False,
     force: bool = False,
+    executor: Executor | None = None,
 ) -> SweepAnswer:
     """Compute capacity over a grid: any keys of the profile, every combination.
 
@@ -159,6 +155,10 @@ def sweep(
         deviation, 95 % quantile and worst of each figure of the circle over the seeds, and the share that failed.
     force
         Allow more than 1,000 circle tests.
+    executor
+        With `circle`: where the tests run, in chunks of about a second; by default in this thread. Any
+        `concurrent.futures.Executor` gives the same answer, and is not shut down. Worker processes must have this
+        version of busplan.
 
     Returns
     -------
@@ -170,6 +170,8 @@ def sweep(
     ------
     BusplanError
         Not a profile, an invalid key or value, a point whose circle test cannot be run, or too many points.
+    Exception
+        What `executor` raises.
 
     References
     ----------
@@ -184,6 +186,9 @@ def sweep(
     >>> answer["limited_by"].tolist(), len(answer)
     (['time', 'time', 'time'], 3)
     """
+    if executor is not None and not (circle and isinstance(executor, Executor)):
+        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
+        raise BusplanError(f"executor{wrong}")
     network = load_profile(profile)
     asked = None if timing_model is None else checked_models(timing_model, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
@@ -213,11 +218,8 @@ def sweep(
     if circle:
         if not force:
             require_few(grid, seeds=count, option="circle", consent="force=True")
-        require_circles(network, grid, seeds=count)
-    if seeds is not None:
-        blocks = (with_seeds(network, block, seeds, run=_run_here) for block in blocks)
-    elif circle:
-        blocks = (with_circles(network, block, run=_run_here) for block in blocks)
+        tests, where = CircleTests(network, grid, seeds), executor or Here()
+        blocks = circle_blocks(tests, where, timing_models=models, cost=require_circles(tests, where))
     columns = all_columns(network, grid, circle=circle_columns(circle=circle, summary=summary))
     return SweepAnswer(network, grid, models, columns, tuple(blocks), None if seeds is None else count)
 
@@ -250,7 +252,3 @@ def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, na
         if isinstance(given, range)
         else listed(items(given, name=name), name=name, words=words)
     )
-
-
-def _run_here(tasks: Iterable[CircleTask]) -> Iterable[Figures]:
-    return map(run_task, tasks)

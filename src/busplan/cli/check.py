@@ -190,8 +190,8 @@ def _check(
     # Only this process has standard input.
     own = {source: one(source) for source in sources if str(source.path) == "-"}
     others = [source for source in sources if source not in own]
-    with workers(number) as map_:
-        found = own | dict(zip(others, map_(one, others), strict=True))
+    with workers(number) as crew:
+        found = own | dict(zip(others, crew.map(one, others), strict=True))
     return tuple(found[source] for source in sources)
 
 

@@ -104,12 +104,12 @@ def map_command(
 def _found(plan: "Profile", x: str | None, y: str | None, *, jobs: int | None, with_circle: bool) -> "TradeOff":
     from busplan.analysis.map.trade_off import trade_off
     from busplan.cli.progress import progress_bar
-    from busplan.cli.sweep_run import available_processors, mapper
+    from busplan.cli.sweep_run import available_processors, executor
 
     across = _direction(x, plan, option="--x", with_circle=with_circle)
     up = _direction(y, plan, option="--y", with_circle=with_circle)
-    with progress_bar("map") as progress, mapper(jobs or available_processors() if with_circle else 1) as map_:
-        return trade_off(plan, x=across, y=up, with_circle=with_circle, mapper=map_, progress=progress)
+    with progress_bar("map") as progress, executor(jobs or available_processors() if with_circle else 1) as where:
+        return trade_off(plan, x=across, y=up, with_circle=with_circle, mapper=where.map, progress=progress)
 
 
 def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: bool) -> "Direction | None":

@@ -127,6 +127,24 @@ def sweep_command(
             show_default=False,
         ),
     ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(
+            "--cluster",
+            metavar="ADDRESS",
+            help="Run the tests of --circle on the workers of a Dask scheduler, as tcp://HOST:8786. They must have the "
+            "same versions of Python, busplan and numpy. Needs the extra cluster (distributed).  [default: here]",
+            show_default=False,
+        ),
+    ] = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume",
+            help="With --circle and -o FILE: go on after what stands in FILE.parts, where a sweep that did not end, or "
+            "was killed, left the tests that were done.",
+        ),
+    ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Run more than 1,000 circle tests: --circle alone refuses so many.")
     ] = False,
@@ -135,7 +153,9 @@ def sweep_command(
 
     Each row is what `busplan capacity` gives for that point. Memory stays flat however large the grid is; millions of
     points take seconds, and writing them as text some minutes. Ctrl-C, SIGTERM and SIGHUP keep the rows so far in
-    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. A report: it exits 0 whatever fits.
+    FILE.partial.csv (or .json, .jsonl, .parquet) and leave FILE as it was. With --circle and -o FILE, tests that are
+    done stand in the folder FILE.parts until FILE is complete, and --resume goes on there, even after SIGKILL. A
+    report: it exits 0 whatever fits.
 
     Example: busplan sweep paper-1ms --vary bus.nodes=1:16 --sort margin_us
     """
@@ -144,7 +164,11 @@ def sweep_command(
         _require_parquet(output, typed=format_)
     _require_sense(form, sort=sort, top=top)
     _require_needed("--plot FILE", plot is not None, {"--figure": figure})
-    _require_needed("--circle", circle, {"--jobs": jobs, "--force": force or None, "--summary": summary or None})
+    own = {"--cluster": cluster, "--resume": resume or None, "--force": force or None, "--summary": summary or None}
+    _require_needed("--circle", circle, {"--jobs": jobs, **own})
+    _require_needed("--output FILE, beside which the parts stand", output is not None, {"--resume": resume or None})
+    if cluster is not None:
+        _require_cluster(jobs)
     for option, number in (("--top", top), ("--jobs", jobs)):
         if number is not None and number < 1:
             raise BusplanError(f"{option} {number}: must be 1 or more")
@@ -189,6 +213,8 @@ def sweep_command(
             figure=drawn,
             jobs=(jobs or available_processors()) if circle else None,
             force=force,
+            cluster=cluster,
+            resume=resume,
         )
     )
 
@@ -214,6 +240,15 @@ def _require_parquet(output: Path | None, *, typed: str | None) -> None:
         option="--format parquet" if typed else f"--output {output}",
         module="pyarrow.parquet",
     )
+
+
+def _require_cluster(jobs: int | None) -> None:
+    """Refuse a cluster without its library, or beside processes of our own."""
+    if jobs is not None:
+        raise BusplanError(
+            "--jobs: is the number of processes here, and --cluster runs the tests elsewhere; leave one out"
+        )
+    require_extra("distributed", extra="cluster", option="--cluster", module="distributed")
 
 
 def _require_sense(form: SweepForm, *, sort: str | None, top: int | None) -> None:

@@ -39,9 +39,13 @@ class SweepJob(NamedTuple):
     plot_format: str | None
     figure: str
     jobs: int | None
-    """Processes for circle tests; None without circle tests."""
+    """Processes for circle tests, where there is no cluster; None without circle tests."""
     force: bool
     """If True, allow any number of circle tests."""
+    cluster: str | None
+    """Address of a Dask scheduler whose workers run the circle tests."""
+    resume: bool
+    """If True, go on with the parts of a sweep that did not end."""
 
     @property
     def tests(self) -> int | None:

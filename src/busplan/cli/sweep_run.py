@@ -3,8 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from itertools import islice
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
 from busplan.cli.output import CANNOT, new_file, partial_path, say
@@ -12,20 +11,19 @@ from busplan.cli.progress import progress_bar
 from busplan.cli.sweep_job import TOP_FORMS
 from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import WorkerLostError
+from busplan.progress import Progress
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from busplan.analysis.sweep.blocks import SweepBlock
-    from busplan.analysis.sweep.circles import CircleTask, Figures
     from busplan.cli.sweep_job import SweepJob
-    from busplan.cli.workers import Map
+    from busplan.cli.sweep_parts import Parts
     from busplan.drawings.sweep_plot import FigureData
 
-_CIRCLES_AT_ONCE: Final = 4
-"""Points that each process tests between two checks for signals."""
 
-
-class _BetweenTestsError(Exception):
-    """A signal came between the circle tests of one point, which is left out."""
+class _StoppedBetweenError(Exception):
+    """A signal came: what is in the middle of a block is left out."""
 
 
 def available_processors() -> int:
@@ -48,8 +46,9 @@ def run_sweep(job: "SweepJob") -> None:
     from busplan.forms.columns import sentence_text
 
     drawing = _drawing(job)
-    if job.jobs is not None:
-        _require_circles(job)
+    if job.jobs is not None and not job.force:
+        _require_few(job)
+    parts = _parts(job)
     tally = Tally(job.profile, job.grid, job.timing_models, seeds=job.tests)
     expected = tally.expected
     with ExitStack() as stack:
@@ -59,13 +58,7 @@ def run_sweep(job: "SweepJob") -> None:
             file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
             sink = sink_for(job, file, tally)
             takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-            lost = _work(
-                job,
-                takers,
-                points=sink.points,
-                progress=lambda: (tally.points * (job.tests or 1), expected * (job.tests or 1)),
-                stopped=lambda: noted() is not None,
-            )
+            lost = _work(job, takers, parts, points=sink.points, stopped=lambda: noted() is not None)
         complete = tally.points == expected
         sink.finish(complete=complete)
         if job.form not in TOP_FORMS or file is not None:
@@ -73,6 +66,9 @@ def run_sweep(job: "SweepJob") -> None:
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
             say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
+            if parts is not None and parts.tests:
+                all_tests = expected * (job.tests or 1)
+                say(f"{parts.tests:,} of {all_tests:,} circle tests are in {parts.folder}: go on with --resume")
             signal = noted()
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_format is not None:
@@ -81,6 +77,8 @@ def run_sweep(job: "SweepJob") -> None:
                     ", ".join(filter(None, (job.profile.name, job.changes.words))), file_format=job.plot_format
                 )
             )
+    if parts is not None:
+        parts.remove()
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")
@@ -89,27 +87,24 @@ def run_sweep(job: "SweepJob") -> None:
 def _work(
     job: "SweepJob",
     takers: "Sequence[Callable[[SweepBlock], None]]",
+    parts: "Parts | None",
     *,
     points: int,
-    progress: Callable[[], tuple[int, int]],
     stopped: Callable[[], bool],
 ) -> WorkerLostError | None:
     """Pass each block to all takers, until the end or a stop; return the error of a lost worker."""
 
-    def before_tests(done: int) -> None:
-        report(done, progress()[1])
+    def watch(*_: object) -> None:
         if stopped():
-            raise _BetweenTestsError
+            raise _StoppedBetweenError
 
     try:
-        with progress_bar("sweep") as report, _blocks(job, points, before_tests) as blocks:
+        with progress_bar("sweep") as report, _blocks(job, parts, points, report, watch) as blocks:
             for block in blocks:
                 for take in takers:
                     take(block)
-                report(*progress())
-                if stopped():
-                    break
-    except _BetweenTestsError:
+                watch()
+    except _StoppedBetweenError:
         return None
     except WorkerLostError as error:
         return error
@@ -125,50 +120,75 @@ def _drawing(job: "SweepJob") -> "FigureData | None":
     return FigureData(job.profile, job.grid, figure=job.figure, timing_models=job.timing_models)
 
 
-def _require_circles(job: "SweepJob") -> None:
-    from busplan.analysis.sweep.circles import require_circles, require_few
+def _require_few(job: "SweepJob") -> None:
+    from busplan.analysis.sweep.circles import require_few
 
-    if not job.force:
-        require_few(job.grid, seeds=job.tests or 1, option="--circle", consent="--force")
-    require_circles(job.profile, job.grid, seeds=job.tests or 1)
+    require_few(job.grid, seeds=job.tests or 1, option="--circle", consent="--force")
+
+
+def _parts(job: "SweepJob") -> "Parts | None":
+    if job.jobs is None or job.output is None:
+        return None
+    from busplan.cli.sweep_parts import Parts
+
+    return Parts(job, job.output)
 
 
 @contextmanager
-def _blocks(job: "SweepJob", points: int, before_tests: Callable[[int], None]) -> "Iterator[Iterable[SweepBlock]]":
+def _blocks(
+    job: "SweepJob", parts: "Parts | None", points: int, report: Progress, watch: Callable[[], None]
+) -> "Iterator[Iterable[SweepBlock]]":
     """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
     from busplan.analysis.sweep.blocks import sweep
 
     if job.jobs is None:
-        yield sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=points)
+        yield _reported(sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=points), job, report)
         return
-    from busplan.analysis.sweep.circles import run_task, with_circles
-    from busplan.analysis.sweep.seeds import with_seeds
+    from busplan.analysis.sweep.circle_run import NOTHING_KEPT, CircleTests, circle_blocks, require_circles
 
-    at_once = _CIRCLES_AT_ONCE * job.jobs
-    seeds = job.seeds
-    few = sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=at_once if seeds is None else 1)
-    with mapper(min(job.jobs, job.grid.points * (job.tests or 1))) as map_:
-        done = 0
-
-        def run(tasks: "Iterable[CircleTask]") -> "Iterator[Figures]":
-            nonlocal done
-            left = iter(tasks)
-            while batch := list(islice(left, at_once)):
-                before_tests(done)
-                yield from map_(run_task, batch)
-                done += len(batch)
-
-        yield (
-            with_circles(job.profile, block, run=run)
-            if seeds is None
-            else with_seeds(job.profile, block, seeds, run=run)
-            for block in few
+    tests = CircleTests(job.profile, job.grid, job.seeds)
+    with ExitStack() as stack:
+        if parts is not None:
+            stack.callback(parts.flush)
+        where, watch = stack.enter_context(_where(job, tests.number, watch))
+        yield circle_blocks(
+            tests,
+            where,
+            timing_models=job.timing_models,
+            cost=require_circles(tests, where, watch=watch),
+            kept=parts or NOTHING_KEPT,
+            progress=lambda done: report(done, tests.number),
+            watch=watch,
         )
 
 
 @contextmanager
-def mapper(jobs: int) -> "Iterator[Map]":
-    """Give a `map` that works here, or in other processes.
+def _where(job: "SweepJob", tests: int, watch: Callable[[], None]) -> "Iterator[tuple[Executor, Callable[[], None]]]":
+    """Executor of circle tests, and what must be watched while it works."""
+    if job.cluster is None:
+        with executor(min(job.jobs or 1, tests)) as here:
+            yield here, watch
+        return
+    from busplan.cli.cluster import cluster
+
+    with cluster(job.cluster) as (there, look):
+
+        def watch_both() -> None:
+            watch()
+            look()
+
+        yield there, watch_both
+
+
+def _reported(blocks: "Iterable[SweepBlock]", job: "SweepJob", report: Progress) -> "Iterator[SweepBlock]":
+    for block in blocks:
+        yield block
+        report(block.chunk.start + block.chunk.points, job.grid.points)
+
+
+@contextmanager
+def executor(jobs: int) -> "Iterator[Executor]":
+    """Give an executor that works here, or in other processes.
 
     Parameters
     ----------
@@ -176,9 +196,11 @@ def mapper(jobs: int) -> "Iterator[Map]":
         Number of processes [1].
     """
     if jobs == 1:
-        yield lambda function, tasks: list(map(function, tasks))
+        from busplan.analysis.sweep.execution import Here
+
+        yield Here()
         return
     from busplan.cli.workers import workers
 
-    with workers(jobs) as map_:
-        yield map_
+    with workers(jobs) as crew:
+        yield crew

@@ -65,7 +65,7 @@ def _not_kept() -> NoReturn:
 
 
 class _RowsSink:
-    """Writes every row as it comes."""
+    """Writes every row as it comes; nothing before the first, for a point may be refused."""
 
     def __init__(self, job: "SweepJob", form: RowsForm, write: "Callable[[bytes], object]") -> None:
         from busplan.answers.sweep.rows import SweepTable
@@ -74,12 +74,19 @@ class _RowsSink:
         table = SweepTable(job.profile, job.grid, job.timing_models, job.columns, job.changes, job.tests)
         self._writer = rows_writer(form, table, write)
         self.points = self._writer.points
-        self._writer.begin()
+        self._is_begun = False
 
     def add(self, block: "SweepBlock") -> None:
         """Write a block."""
+        self._begin()
         self._writer.join(self._writer.encode(block))
 
     def finish(self, *, complete: bool) -> None:
         """Write what stands behind the rows."""
+        self._begin()
         self._writer.end(complete=complete)
+
+    def _begin(self) -> None:
+        if not self._is_begun:
+            self._is_begun = True
+            self._writer.begin()

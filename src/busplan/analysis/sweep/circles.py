@@ -1,16 +1,18 @@
 """Circle tests over a grid: one for each point, in any order and in any process."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from math import isnan
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from busplan.analysis.circle.estimate import NOTHING, announce, estimate
+from busplan.analysis.circle.estimate import NOTHING, Estimate, estimate
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, loop_timing, setup
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
-from busplan.analysis.sweep.grid import Grid
+from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -38,17 +40,46 @@ def all_columns(profile: Profile, grid: Grid, *, circle: Sequence[str]) -> tuple
     return (*grid.axes, *figure_names(profile), *circle)
 
 
-class CircleTask(NamedTuple):
-    """One point's circle test; a process can be handed it."""
+class CircleChunk(NamedTuple):
+    """Some points next to each other; a process can be handed it."""
 
     profile: Profile
-    changes: dict[str, object]
+    start: int
+    """Number of the first test, in the order of the grid."""
+    points: tuple[dict[str, object], ...]
+    """Values of the varied keys."""
 
 
-def run_task(task: CircleTask) -> Figures:
-    """Run the circle test of a point."""
-    (result,) = circle_test(override(task.profile, task.changes), explain=False).results
-    return tuple(getattr(result, name) for name in CIRCLE_COLUMNS)
+def run_chunk(chunk: CircleChunk) -> Array:
+    """Run the circle tests of a chunk.
+
+    Returns
+    -------
+    Array
+        Shape (points, CIRCLE_COLUMNS), as float64: truth values are 0 and 1, what is missing is NaN.
+    """
+    return np.array([_run(chunk.profile, point) for point in chunk.points], dtype=float)
+
+
+def _run(profile: Profile, point: dict[str, object]) -> list[float | None]:
+    (result,) = circle_test(override(profile, point), explain=False).results
+    return [getattr(result, name) for name in CIRCLE_COLUMNS]
+
+
+def figures_of(results: Array) -> Iterator[Figures]:
+    """Figures of each test, from `run_chunk`.
+
+    Parameters
+    ----------
+    results
+        Shape (points, CIRCLE_COLUMNS).
+    """
+    are_truths = [CIRCLE_BY_KEY[name].sort == "truth" for name in CIRCLE_COLUMNS]
+    for row in results.tolist():
+        yield tuple(
+            None if isnan(value) else bool(value) if is_truth else value
+            for value, is_truth in zip(row, are_truths, strict=True)
+        )
 
 
 def require_few(grid: Grid, *, seeds: int = 1, option: str, consent: str) -> None:
@@ -76,17 +107,8 @@ def require_few(grid: Grid, *, seeds: int = 1, option: str, consent: str) -> Non
         )
 
 
-def require_circles(profile: Profile, grid: Grid, *, seeds: int = 1) -> None:
-    """Refuse a grid with a point whose circle test cannot be run, before any is run; say what a long sweep costs.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    grid
-        The points.
-    seeds
-        Circle tests of each point.
+def check_chunk(chunk: CircleChunk) -> Estimate:
+    """Refuse a point whose circle test cannot be run; else say what all cost.
 
     Raises
     ------
@@ -95,9 +117,8 @@ def require_circles(profile: Profile, grid: Grid, *, seeds: int = 1) -> None:
         or the circle is too short for its ramps.
     """
     cost = NOTHING
-    for chunk in grid.chunks(1):
-        changes = chunk.point(0)
-        variant = override(profile, changes)
+    for changes in chunk.points:
+        variant = override(chunk.profile, changes)
         try:
             if bus(variant).fits:
                 cost = cost.then(estimate((), [setup(variant)]))
@@ -106,24 +127,20 @@ def require_circles(profile: Profile, grid: Grid, *, seeds: int = 1) -> None:
         except BusplanError as error:
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
             raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None
-    announce(cost._replace(steps=seeds * cost.steps, time_s=seeds * cost.time_s))
+    return cost
 
 
-def with_circles(
-    profile: Profile, block: SweepBlock, *, run: Callable[[Iterable[CircleTask]], Iterable[Figures]]
-) -> SweepBlock:
+def with_circles(block: SweepBlock, tests: Iterator[Figures]) -> SweepBlock:
     """Add the columns of circle tests to a block: one test a point, the same beside every timing model.
 
     Parameters
     ----------
-    profile
-        The network.
     block
         Its capacity.
-    run
-        Maps `run_task` over tasks, in this or other processes, in order.
+    tests
+        Figures of its points, and of those behind them.
     """
-    results = list(run(CircleTask(profile, block.chunk.point(index)) for index in range(block.chunk.points)))
+    results = list(islice(tests, block.chunk.points))
     circles = {
         name: _column(name, [point[place] for point in results], shape=block.chunk.shape)
         for place, name in enumerate(CIRCLE_COLUMNS)

@@ -1,6 +1,7 @@
 """Circle tests over many seeds: how the figures of each point are spread, and how often the circle fails."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from math import sqrt
 from statistics import NormalDist
 from types import MappingProxyType
@@ -10,11 +11,10 @@ import numpy as np
 
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, CircleTask, Figures
+from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, Figures
 from busplan.analysis.sweep.grid import Array, Grid, Values
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
-from busplan.sections.profile import Profile
 
 SEED: Final = "delivery.seed"
 """The key that a summary is over."""
@@ -93,29 +93,21 @@ def without_seed(grid: Grid, *, option: str) -> tuple[Grid, Values]:
     return Grid({key: axis for key, axis in grid.axes.items() if key != SEED}), grid.axes[SEED]
 
 
-def with_seeds(
-    profile: Profile, block: SweepBlock, seeds: Values, *, run: Callable[[Iterable[CircleTask]], Iterable[Figures]]
-) -> SweepBlock:
+def with_seeds(block: SweepBlock, tests: Iterator[Figures], seeds: int) -> SweepBlock:
     """Add the columns of a summary to a block: a circle test for each point and seed, the same beside every model.
 
     Parameters
     ----------
-    profile
-        The network.
     block
         Its capacity.
+    tests
+        Figures of its points, each with every seed, and of those behind them.
     seeds
-        Values of `SEED`.
-    run
-        As in `with_circles`.
+        Tests of each point.
     """
-    rows = [summary(list(run(_tasks(profile, block.chunk.point(index), seeds)))) for index in range(block.chunk.points)]
+    rows = [summary(list(islice(tests, seeds))) for _ in range(block.chunk.points)]
     columns = {name: _column([row[name] for row in rows], shape=block.chunk.shape) for name in SUMMARY_COLUMNS}
     return block._replace(models=tuple({**figures, **columns} for figures in block.models))
-
-
-def _tasks(profile: Profile, point: dict[str, object], seeds: Values) -> Iterator[CircleTask]:
-    return (CircleTask(profile, {**point, SEED: seed}) for seed in seeds.part(0, seeds.size).tolist())
 
 
 def _column(values: Sequence[float | None], *, shape: tuple[int, ...]) -> Column:

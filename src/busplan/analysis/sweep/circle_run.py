@@ -1,0 +1,212 @@
+"""Run the circle tests of a grid in chunks, on any executor: the same blocks whatever the chunks and their order."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from itertools import groupby, islice
+from typing import Final, NamedTuple, Protocol
+
+from busplan.analysis.circle.estimate import NOTHING, Estimate, announce
+from busplan.analysis.sweep.blocks import SweepBlock, sweep
+from busplan.analysis.sweep.circles import (
+    MOST_CIRCLES_UNASKED,
+    CircleChunk,
+    check_chunk,
+    figures_of,
+    run_chunk,
+    with_circles,
+)
+from busplan.analysis.sweep.execution import Here, ignored, run_in_order
+from busplan.analysis.sweep.grid import Array, Grid, Values
+from busplan.analysis.sweep.seeds import SEED, with_seeds
+from busplan.sections.profile import Profile
+
+_CHUNK_S: Final = 1.5
+"""Estimated time of a chunk: long beside the way to a worker, short enough to be lost."""
+_EACH_S: Final = 0.002
+"""Time of a test without its simulation."""
+_FEWEST_CHUNKS: Final = 64
+"""So many chunks, if there are tests enough, share out well."""
+_CHECKED_AT_ONCE: Final = 500
+"""Points of a chunk that is only checked: about a second."""
+_BLOCKS: Final = 1000
+_BLOCK_TESTS: Final = range(16, 4097)
+"""Tests of a block: by the grid alone, so that any executor gives the same row groups."""
+
+
+class CircleTests(NamedTuple):
+    """The circle tests of a sweep: one for each point, or for each point and seed."""
+
+    profile: Profile
+    grid: Grid
+    """Of the rows."""
+    seeds: Values | None = None
+    """Seeds of each row; None without a summary."""
+
+    @property
+    def each(self) -> int:
+        """Tests of a row."""
+        return 1 if self.seeds is None else self.seeds.size
+
+    @property
+    def number(self) -> int:
+        """All tests."""
+        return self.grid.points * self.each
+
+    def points(self) -> Iterator[dict[str, object]]:
+        """Values of the varied keys of each test, in the order of the grid; seeds change fastest."""
+        grid = self.grid if self.seeds is None else Grid({**self.grid.axes, SEED: self.seeds})
+        return _points(grid)
+
+
+class Kept(Protocol):
+    """Results of earlier runs, and a place for new ones."""
+
+    def __contains__(self, test: int, /) -> bool:
+        """Whether a test is known, by its number."""
+
+    def results(self, start: int, count: int) -> Array:
+        """Results of known tests, as from `run_chunk`."""
+
+    def add(self, start: int, results: Array) -> None:
+        """Keep the results of a chunk."""
+
+
+class _Nothing:
+    def __contains__(self, test: int) -> bool:
+        return False
+
+    def results(self, start: int, count: int) -> Array:
+        raise KeyError(start, count)
+
+    def add(self, start: int, results: Array) -> None:
+        pass
+
+
+NOTHING_KEPT: Final[Kept] = _Nothing()
+
+
+def require_circles(tests: CircleTests, executor: Executor, *, watch: Callable[[], None] = ignored) -> Estimate:
+    """Refuse a grid with a point whose circle test cannot be run, before any is run; say what a long sweep costs.
+
+    Parameters
+    ----------
+    tests
+        The tests.
+    executor
+        Where many points are checked.
+    watch
+        As in `run_in_order`.
+
+    Raises
+    ------
+    BusplanError
+        The first such point, as from `check_chunk`.
+    """
+    cost = NOTHING
+    where = executor if tests.grid.points > MOST_CIRCLES_UNASKED else Here()
+    chunks = _chunks(tests.profile, enumerate(_points(tests.grid)), _CHECKED_AT_ONCE)
+    for one in run_in_order(where, check_chunk, chunks, watch=watch):
+        cost = cost.then(one)
+    cost = cost._replace(steps=tests.each * cost.steps, time_s=tests.each * cost.time_s)
+    announce(cost)
+    return cost
+
+
+def circle_blocks(
+    tests: CircleTests,
+    executor: Executor,
+    *,
+    timing_models: Sequence[str],
+    cost: Estimate,
+    kept: Kept = NOTHING_KEPT,
+    progress: Callable[[int], None] = ignored,
+    watch: Callable[[], None] = ignored,
+) -> Iterator[SweepBlock]:
+    """Compute a sweep with its circle tests.
+
+    Parameters
+    ----------
+    tests
+        The tests.
+    executor
+        Where they run; it is not shut down.
+    timing_models
+        As in `sweep`.
+    cost
+        What all of them cost, from `require_circles`.
+    kept
+        What need not be computed.
+    progress
+        Called with the number of tests that are done, in whatever order.
+    watch
+        As in `run_in_order`.
+
+    Yields
+    ------
+    SweepBlock
+        In the order of the grid.
+
+    Raises
+    ------
+    Exception
+        As `run_in_order`.
+    """
+    done = 0
+
+    def known(chunk: CircleChunk) -> Array | None:
+        if chunk.start not in kept:
+            return None
+        count(chunk)
+        return kept.results(chunk.start, len(chunk.points))
+
+    def finished(chunk: CircleChunk, results: Array) -> None:
+        kept.add(chunk.start, results)
+        count(chunk)
+
+    def count(chunk: CircleChunk) -> None:
+        nonlocal done
+        done += len(chunk.points)
+        progress(done)
+
+    size = chunk_tests(tests.number, time_s=cost.time_s)
+    runs = groupby(enumerate(tests.points()), key=lambda one: one[0] in kept)
+    chunks = (chunk for _, run in runs for chunk in _chunks(tests.profile, run, size))
+    found = run_in_order(executor, run_chunk, chunks, known=known, finished=finished, watch=watch)
+    figures = (one for results in found for one in figures_of(results))
+    most = max(1, _within(tests.number // _BLOCKS, _BLOCK_TESTS) // tests.each)
+    for block in sweep(tests.profile, tests.grid, timing_models=timing_models, chunk_points=most):
+        yield with_circles(block, figures) if tests.seeds is None else with_seeds(block, figures, tests.each)
+
+
+def chunk_tests(number: int, *, time_s: float) -> int:
+    """Choose the tests of a chunk: about a second of work, and fewer where there would be few chunks.
+
+    Parameters
+    ----------
+    number
+        All tests.
+    time_s
+        Estimated time of all.
+
+    Examples
+    --------
+    >>> chunk_tests(100_000, time_s=6000), chunk_tests(640, time_s=38), chunk_tests(10, time_s=100)
+    (24, 10, 1)
+    """
+    by_time = int(_CHUNK_S / (time_s / number + _EACH_S))
+    return max(1, min(by_time, number // _FEWEST_CHUNKS))
+
+
+def _within(number: int, bounds: range) -> int:
+    return min(max(number, bounds[0]), bounds[-1])
+
+
+def _points(grid: Grid) -> Iterator[dict[str, object]]:
+    # Some at a time: an axis that is a list is looked through for each chunk.
+    return (chunk.point(index) for chunk in grid.chunks(_BLOCK_TESTS[-1]) for index in range(chunk.points))
+
+
+def _chunks(profile: Profile, points: Iterable[tuple[int, dict[str, object]]], most: int) -> Iterator[CircleChunk]:
+    left = iter(points)
+    while part := list(islice(left, most)):
+        yield CircleChunk(profile, part[0][0], tuple(point for _, point in part))

@@ -1,0 +1,139 @@
+"""The seam of execution: tasks on any executor, a bounded number at once, done in any order, given in theirs."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future
+from functools import partial
+from queue import Empty, SimpleQueue
+from typing import Final, TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+MOST_OUTSTANDING: Final = 512
+"""Most tasks that are handed over and not given back: a cluster has enough to do, and memory stays flat."""
+_GLANCE_S: Final = 0.2
+"""Longest time between two calls of `watch`."""
+
+
+class Here(Executor):
+    """Runs each task at once, in this thread."""
+
+    def submit(self, fn: Callable[..., Result], /, *args: object, **kwargs: object) -> "Future[Result]":
+        """Run a task.
+
+        Parameters
+        ----------
+        fn
+            A function.
+        *args, **kwargs
+            Its arguments.
+        """
+        future: Future[Result] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - who asks for the result gets it
+            future.set_exception(error)
+        return future
+
+
+def unknown(_task: object) -> None:
+    """Know no result: every task is run."""
+
+
+def ignored(*_: object) -> None:
+    """Do nothing."""
+
+
+def run_in_order(
+    executor: Executor,
+    function: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    *,
+    known: Callable[[Task], Result | None] = unknown,
+    finished: Callable[[Task, Result], None] = ignored,
+    watch: Callable[[], None] = ignored,
+    most: int = MOST_OUTSTANDING,
+) -> Iterator[Result]:
+    """Run tasks on an executor, which is not shut down.
+
+    Parameters
+    ----------
+    executor
+        Where they run.
+    function
+        What is done: for other processes, a function at the top of its module.
+    tasks
+        Its arguments; they are taken as there is room.
+    known
+        A result that need not be computed, or None.
+    finished
+        Called with each task that was run, as soon as it is done.
+    watch
+        Called some times a second and after each task; what it raises ends the run.
+    most
+        Most tasks that are handed over and not given back.
+
+    Yields
+    ------
+    Result
+        In the order of the tasks.
+
+    Raises
+    ------
+    Exception
+        What the first task that failed raised, after the results of those before it.
+    CancelledError
+        The executor cancelled a task.
+    """
+    left = iter(tasks)
+    done: SimpleQueue[int] = SimpleQueue()
+    outstanding: dict[int, tuple[Task, Future[Result]]] = {}
+    results: dict[int, Future[Result]] = {}
+    taken = given = 0
+    is_open = True
+    try:
+        while is_open or given < taken:
+            # A task that is done is looked at before another is handed over.
+            while is_open and taken - given < most and done.empty() and given not in results:
+                try:
+                    task = next(left)
+                except StopIteration:
+                    is_open = False
+                    break
+                result = known(task)
+                if result is None:
+                    future = executor.submit(function, task)
+                    outstanding[taken] = task, future
+                    future.add_done_callback(partial(_note, done, taken))
+                else:
+                    results[taken] = Here().submit(lambda found: found, result)
+                taken += 1
+            for place in _those_done(done, is_waiting=given < taken and given not in results):
+                task, future = outstanding.pop(place)
+                results[place] = future
+                if future.cancelled() or future.exception() is not None:
+                    is_open = False
+                else:
+                    finished(task, future.result())
+            watch()
+            while given in results:
+                future = results.pop(given)
+                given += 1
+                yield future.result()
+    finally:
+        for _, future in outstanding.values():
+            future.cancel()
+
+
+def _note(done: SimpleQueue[int], place: int, _: "Future[Result]") -> None:
+    done.put(place)
+
+
+def _those_done(done: SimpleQueue[int], *, is_waiting: bool) -> Iterator[int]:
+    """Give the places of all that is done; wait a little for the first."""
+    try:
+        yield done.get(timeout=_GLANCE_S) if is_waiting else done.get_nowait()
+        while True:
+            yield done.get_nowait()
+    except Empty:
+        return
