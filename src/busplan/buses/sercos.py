@@ -1,9 +1,10 @@
 """What SERCOS I, II and III share: how long feedback and a command are on their way."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import reduce
 from typing import Final, TypeAlias
 
+from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusLatency
 from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
 from busplan.buses.network import Group, Network
@@ -52,17 +53,6 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
     )
 
 
-def subject(setup: Iterable[str]) -> str:
-    """Say whose delay it is, and how the bus is set.
-
-    Parameters
-    ----------
-    setup
-        How the bus is set.
-    """
-    return ", ".join(("feedback and commands of all nodes", *setup))
-
-
 def _slowest(network: Network, execution_us: Callable[[Group], Number]) -> Number:
     return reduce(larger, (execution_us(one) + one.worst_extra_us for one in network.groups))
 
@@ -71,3 +61,24 @@ def _delay(name: str, *parts_us: Number) -> BusLatency:
     *parts, whole = DELAYS
     phases = dict(zip((one.key for one in parts), parts_us, strict=True))
     return BusLatency(name, None, {**phases, whole.key: total(parts_us)})
+
+
+class SercosBus(Bus):
+    """A ring of SERCOS: its drives work beside the telegrams."""
+
+    @property
+    def latency_figures(self) -> tuple[Figure, ...]:
+        """Of `latency`, in the order of its document."""
+        return LATENCY
+
+    def latency_subject(self, network: Network) -> str:
+        """Say whose delay it is, and how the bus is set."""
+        return ", ".join(("feedback and commands of all nodes", *self.setup_words(network)))
+
+    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
+        """It runs beside the telegrams: drives sample before their telegram, and act behind the last MDT."""
+        return False
+
+    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
+        """The nodes' time is in every latency."""
+        return True

@@ -3,12 +3,11 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus
-from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, LATENCY, MEASURE, WHOLE_PERIOD, subject
+from busplan.buses.sercos import BASE, DELAYS, MEASURE, WHOLE_PERIOD, SercosBus
 from busplan.buses.sercos2 import figures, rules
 from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US, WORD_BYTES
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
@@ -24,7 +23,7 @@ _TELEGRAMS: Final = figures.MDT_BYTES.reference
 _FASTEST: Final = 16
 
 
-class Sercos2(Bus):
+class Sercos2(SercosBus):
     """SERCOS I and II, whose drives answer one after the other, and are told in one telegram."""
 
     kind = "sercos2"
@@ -92,23 +91,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
     def cycle(self, network: Network, *, model: str) -> Sercos2Cycle:
         """The cycle of a network under one timing model."""
         return Sercos2Cycle(network, model)
-
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return LATENCY
-
-    def latency_subject(self, network: Network) -> str:
-        """Say whose delay it is."""
-        return subject(self.setup_words(network))
-
-    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
-        """It runs beside the telegrams: drives sample before MST, and act behind the MDT."""
-        return False
-
-    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
-        """The nodes' time is in every latency."""
-        return True
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """A longer gap, and the fastest ring."""

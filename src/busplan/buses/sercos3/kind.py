@@ -3,12 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from busplan.buses.bus import Bus
-from busplan.buses.figure import NONPERIODIC, Figure
+from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, LATENCY, MEASURE, WHOLE_PERIOD, subject
+from busplan.buses.sercos import BASE, DELAYS, MEASURE, WHOLE_PERIOD, SercosBus
 from busplan.buses.sercos3 import figures, rules
 from busplan.buses.sercos3.constants import (
     CONNECTION_BYTES,
@@ -36,7 +35,7 @@ _METHOD: Final = "bus.timing_method"
 _METHODS: Final = ("mdt-at-ucc", "mdt-ucc-at", "at-last")
 
 
-class Sercos3(Bus):
+class Sercos3(SercosBus):
     """SERCOS III, whose devices take their data from the MDT and put theirs into the AT while these pass."""
 
     kind = "sercos3"
@@ -112,23 +111,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     def cycle(self, network: Network, *, model: str) -> Sercos3Cycle:
         """The cycle of a network under one timing model."""
         return Sercos3Cycle(network, model)
-
-    @property
-    def latency_figures(self) -> tuple[Figure, ...]:
-        """Of `latency`, in the order of its document."""
-        return LATENCY
-
-    def latency_subject(self, network: Network) -> str:
-        """Say whose delay it is."""
-        return subject(self.setup_words(network))
-
-    def has_execution(self, network: Network) -> bool:  # noqa: ARG002 - none has
-        """It runs beside the telegrams: devices sample before the AT begin, and act behind the MDT."""
-        return False
-
-    def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
-        """The nodes' time is in every latency."""
-        return True
 
     def settings(self, network: Network) -> tuple[Setting, ...]:
         """The other timing methods, in the order of CoSeMa."""
