@@ -12,7 +12,7 @@ from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, tak
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.output import write_document
-from busplan.cli.pictures import picture_form, picture_title
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
 from busplan.cli.vary import VALUES_HELP, parse_axis
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
@@ -67,8 +67,7 @@ def map_command(
         MapForm | None,
         typer.Option(
             "--format",
-            help="Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
-            "(matplotlib).  [default: by the ending of --output, else table]",
+            help=PICTURE_FORMAT_HELP,
             show_default=False,
         ),
     ] = None,

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from busplan.cli.options import AnyForm, form_of_file
 from busplan.cli.output import refuse_terminal
@@ -10,6 +10,13 @@ from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
     from busplan.forms.blocks import Sentence
+
+
+PICTURE_FORMAT_HELP: Final = (
+    "Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
+    "(matplotlib).  [default: by the ending of --output, else table]"
+)
+"""Of --format, where an answer may also be SVG or PNG."""
 
 
 def picture_form(given: AnyForm | None, output: Path | None, *, forms: Mapping[str, AnyForm]) -> AnyForm:

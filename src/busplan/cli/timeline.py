@@ -19,7 +19,7 @@ from busplan.cli.options import (
     timing_model,
 )
 from busplan.cli.output import write_document
-from busplan.cli.pictures import picture_form, picture_title
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -88,8 +88,7 @@ def timeline_command(
         TimelineForm | None,
         typer.Option(
             "--format",
-            help="Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
-            "(matplotlib).  [default: by the ending of --output, else table]",
+            help=PICTURE_FORMAT_HELP,
             show_default=False,
         ),
     ] = None,
