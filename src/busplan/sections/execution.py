@@ -68,6 +68,15 @@ class LinearExecution(GradedExecution):
     base_us: TimeUs = Field(description="Execution time of an empty payload [us]", examples=[30])
     per_byte_us: TimeUs = Field(description="What each byte of payload adds [us/byte]", examples=[0.35])
 
+    @property
+    def ascends_from_bytes(self) -> int:
+        """The payload from which on no larger one takes less time."""
+        return 0
+
+    def covers(self, payload_bytes: int) -> bool:
+        """Tell whether the execution time of that payload is known."""
+        return payload_bytes >= 0
+
     def execution_us(self, payload_bytes: Number) -> Number:
         """Execution time T_exec of one transaction with that payload [us]."""
         return self.base_us + self.per_byte_us * payload_bytes
@@ -102,6 +111,12 @@ class TableExecution(GradedExecution):
         if problems:
             raise refused(*problems)
         return self
+
+    @property
+    def ascends_from_bytes(self) -> int:
+        """The payload from which on no larger one takes less time."""
+        falls = [self.payload_bytes[at + 1] for at, (one, other) in enumerate(pairwise(self.time_us)) if other < one]
+        return falls[-1] if falls else 0
 
     def covers(self, payload_bytes: int) -> bool:
         """Tell whether the execution time of that payload is known."""

@@ -366,9 +366,7 @@ class _Compared(NamedTuple):
 
 def _compared(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> list[_Compared]:
     sizes = {one.payload_bytes for one, _ in raw}
-    fitted_us = {
-        size: plain(fit.execution_us(size)) for size in sizes if isinstance(fit, LinearExecution) or fit.covers(size)
-    }
+    fitted_us = {size: plain(fit.execution_us(size)) for size in sizes if fit.covers(size)}
     return [
         _Compared(
             one, packets_us, round(one.latency_us - packets_us, _EXACT_DECIMALS), fitted_us.get(one.payload_bytes)

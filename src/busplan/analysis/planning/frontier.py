@@ -1,5 +1,6 @@
 """What a network could reach with all that is cheap free: the shortest period, the largest payload, the most nodes."""
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from math import inf
 
@@ -54,15 +55,23 @@ def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
 
 
 def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
-    """For reads and writes alike. Every size is tried: an execution table need not ascend."""
+    """For reads and writes alike. Where a larger one may take less time, every size is tried."""
     title, payloads = "largest payload", bus_of(goal).payloads(network_of(goal))
     step = payloads.step_bytes
     largest, tried = payloads.most_bytes // step * step, None
-    for size in range(largest, 0, -step):
-        one = with_payload(goal, size)
-        if one is None:
-            why = "each group has its own" if goal.group else "the payload follows the axes of a node"
-            return Impossible(title, why)
+    if with_payload(goal, largest) is None:
+        return Impossible(title, "each group has its own" if goal.group else "the payload follows the axes of a node")
+    execution = goal.alike_nodes[0].node.execution
+    sizes = [size for size in range(step, largest + 1, step) if execution.covers(size)]
+
+    def is_out(size: int) -> bool:
+        one = with_payload(goal, size) or {}
+        return not (search.allows(one) and search.reaches(one, cheap))
+
+    first = bisect_left(sizes, execution.ascends_from_bytes)
+    del sizes[bisect_left(sizes, True, lo=first, key=is_out) + 1 :]
+    for size in reversed(sizes):
+        one = with_payload(goal, size) or {}
         if not search.allows(one):
             continue
         found = search.least(cheap, one) if search.reaches(one, cheap) else None

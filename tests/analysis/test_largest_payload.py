@@ -1,0 +1,50 @@
+"""The largest payload that a plan names, against larger ones, on random profiles of every kind of bus."""
+
+from collections.abc import Mapping
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.capacity.figures import figures
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.constraints import keeps_limits, refused_period
+from busplan.analysis.planning.plan import plan
+from busplan.buses import kind_names
+from busplan.profile.toml import override
+from busplan.sections.profile import Profile
+
+SOME = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.mark.parametrize("kind", kind_names())
+@SOME
+@given(data=st.data())
+def test_it_is_good_and_no_larger_one_is(
+    kind: str, data: st.DataObject, profiles_by_kind: Mapping[str, st.SearchStrategy[Profile]]
+) -> None:
+    own = data.draw(profiles_by_kind[kind])
+    payloads = bus_of(own).payloads(network_of(own))
+    most, step = payloads.most_bytes, payloads.step_bytes
+    if own.group or own.payload.follows_axes or most < 4 * step:
+        return
+    # Times that rise, fall or do both, of which about half a period allows.
+    given_us = own.cycle.period_us * own.cycle.slice_ratio / own.bus.nodes
+    times_us = data.draw(st.lists(st.integers(0, 100).map(lambda share: share * given_us / 100), min_size=4, max_size=4))
+    table = {"kind": "table", "payload_bytes": [1, 2 * step, most // 2, most], "time_us": times_us}
+    both = {"payload.read_bytes": step, "payload.write_bytes": step, "node.execution": table}
+    goal = override(own, both)
+
+    def is_good(size: int) -> bool:
+        profile = override(goal, {"payload.read_bytes": size, "payload.write_bytes": size})
+        found = figures(profile, model=bus_of(profile).deciding_model)
+        at_period = keeps_limits(network_of(profile)) and not refused_period(profile, profile.cycle.period_us)
+        return bool(found.verdict == FITS and found.safe and at_period)
+
+    said = [one.changes for one in plan(goal, free=[]).options if one.title == "largest payload"]
+    largest = int(said[0].get("payload.read_bytes", step)) if said else 0
+    assert not largest or is_good(largest)
+    above = range(largest + step, most + 1, step)
+    if above:
+        assert not any(map(is_good, {above[0], *data.draw(st.lists(st.sampled_from(above), max_size=8))}))
