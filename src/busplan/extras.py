@@ -34,3 +34,13 @@ def require_extra(library: str, *, extra: str, option: str, module: str) -> None
             f"{option} needs {library}, and the installed one does not load ({type(error).__name__}: {error}); "
             f"install it again, as in pip install --force-reinstall {library}"
         ) from None
+
+
+def require_matplotlib(option: str) -> None:
+    """Refuse to start if no figure can be drawn; as `require_extra`."""
+    require_extra("matplotlib", extra="plot", option=option, module="matplotlib.figure")
+
+
+def require_pyarrow(option: str) -> None:
+    """Refuse to start if no Parquet file can be written; as `require_extra`."""
+    require_extra("pyarrow", extra="table", option=option, module="pyarrow.parquet")

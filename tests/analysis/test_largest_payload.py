@@ -27,10 +27,11 @@ def test_it_is_good_and_no_larger_one_is(
     own = data.draw(profiles_by_kind[kind])
     payloads = bus_of(own).payloads(network_of(own))
     most, step = payloads.most_bytes, payloads.step_bytes
-    if own.group or own.payload.follows_axes or most < 4 * step:
+    nodes = own.alike_nodes[0]
+    if own.group or nodes.payload.follows_axes or most < 4 * step:
         return
     # Times that rise, fall or do both; two of a node's transactions take the longest one's share of the slice.
-    given_us = own.cycle.period_us * own.cycle.slice_ratio / own.bus.nodes
+    given_us = own.cycle.period_us * own.cycle.slice_ratio / nodes.nodes
     times_us = [share * given_us / 2 for share in data.draw(st.permutations([0.0, 0.05, 0.3, 1.0]))]
     table = {"kind": "table", "payload_bytes": [1, 2 * step, most // 2, most], "time_us": times_us}
     both = {"payload.read_bytes": step, "payload.write_bytes": step, "node.execution": table}

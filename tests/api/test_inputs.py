@@ -180,15 +180,15 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a title of two lines": (lambda: busplan.report("paper-4ms", title="a\nb"), "title 'a\\nb': expected words"),
     "another ending": (
         lambda: busplan.latency("paper-4ms").save("x.pdf"),
-        "x.pdf: expected a name ending in .txt, .md, .html, .csv, .json",
+        "x.pdf: expected a name ending in .txt, .md, .html, .csv, .json, .svg",
     ),
     "a picture that there is not": (
         lambda: busplan.latency("paper-4ms").save("x.svg"),
-        "x.svg: expected a name ending in .txt, .md, .html, .csv, .json; this answer has no picture",
+        "there is nothing to draw: this answer has no picture",
     ),
     "a folder that there is not": (
         lambda: busplan.latency("paper-4ms").save("nowhere/x.md"),
-        "nowhere/x.md: cannot be written: No such file or directory",
+        "nowhere/x.md: cannot be written: there is no folder ",
     ),
 }
 

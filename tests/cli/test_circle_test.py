@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from busplan.cli.output import new_file
 from busplan.errors import BusplanError
+from busplan.files import new_file
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
-from busplan.cli.output import new_file, write_file
 from busplan.errors import BusplanError
+from busplan.files import new_file, write_file
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]

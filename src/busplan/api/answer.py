@@ -3,13 +3,21 @@
 import json
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from busplan.errors import BusplanError
+from busplan.extras import require_matplotlib, require_pyarrow
+from busplan.files import document_bytes, write_file
 from busplan.forms import ENDINGS, Form, render
 from busplan.forms.blocks import Report
 from busplan.forms.terminal import block_lines
+
+_LIBRARIES: Final = MappingProxyType({".png": require_matplotlib, ".parquet": require_pyarrow})
+"""What must be there for a file, by ending."""
 
 
 class Answer(ABC):
@@ -36,30 +44,37 @@ class Answer(ABC):
         return render(self._report(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the answer to a file in the form of its ending; an old file is replaced.
+        """Write the answer to a file in the form of its ending; an old file is whole until the new one replaces it.
 
         Parameters
         ----------
         path
-            A name ending in .html, .md, .txt, .json or .csv; .svg for an answer with a picture.
+            A name ending in .html, .md, .txt, .json or .csv; .svg for an answer with a picture. Maps, comparisons of
+            buses and timelines take .png (with the extra `plot`), timelines .mmd, and sweeps .jsonl and .parquet (with
+            the extra `table`).
 
         Raises
         ------
         BusplanError
             Another ending, a form that the answer does not have, or the file cannot be written.
         """
-        ending = Path(path).suffix.lower()
-        svg = self._repr_svg_() if ending == ".svg" else None
-        if svg is None and ending not in ENDINGS:
-            picture = "; this answer has no picture" if ending == ".svg" else ""
-            raise BusplanError(f"{path}: expected a name ending in {', '.join(ENDINGS)}{picture}")
-        text = svg or self._text(ENDINGS[ending])
-        try:
-            # Bytes of a path that are not UTF-8 become escapes, as on the command line.
-            Path(path).write_bytes(text.encode("utf-8", "backslashreplace"))
-        except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-            reason = error.strerror if isinstance(error, OSError) else str(error)
-            raise BusplanError(f"{path}: cannot be written: {reason}") from None
+        contents, ending = self._contents(), Path(path).suffix.lower()
+        if ending not in contents:
+            raise BusplanError(f"{path}: expected a name ending in {', '.join(contents)}")
+        if ending in _LIBRARIES:
+            _LIBRARIES[ending](str(path))
+        write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
+
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        """What makes the content of a file, by ending."""
+        return {**{ending: partial(self._text, form) for ending, form in ENDINGS.items()}, ".svg": self._svg}
+
+    def _svg(self) -> str:
+        """The picture, which not every answer has."""
+        found = self._repr_svg_()
+        if found is None:
+            raise BusplanError("there is nothing to draw: this answer has no picture")
+        return found
 
     def _text(self, form: Form) -> str:
         """The answer in a form."""
@@ -88,3 +103,19 @@ class Answer(ABC):
         from busplan.forms.picture import first_picture
 
         return first_picture(self._report().blocks())
+
+
+class DrawnAnswer(Answer):
+    """An answer that is a picture, which a file may hold alone."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def _pictures(self) -> Mapping[str, Callable[[], str | bytes]]:
+        """What draws it, by ending."""
+
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        return {**super()._contents(), **self._pictures()}
+
+    def _repr_svg_(self) -> str | None:
+        return str(self._pictures()[".svg"]())

@@ -1,9 +1,10 @@
 """`busplan.sweep`."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -24,7 +25,7 @@ from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
 from busplan.api.renamed import renamed
 from busplan.errors import BusplanError
-from busplan.forms import Form, RowsForm
+from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Report
 from busplan.forms.csv_rows import spelled
 from busplan.profile.kinds import words_of
@@ -84,10 +85,9 @@ class SweepAnswer(Answer):
         """Write the document of `busplan sweep --format json`."""
         return self._rows_in("json").decode()
 
-    def _text(self, form: Form) -> str:
-        if form == "csv":
-            return self._rows_in("csv").decode()
-        return Answer._text(self, form)  # noqa: SLF001 - super() knows no class with slots made anew
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        rows = {ending: partial(self._rows_in, form) for ending, form in ROWS_ENDINGS.items()}
+        return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
 
     def _rows_in(self, form: RowsForm) -> bytes:
         """Every row in a form."""

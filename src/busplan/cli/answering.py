@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 from busplan.cli.destinations import require_apart
 from busplan.cli.options import form_of_file
-from busplan.cli.output import document_bytes, emit_document, emit_text, is_styled, new_file, say
+from busplan.cli.output import emit_document, emit_text, is_styled, say
 from busplan.errors import BusplanError, PlacedError, WorkerLostError
+from busplan.files import document_bytes, new_file
 from busplan.forms import ENDINGS, Form, render
 from busplan.profile.changes import NO_CHANGES, SET, KeyChanges
 

@@ -18,9 +18,10 @@ from busplan.cli.changes import (
 )
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, FormatOption, OutputOption, ProfileArgument, plot_format
-from busplan.cli.output import NewFile, PlanFailsError, new_file, say
+from busplan.cli.output import PlanFailsError, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
+from busplan.files import NewFile, new_file
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:

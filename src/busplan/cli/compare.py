@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal, assert_never
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -13,16 +13,16 @@ from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.output import write_document
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
+from busplan.drawings.pictures import PICTURES, Picture
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.comparison.kinds import KindComparison
 
-Picture = Literal["svg", "png"]
 CompareForm = Literal[Form, Picture]
 
-_ENDINGS: Final[Mapping[str, CompareForm]] = MappingProxyType({**ENDINGS, ".svg": "svg", ".png": "png"})
+_ENDINGS: Final[Mapping[str, CompareForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 
 
 def _complete_kinds(incomplete: str) -> list[str]:
@@ -105,17 +105,7 @@ def _found(profile: str, buses: str | None, changes: KeyChanges, *, with_circle:
 def _picture(found: "KindComparison", form: Picture, changes: KeyChanges) -> str | bytes:
     """The drawing as a file of its own."""
     from busplan.answers.compare import headline, require_drawn
+    from busplan.drawings.pictures import compare_picture
 
     require_drawn(found)
-    title = picture_title(headline(found), changes)
-    match form:
-        case "svg":
-            from busplan.drawings.compare.svg import compare_svg
-
-            return compare_svg(found, title=title)
-        case "png":
-            from busplan.drawings.compare.png import compare_png
-
-            return compare_png(found, title=title)
-        case _:
-            assert_never(form)
+    return compare_picture(found, form, title=picture_title(headline(found), changes))

@@ -9,8 +9,9 @@ import typer
 
 from busplan.buses import kind_named, kind_names
 from busplan.cli.options import complete_profile, time_us
-from busplan.cli.output import say, write_file
+from busplan.cli.output import say
 from busplan.errors import BusplanError
+from busplan.files import write_file
 
 if TYPE_CHECKING:
     from busplan.profile.starter import Machine

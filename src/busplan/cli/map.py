@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal, assert_never
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -14,6 +14,7 @@ from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.output import write_document
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
 from busplan.cli.vary import VALUES_HELP, parse_axis
+from busplan.drawings.pictures import PICTURES, Picture
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -23,10 +24,9 @@ if TYPE_CHECKING:
     from busplan.analysis.map.trade_off import TradeOff
     from busplan.sections.profile import Profile
 
-Picture = Literal["svg", "png"]
 MapForm = Literal[Form, Picture]
 
-_ENDINGS: Final[Mapping[str, MapForm]] = MappingProxyType({**ENDINGS, ".svg": "svg", ".png": "png"})
+_ENDINGS: Final[Mapping[str, MapForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 
 
 def _along(option: str, *, default: str) -> typer.models.OptionInfo:
@@ -124,16 +124,6 @@ def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: b
 def _picture(found: "TradeOff", form: Picture, changes: KeyChanges) -> str | bytes:
     """The drawing as a file of its own."""
     from busplan.answers.map import headline
+    from busplan.drawings.pictures import map_picture
 
-    title = picture_title(headline(found), changes)
-    match form:
-        case "svg":
-            from busplan.drawings.map.svg import map_svg
-
-            return map_svg(found, title=title)
-        case "png":
-            from busplan.drawings.map.png import map_png
-
-            return map_png(found, title=title)
-        case _:
-            assert_never(form)
+    return map_picture(found, form, title=picture_title(headline(found), changes))

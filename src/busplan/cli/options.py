@@ -129,12 +129,13 @@ def plot_format(path: Path) -> str:
     BusplanError
         Another ending, or matplotlib is not installed.
     """
-    from busplan.drawings.circle_plot import PLOT_FORMATS, require_matplotlib
+    from busplan.drawings.circle_plot import PLOT_FORMATS
+    from busplan.extras import require_matplotlib
 
     file_format = path.suffix.removeprefix(".").lower()
     if file_format not in PLOT_FORMATS:
         raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
-    require_matplotlib()
+    require_matplotlib("--plot")
     return file_format
 
 

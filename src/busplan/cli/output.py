@@ -1,26 +1,17 @@
-"""All output: documents to stdout, messages to stderr, files atomically."""
+"""All output: documents to stdout, messages to stderr."""
 
-import io
 import os
-import stat
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from errno import EISDIR
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-from busplan.cli.interrupt import StoppedError
 from busplan.errors import BusplanError
+from busplan.files import document_bytes, write_file
 
 PLAN_FAILS: int = 1
 """Exit code if the answer is that the plan fails."""
 CANNOT: int = 2
 """Exit code if the program could not do its job."""
-
-_LONG_NAME = 200
-_NEW_MODE = 0o666
-"""Permissions of a new file, before the umask."""
 
 
 class PlanFailsError(Exception):
@@ -62,11 +53,6 @@ def emit_document(document: str | bytes) -> None:
     sys.stdout.buffer.flush()
 
 
-def document_bytes(document: str | bytes) -> bytes:
-    """Encode a document as UTF-8; bytes of a path that are not UTF-8 become JSON escapes."""
-    return document.encode("utf-8", "backslashreplace") if isinstance(document, str) else document
-
-
 def refuse_terminal(form: str) -> None:
     """Refuse to write binary data to a terminal.
 
@@ -103,160 +89,3 @@ def is_terminal() -> bool:
 def is_styled() -> bool:
     """Whether to write colours: on a terminal, or with FORCE_COLOR."""
     return os.environ.get("FORCE_COLOR", "0") not in ("", "0") or is_terminal()
-
-
-def write_file(path: Path, content: bytes, *, overwrite: bool) -> None:
-    """Write a file atomically.
-
-    Raises
-    ------
-    BusplanError
-        It exists and `overwrite` is false, or it cannot be written.
-    """
-    with new_file(path, overwrite=overwrite) as file:
-        file.write(content)
-
-
-def partial_path(path: Path) -> Path:
-    """File name for the output of a stopped run: rows.csv becomes rows.partial.csv."""
-    return path.with_name(f"{path.stem}.partial{path.suffix}")
-
-
-@contextmanager
-def new_file(path: Path, *, overwrite: bool, keeps_partial: bool = False) -> Iterator["NewFile"]:
-    """Open a file for atomic writing: a temporary file next to it is renamed at the end.
-
-    It is opened at once, so that a path that cannot be written fails before the work. After an error, the old file is
-    unchanged. With `keeps_partial`, a `StoppedError` leaves the output so far under `partial_path`.
-
-    Raises
-    ------
-    BusplanError
-        It exists and `overwrite` is false, or it cannot be written.
-    """
-    target = Path(os.path.realpath(path))
-    # A name of the greatest length leaves no room for a suffix.
-    stem = target.name if len(os.fsencode(target.name)) <= _LONG_NAME else "busplan"
-    temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
-    stopped: StoppedError | None = None
-    with ExitStack() as last:
-        with _named(path, target):
-            mode = _mode_of(target, overwrite=overwrite)
-            last.callback(_remove, temporary)
-            file = NewFile(_Raw(temporary, path=path, target=target))
-        last.callback(_close, file)
-        try:
-            # Errors of the caller's own work pass through.
-            yield file
-        except StoppedError as error:
-            if not keeps_partial:
-                raise
-            stopped, target, overwrite = error, partial_path(target), True
-        if file.abandoned:
-            return
-        with _named(path, target):
-            file.flush()
-            os.fsync(file.fileno())
-            _give_name(file.fileno(), temporary)
-            file.close()
-            if mode is not None:
-                temporary.chmod(mode)
-            if overwrite:
-                temporary.replace(target)
-            else:
-                _rename_new(temporary, target)
-        if stopped is not None:
-            raise stopped
-
-
-class _Raw(io.FileIO):
-    """A new file whose write errors name the user's path: a full disk shows in the caller's own write."""
-
-    def __init__(self, temporary: Path, *, path: Path, target: Path) -> None:
-        self._names = path, target
-        super().__init__(temporary, "xb", opener=_opened)
-
-    def write(self, data: Any, /) -> int:
-        with _named(*self._names):
-            return super().write(data)
-
-
-class NewFile(io.BufferedWriter):
-    """A file that is not complete yet."""
-
-    abandoned = False
-
-    def abandon(self) -> None:
-        """Discard the new file at the end and leave an old one unchanged."""
-        self.abandoned = True
-
-
-def _opened(temporary: str, flags: int) -> int:
-    """Open a file without a name, if the system supports it, so that a killed process leaves nothing behind."""
-    if hasattr(os, "O_TMPFILE") and Path("/proc/self/fd").is_dir():
-        with suppress(OSError):
-            return os.open(Path(temporary).parent, os.O_TMPFILE | os.O_WRONLY, _NEW_MODE)
-    return os.open(temporary, flags, _NEW_MODE)
-
-
-def _give_name(descriptor: int, temporary: Path) -> None:
-    if os.fstat(descriptor).st_nlink:
-        return
-    nameless = f"/proc/self/fd/{descriptor}"
-    try:
-        # src_dir_fd is not used by an absolute path, but makes Python follow the link.
-        os.link(nameless, temporary, src_dir_fd=descriptor)
-    except OSError:  # a file system without hard links
-        from shutil import copyfile
-
-        copyfile(nameless, temporary)
-
-
-def _close(file: NewFile) -> None:
-    with suppress(OSError, ValueError, BusplanError):
-        file.close()
-
-
-def _remove(temporary: Path) -> None:
-    with suppress(OSError, ValueError):
-        temporary.unlink()
-
-
-@contextmanager
-def _named(path: Path, target: Path) -> Iterator[None]:
-    """Convert errors of the operating system to messages with the user's path."""
-    try:
-        yield
-    except FileExistsError:
-        raise BusplanError(f"{path}: already there; give another name, or --force to overwrite it") from None
-    except FileNotFoundError:
-        raise BusplanError(f"{path}: cannot be written: there is no folder {target.parent}") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise BusplanError(f"{path}: cannot be written: {reason}") from None
-
-
-def _mode_of(target: Path, *, overwrite: bool) -> int | None:
-    """Permissions of the file to be replaced, None for a new file; refuse one that may not be replaced."""
-    if not os.path.lexists(target):
-        return None
-    if not overwrite:
-        raise FileExistsError
-    status = target.stat()
-    if stat.S_ISDIR(status.st_mode):
-        raise IsADirectoryError(EISDIR, os.strerror(EISDIR))
-    if not stat.S_ISREG(status.st_mode):
-        raise ValueError("is not a regular file")
-    return stat.S_IMODE(status.st_mode)
-
-
-def _rename_new(temporary: Path, target: Path) -> None:
-    """Rename a file, but never over an existing one."""
-    try:
-        os.link(temporary, target)
-    except FileExistsError:
-        raise
-    except OSError:  # a file system without hard links: not atomic
-        if os.path.lexists(target):
-            raise FileExistsError from None
-        temporary.replace(target)

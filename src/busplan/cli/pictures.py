@@ -40,7 +40,7 @@ def picture_form(given: AnyForm | None, output: Path | None, *, forms: Mapping[s
     if chosen == forms[".png"]:
         if output is None:
             refuse_terminal(chosen)
-        from busplan.drawings.circle_plot import require_matplotlib
+        from busplan.extras import require_matplotlib
 
         require_matplotlib(f"--format {chosen}")
     return chosen

@@ -12,9 +12,10 @@ from busplan.cli.apply import apply_changes, require_own_file
 from busplan.cli.changes import GAP_COUNT, NODES, RESERVE, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument
-from busplan.cli.output import NewFile, PlanFailsError, emit_document, new_file, say
+from busplan.cli.output import PlanFailsError, emit_document, say
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
+from busplan.files import NewFile, new_file
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 

@@ -12,8 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from busplan.cli.output import NewFile, new_file, say
+from busplan.cli.output import say
 from busplan.errors import BusplanError
+from busplan.files import NewFile, new_file
 
 PATIENCE_S: Final = 30.0
 """Longest wait for another run, which only reads and writes a short file."""

@@ -18,19 +18,20 @@ from busplan.cli.options import (
     output_option,
     plot_format,
 )
-from busplan.cli.output import partial_path, refuse_terminal
+from busplan.cli.output import refuse_terminal
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
-from busplan.extras import require_extra
-from busplan.forms import ENDINGS
+from busplan.extras import require_extra, require_pyarrow
+from busplan.files import partial_path
+from busplan.forms import ENDINGS, ROWS_ENDINGS
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
     from busplan.analysis.sweep.grid import Grid
     from busplan.sections.profile import Profile
 
-_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, ".jsonl": "jsonl", ".parquet": "parquet"})
+_ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
 _DEFAULT_FIGURE: Final = "safe_axes"
 _FIGURE_OF_GROUPS: Final = "margin_corrected_us"
@@ -234,12 +235,7 @@ def _require_parquet(output: Path | None, *, typed: str | None) -> None:
     """Refuse a table that cannot be written, or that nobody can read."""
     if output is None:
         refuse_terminal("parquet")
-    require_extra(
-        "pyarrow",
-        extra="table",
-        option="--format parquet" if typed else f"--output {output}",
-        module="pyarrow.parquet",
-    )
+    require_pyarrow("--format parquet" if typed else f"--output {output}")
 
 
 def _require_cluster(jobs: int | None) -> None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from busplan import __version__
-from busplan.cli.output import write_file
 from busplan.errors import BusplanError
+from busplan.files import write_file
 from busplan.profile.write import profile_text
 
 if TYPE_CHECKING:

@@ -6,11 +6,12 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
-from busplan.cli.output import CANNOT, new_file, partial_path, say
+from busplan.cli.output import CANNOT, say
 from busplan.cli.progress import progress_bar
 from busplan.cli.sweep_job import TOP_FORMS
 from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import WorkerLostError
+from busplan.files import new_file, partial_path
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -55,7 +56,11 @@ def run_sweep(job: "SweepJob") -> None:
         with signals_noted() as noted:
             # Opened before the work, so that a path that cannot be written fails at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
-            file = stack.enter_context(new_file(job.output, overwrite=True, keeps_partial=True)) if job.output else None
+            file = (
+                stack.enter_context(new_file(job.output, overwrite=True, keeps_after=StoppedError))
+                if job.output
+                else None
+            )
             sink = sink_for(job, file, tally)
             takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
             lost = _work(job, takers, parts, points=sink.points, stopped=lambda: noted() is not None)

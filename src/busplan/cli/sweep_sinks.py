@@ -3,8 +3,9 @@
 from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol
 
 from busplan.cli.answering import give, report_with
-from busplan.cli.output import document_bytes, emit_document
+from busplan.cli.output import emit_document
 from busplan.errors import BusplanError
+from busplan.files import document_bytes
 from busplan.forms import Form, RowsForm, render
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Final, Literal, assert_never
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
@@ -20,6 +20,7 @@ from busplan.cli.options import (
 )
 from busplan.cli.output import write_document
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
+from busplan.drawings.pictures import TIMELINE_PICTURES, TimelinePicture
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -28,12 +29,9 @@ if TYPE_CHECKING:
     from busplan.analysis.timeline.schedule import Schedule
     from busplan.sections.profile import Profile
 
-Picture = Literal["mermaid", "svg", "png"]
-TimelineForm = Literal[Form, Picture]
+TimelineForm = Literal[Form, TimelinePicture]
 
-_ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType(
-    {**ENDINGS, ".mmd": "mermaid", ".svg": "svg", ".png": "png"}
-)
+_ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **TIMELINE_PICTURES})
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
@@ -143,23 +141,9 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
     return match["kind"], int(match["node"])
 
 
-def _picture(shown: "Schedule", form: Picture, changes: KeyChanges) -> str | bytes:
+def _picture(shown: "Schedule", form: TimelinePicture, changes: KeyChanges) -> str | bytes:
     """The drawing as a file of its own."""
     from busplan.answers.timeline import headline
+    from busplan.drawings.pictures import timeline_picture
 
-    title = picture_title(headline(shown), changes)
-    match form:
-        case "mermaid":
-            from busplan.drawings.timeline.mermaid import timeline_mermaid
-
-            return timeline_mermaid(shown, title=title)
-        case "svg":
-            from busplan.drawings.timeline.svg import timeline_svg
-
-            return timeline_svg(shown, title=title)
-        case "png":
-            from busplan.drawings.timeline.png import timeline_png
-
-            return timeline_png(shown, title=title)
-        case _:
-            assert_never(form)
+    return timeline_picture(shown, form, title=picture_title(headline(shown), changes))

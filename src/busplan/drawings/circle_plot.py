@@ -5,7 +5,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Final
 
 from busplan.errors import BusplanError
-from busplan.extras import require_extra
+from busplan.extras import require_matplotlib
 from busplan.forms.numbers import period
 
 if TYPE_CHECKING:
@@ -18,22 +18,6 @@ PLOT_FORMATS: Final = ("png", "svg", "pdf")
 _NAME_WIDTH: Final = 60
 """Longest line of a name, in characters: even of wide ones it fits the figure."""
 _TITLE_WIDTH: Final = 110
-
-
-def require_matplotlib(option: str = "--plot") -> None:
-    """Refuse to start if no figure can be drawn.
-
-    Parameters
-    ----------
-    option
-        Option that asked for the figure.
-
-    Raises
-    ------
-    BusplanError
-        The extra `plot` is not installed, or does not load.
-    """
-    require_extra("matplotlib", extra="plot", option=option, module="matplotlib.figure")
 
 
 def circle_figure(test: "CircleTest", *, file_format: str, note: str = "") -> bytes:
@@ -58,7 +42,7 @@ def circle_figure(test: "CircleTest", *, file_format: str, note: str = "") -> by
     BusplanError
         matplotlib is not installed, or no period was simulated.
     """
-    require_matplotlib()
+    require_matplotlib("--plot")
     from matplotlib import rc_context
 
     buffer = BytesIO()

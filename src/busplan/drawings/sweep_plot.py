@@ -9,10 +9,11 @@ import numpy as np
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Grid
-from busplan.drawings.circle_plot import metadata, require_matplotlib
+from busplan.drawings.circle_plot import metadata
 from busplan.drawings.sweep_scales import key_label, plot_scale, plotted_figure
 from busplan.drawings.sweep_words import Panel, Plotted, caption
 from busplan.errors import BusplanError
+from busplan.extras import require_matplotlib
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -38,7 +39,7 @@ def require_drawable(grid: Grid) -> None:
         raise BusplanError(f"--plot: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
     if grid.points > MAX_DRAWN:
         raise BusplanError(f"--plot: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
-    require_matplotlib()
+    require_matplotlib("--plot")
 
 
 class FigureData:

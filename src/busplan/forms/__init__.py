@@ -13,6 +13,9 @@ RowsForm = Literal["csv", "json", "jsonl", "parquet"]
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )
+ROWS_ENDINGS: Final[Mapping[str, RowsForm]] = MappingProxyType(
+    {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".parquet": "parquet"}
+)
 """Form by file name extension."""
 
 
