@@ -56,7 +56,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
     temporary = target.with_name(f".{stem}.{os.urandom(4).hex()}.tmp")
     stopped: BaseException | None = None
     with ExitStack() as last:
-        with _named(path, target):
+        with naming_errors(path, target):
             mode = _mode_of(target, overwrite=overwrite)
             last.callback(_remove, temporary)
             file = NewFile(_Raw(temporary, path=path, target=target))
@@ -68,7 +68,7 @@ def new_file(path: Path, *, overwrite: bool, keeps_after: type[BaseException] | 
             stopped, target, overwrite = error, partial_path(target), True
         if file.abandoned:
             return
-        with _named(path, target):
+        with naming_errors(path, target):
             file.flush()
             os.fsync(file.fileno())
             _give_name(file.fileno(), temporary)
@@ -91,7 +91,7 @@ class _Raw(io.FileIO):
         super().__init__(temporary, "xb", opener=_opened)
 
     def write(self, data: Any, /) -> int:
-        with _named(*self._names):
+        with naming_errors(*self._names):
             return super().write(data)
 
 
@@ -136,9 +136,26 @@ def _remove(temporary: Path) -> None:
         temporary.unlink()
 
 
+def lock(descriptor: int) -> bool:
+    """Lock an open file or folder until it is closed, also by the end of the process; False if another one has it.
+
+    Raises
+    ------
+    OSError
+        Its file system has no locks.
+    """
+    from fcntl import LOCK_EX, LOCK_NB, flock  # noqa: PLC0415 - as above
+
+    try:
+        flock(descriptor, LOCK_EX | LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
 @contextmanager
-def _named(path: Path, target: Path) -> Iterator[None]:
-    """Convert errors of the operating system to messages with the user's path."""
+def naming_errors(path: Path, target: Path) -> Iterator[None]:
+    """Convert errors of the operating system about a target to messages with the user's path."""
     try:
         yield
     except FileExistsError:

@@ -211,3 +211,23 @@ def test_a_sweep_that_was_killed_goes_on_to_the_same_bytes(run: Run, tmp_path: P
     # Its rows are those of a sweep without parts.
     streamed = run("sweep", "paper-1ms", *grid[:-1], "1", "--format", "csv", cwd=tmp_path)
     assert (tmp_path / "r.csv").read_text(encoding="utf-8") == streamed.stdout
+
+
+@pytest.mark.parametrize("more", [(), ("--resume",)])
+def test_another_run_of_the_sweep_is_refused_and_harms_nothing(
+    run: Run, tmp_path: Path, whole: dict[str, bytes], monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...]
+) -> None:
+    refusals: list[Any] = []
+
+    def meanwhile(chunk: CircleChunk) -> Any:
+        if not refusals:
+            refusals.append(None)  # the other run must not start a third
+            refusals[0] = sweep(run, tmp_path, "csv", *more)
+        return run_chunk(chunk)
+
+    monkeypatch.setattr(circle_run, "run_chunk", meanwhile)
+    assert sweep(run, tmp_path, "csv").returncode == 0
+    assert refusals[0].returncode == 2
+    assert "r.csv.parts: another run is at this sweep; wait for its end" in refusals[0].stderr
+    assert (tmp_path / "r.csv").read_bytes() == whole["csv"]
+    assert [path.name for path in tmp_path.iterdir()] == ["r.csv"]

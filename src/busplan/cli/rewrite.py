@@ -14,7 +14,7 @@ from typing import Final
 
 from busplan.cli.output import say
 from busplan.errors import BusplanError
-from busplan.files import NewFile, new_file
+from busplan.files import NewFile, lock, new_file
 
 PATIENCE_S: Final = 30.0
 """Longest wait for another run, which only reads and writes a short file."""
@@ -46,22 +46,16 @@ def changing(path: Path) -> Iterator[None]:
 
 
 def _lock(folder: int, path: Path) -> None:
-    from fcntl import LOCK_EX, LOCK_NB, flock
-
     end = time.monotonic() + PATIENCE_S
-    while True:
-        try:
-            flock(folder, LOCK_EX | LOCK_NB)
-        except BlockingIOError:
+    try:
+        while not lock(folder):
             if time.monotonic() > end:
                 raise BusplanError(
                     f"{path}: another run has been changing a file of this folder for {PATIENCE_S:g} s; try again"
-                ) from None
+                )
             time.sleep(_LOOK_AGAIN_S)
-            continue
-        except OSError as error:  # some network file systems have no locks
-            say(f"{path}: its folder cannot be locked ({error.strerror}); let no other run write it meanwhile")
-        return
+    except OSError as error:  # some network file systems have no locks
+        say(f"{path}: its folder cannot be locked ({error.strerror}); let no other run write it meanwhile")
 
 
 def require_changeable(path: Path) -> os.stat_result | None:

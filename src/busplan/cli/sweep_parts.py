@@ -2,7 +2,8 @@
 
 import io
 import json
-from contextlib import suppress
+import os
+from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic
@@ -11,11 +12,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from busplan import __version__
+from busplan.cli.output import say
 from busplan.errors import BusplanError
-from busplan.files import write_file
+from busplan.files import lock, naming_errors, write_file
 from busplan.profile.write import profile_text
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from busplan.analysis.sweep.grid import Array, Values
     from busplan.cli.sweep_job import SweepJob
 
@@ -27,6 +31,50 @@ _OFTEN_S: Final = 1.0
 def parts_path(output: Path) -> Path:
     """Folder of the parts of a file: rows.csv.parts."""
     return output.with_name(f"{output.name}.parts")
+
+
+@contextmanager
+def kept_parts(job: "SweepJob", output: Path) -> "Iterator[Parts]":
+    """Give the parts of a sweep to this run alone, and remove them when its file is complete.
+
+    Raises
+    ------
+    BusplanError
+        As `Parts`, or another run has them.
+    """
+    with _locked(parts_path(output), output):
+        parts = Parts(job, output)
+        yield parts
+        parts.remove()
+
+
+@contextmanager
+def _locked(folder: Path, output: Path) -> "Iterator[None]":
+    """Keep other runs out of a folder, which is made for it; what stays empty is removed."""
+    with naming_errors(output, folder):
+        if not folder.exists():
+            folder.mkdir(exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        if not _is_ours(descriptor, folder):
+            raise BusplanError(f"{folder}: another run is at this sweep; wait for its end, or give another --output")
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                folder.rmdir()
+    finally:
+        os.close(descriptor)
+
+
+def _is_ours(descriptor: int, folder: Path) -> bool:
+    try:
+        is_locked = lock(descriptor)
+    except OSError as error:  # some network file systems have no locks
+        say(f"{folder}: cannot be locked ({error.strerror}); let no other run write it meanwhile")
+        return True
+    # A run that has just ended removed what was locked here.
+    return is_locked and folder.exists() and os.path.samestat(os.fstat(descriptor), folder.stat())
 
 
 class Parts:
@@ -94,10 +142,6 @@ class Parts:
         self._pending = []
         content = io.BytesIO()
         np.save(content, part)
-        try:
-            self.folder.mkdir(exist_ok=True)
-        except OSError as error:
-            raise BusplanError(f"{self.folder}: cannot be made: {error.strerror}") from None
         if not (self.folder / _MANIFEST).exists():
             write_file(self.folder / _MANIFEST, json.dumps(self._facts, indent=2).encode(), overwrite=True)
         # No other part has this test, so none has this name.
@@ -106,18 +150,15 @@ class Parts:
         self._written_s = monotonic()
 
     def remove(self) -> None:
-        """Remove the folder: its file is complete."""
+        """Remove what is in the folder: its file is complete."""
         with suppress(OSError):
             for path in (*self.folder.glob("*.npy"), self.folder / _MANIFEST):
                 path.unlink(missing_ok=True)
-            self.folder.rmdir()
 
     def _checked(self, *, resume: bool) -> list[Path]:
         """Files to go on with."""
         try:
             inside = list(self.folder.iterdir())
-        except FileNotFoundError:
-            return []
         except OSError as error:
             raise BusplanError(f"{self.folder}: cannot be read: {error.strerror}") from None
         parts = sorted(path for path in inside if path.suffix == ".npy")

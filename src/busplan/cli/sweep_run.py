@@ -49,10 +49,11 @@ def run_sweep(job: "SweepJob") -> None:
     drawing = _drawing(job)
     if job.jobs is not None and not job.force:
         _require_few(job)
-    parts = _parts(job)
     tally = Tally(job.profile, job.grid, job.timing_models, seeds=job.tests)
     expected = tally.expected
     with ExitStack() as stack:
+        # Left last: parts go when their file is complete.
+        parts = _parts(job, stack)
         with signals_noted() as noted:
             # Opened before the work, so that a path that cannot be written fails at once.
             plot_file = stack.enter_context(new_file(job.plot, overwrite=True)) if job.plot else None
@@ -82,8 +83,6 @@ def run_sweep(job: "SweepJob") -> None:
                     ", ".join(filter(None, (job.profile.name, job.changes.words))), file_format=job.plot_format
                 )
             )
-    if parts is not None:
-        parts.remove()
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")
@@ -131,12 +130,12 @@ def _require_few(job: "SweepJob") -> None:
     require_few(job.grid, seeds=job.tests or 1, option="--circle", consent="--force")
 
 
-def _parts(job: "SweepJob") -> "Parts | None":
+def _parts(job: "SweepJob", stack: ExitStack) -> "Parts | None":
     if job.jobs is None or job.output is None:
         return None
-    from busplan.cli.sweep_parts import Parts
+    from busplan.cli.sweep_parts import kept_parts
 
-    return Parts(job, job.output)
+    return stack.enter_context(kept_parts(job, job.output))
 
 
 @contextmanager
