@@ -155,11 +155,13 @@ def _blocks(
         if parts is not None:
             stack.callback(parts.flush)
         where, watch = stack.enter_context(_where(job, tests.number, watch))
+        with progress_bar("check of the points") as checked:
+            cost = require_circles(tests, where, progress=lambda done: checked(done, tests.grid.points), watch=watch)
         yield circle_blocks(
             tests,
             where,
             timing_models=job.timing_models,
-            cost=require_circles(tests, where, watch=watch),
+            cost=cost,
             kept=parts or NOTHING_KEPT,
             progress=lambda done: report(done, tests.number),
             watch=watch,

@@ -85,7 +85,13 @@ class _Nothing:
 NOTHING_KEPT: Final[Kept] = _Nothing()
 
 
-def require_circles(tests: CircleTests, executor: Executor, *, watch: Callable[[], None] = ignored) -> Estimate:
+def require_circles(
+    tests: CircleTests,
+    executor: Executor,
+    *,
+    progress: Callable[[int], None] = ignored,
+    watch: Callable[[], None] = ignored,
+) -> Estimate:
     """Refuse a grid with a point whose circle test cannot be run, before any is run; say what a long sweep costs.
 
     Parameters
@@ -94,6 +100,8 @@ def require_circles(tests: CircleTests, executor: Executor, *, watch: Callable[[
         The tests.
     executor
         Where many points are checked.
+    progress
+        Called with the number of points that are checked, in the order of the grid.
     watch
         As in `run_in_order`.
 
@@ -105,8 +113,9 @@ def require_circles(tests: CircleTests, executor: Executor, *, watch: Callable[[
     cost = NOTHING
     where = executor if tests.grid.points > MOST_CIRCLES_UNASKED else Here()
     chunks = _chunks(tests.profile, enumerate(_points(tests.grid)), _CHECKED_AT_ONCE)
-    for one in run_in_order(where, check_chunk, chunks, watch=watch):
+    for number, one in enumerate(run_in_order(where, check_chunk, chunks, watch=watch), start=1):
         cost = cost.then(one)
+        progress(min(number * _CHECKED_AT_ONCE, tests.grid.points))
     cost = cost._replace(steps=tests.each * cost.steps, time_s=tests.each * cost.time_s)
     announce(cost)
     return cost
