@@ -1,11 +1,13 @@
 """What `busplan plan` says, and the data it gives."""
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import pytest
 
-from busplan.analysis.planning.plan import plan
+from busplan.analysis.planning.plan import Plan, plan
+from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.answers.plan import plan_document, plan_records, plan_report, settings
 from busplan.forms import render
 from busplan.forms.blocks import Report, Sentence, ShownValue, Table, TableRow, Words, values_in
@@ -42,8 +44,23 @@ def paper() -> Profile:
 Circle = Callable[[Profile], tuple[str, ...]]
 
 
+def rough(profile: Profile) -> tuple[str, ...]:
+    return () if profile.cycle.period_us > 3000 else ("rough",)
+
+
+def egg(_: Profile) -> tuple[str, ...]:
+    return ("the circle is an egg",)
+
+
+@cache
+def planned(profile: Profile, circle: Circle | None = None, max_circles: int = MAX_CIRCLES, **wanted: Any) -> Plan:
+    """The plan for a goal, searched for once; keys of the profile have __ for their dot."""
+    goal = {key.replace("__", "."): value for key, value in wanted.items()}
+    return plan(profile, circle=circle, max_circles=max_circles, wanted=goal)
+
+
 def report(profile: Profile, circle: Circle | None = None, **options: Any) -> Report:
-    return plan_report(plan(profile, circle=circle, **options), with_circle=circle is not None)
+    return plan_report(planned(profile, circle, **options), with_circle=circle is not None)
 
 
 def text(profile: Profile, circle: Circle | None = None, **options: Any) -> str:
@@ -56,7 +73,7 @@ def rows(answer: Report) -> Sequence[TableRow]:
 
 
 def test_the_first_line_says_what_to_set(paper: Profile) -> None:
-    first = text(paper, wanted={"bus.nodes": 4}).splitlines()[0]
+    first = text(paper, bus__nodes=4).splitlines()[0]
     assert first.startswith("paper-1ms with 4 nodes (16 axes) at 1 ms: set bus.gap_count = 10; then it fits with")
     assert first.endswith(" a margin of 75.567 us +/- 23.911 us.")
     assert ": nothing to change; it fits with a margin of" in text(load("paper-optimal-gap").profile).splitlines()[0]
@@ -64,7 +81,7 @@ def test_the_first_line_says_what_to_set(paper: Profile) -> None:
 
 
 def test_no_plan_says_what_binds_and_what_would_be_enough(paper: Profile) -> None:
-    found = report(paper, circle=lambda _: ("the circle is an egg",), max_circles=2)
+    found = report(paper, circle=egg, max_circles=2)
     lines = render(found, "table").splitlines()
     assert found.blocks()[0].state == "fails"  # type: ignore[union-attr]
     assert lines[0].endswith(
@@ -72,8 +89,7 @@ def test_no_plan_says_what_binds_and_what_would_be_enough(paper: Profile) -> Non
     )
     assert lines[1] == "Enough would be to leave out the circle: nothing to change."
     assert "Smallest period: none, the circle is an egg (not proven: the search was cut short" in "\n".join(lines)
-    wanted = {"bus.nodes": 8, "cycle.period_us": 1000.0, "limits.reserve": 0.2}
-    first, *others = text(paper, wanted=wanted).splitlines()
+    first, *others = text(paper, bus__nodes=8, cycle__period_us=1000.0, limits__reserve=0.2).splitlines()
     assert first.endswith(
         ": NO PLAN. No change of gap count and slice ratio is enough: the cycle needs a slice of 1237.520 us to be "
         "shown to fit, and at most 900.000 us can be given."
@@ -87,26 +103,23 @@ def test_no_plan_says_what_binds_and_what_would_be_enough(paper: Profile) -> Non
         "Enough would be to free the period: cycle.period_us = 1400, cycle.slice_ratio = 0.89, bus.gap_count = 21.",
         "Enough would be to free the nodes: bus.nodes = 6, cycle.slice_ratio = 0.89, bus.gap_count = 16.",
     ]
-    weaker = text(paper, wanted={"limits.max_utilisation": 0.15, "cycle.period_us": 1000.0})
+    weaker = text(paper, limits__max_utilisation=0.15, cycle__period_us=1000.0)
     assert "Enough would be limits.max_utilisation = 0.21: cycle.slice_ratio = 0.9, bus.gap_count = 7." in weaker
 
 
 def test_a_period_that_must_change_is_said_first(paper: Profile) -> None:
-    found = report(paper, wanted={"bus.nodes": 8})
+    found = report(paper, bus__nodes=8)
     first = render(found, "table").splitlines()[0]
     assert first.startswith(
         "paper-1ms with 8 nodes (32 axes) at 1 ms: the period must change, for no change of gap count and slice ratio "
         "is enough: set cycle.period_us = 1200, cycle.slice_ratio = 0.83, bus.gap_count = 21; then it fits with"
     )
     assert found.document()["period_is_kept"] is False
-    assert "period must change" not in text(paper, wanted={"bus.nodes": 7})
+    assert "period must change" not in text(paper, bus__nodes=7)
 
 
 def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile) -> None:
-    def circle(profile: Profile) -> tuple[str, ...]:
-        return () if profile.cycle.period_us > 3000 else ("rough",)
-
-    found = report(paper, circle, max_circles=3)
+    found = report(paper, rough, max_circles=3)
     (recommended,) = (row for row in rows(found) if row.highlighted)
     assert recommended.cells[:2] == ("+ period", "*?")
     marks = {str(row.cells[0]): row.cells[1] for row in rows(found)}
@@ -121,33 +134,38 @@ def test_exactly_one_row_is_marked_and_what_is_not_proven_says_so(paper: Profile
     (proven,) = (row for row in rows(report(paper)) if row.highlighted)
     assert proven.cells[:2] == ("as it is", "*")
     assert "not proven" not in text(paper)
-    assert "recommended" not in text(paper, circle=lambda _: ("the circle is an egg",), max_circles=2)
+    assert "recommended" not in text(paper, circle=egg, max_circles=2)
 
 
 def test_what_fails_is_set_apart(paper: Profile) -> None:
-    def circle(profile: Profile) -> tuple[str, ...]:
-        return () if profile.cycle.period_us > 3000 else ("rough",)
-
-    first = rows(report(paper, circle, max_circles=3))[0]
+    first = rows(report(paper, rough, max_circles=3))[0]
     assert first.cells[5] == Words("FAILS", "fails")
-    result = plan(paper, wanted={"bus.nodes": 4})
+    result = planned(paper, bus__nodes=4)
     for row, option in zip(rows(plan_report(result, with_circle=False)), result.options, strict=True):
         margins = [cell for cell in row.cells if isinstance(cell, ShownValue) and "margin" in cell.key]
         assert [margin.state == "fails" for margin in margins] == [option.deciding.verdict != "fits"]
         assert row.cells[5] == "-"
 
 
-@pytest.mark.parametrize("wanted", [{}, {"bus.nodes": 4}, {"bus.nodes": 17}, {"bus.gap_count": 3, "bus.nodes": 4}])
-@pytest.mark.parametrize("name", ["paper-1ms", "paper-dma"])
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("paper-1ms", {}),
+        ("paper-1ms", {"bus__nodes": 4}),
+        ("paper-dma", {"bus__nodes": 17}),
+        ("paper-dma", {"bus__gap_count": 3, "bus__nodes": 4}),
+        ("sercos3-servo-8", {}),
+    ],
+)
 def test_every_figure_stands_in_its_place(
     name: str, wanted: dict[str, Any], values_in_their_places: Callable[[Report], int]
 ) -> None:
-    found = report(load(name).profile, wanted=wanted)
+    found = report(load(name).profile, **wanted)
     assert values_in_their_places(found) > 6 * len(rows(found))
 
 
 def test_a_cell_writes_what_its_option_sets(paper: Profile) -> None:
-    result = plan(paper, wanted={"bus.nodes": 4})
+    result = planned(paper, bus__nodes=4)
     cells = [row.cells[2] for row in rows(plan_report(result, with_circle=False))]
     for number, (cell, option) in enumerate(zip(cells, result.options, strict=True)):
         values = list(values_in(cell))
@@ -175,7 +193,7 @@ def test_settings_are_written_as_a_profile_has_them(paper: Profile) -> None:
 
 
 def test_no_line_of_the_table_is_longer_than_a_screen(paper: Profile) -> None:
-    lines = text(paper, wanted={"bus.nodes": 8}).splitlines()
+    lines = text(paper, bus__nodes=8).splitlines()
     start = next(number for number, line in enumerate(lines) if line.startswith("option "))
     table = lines[start : lines.index("", start)]
     assert len(table) > 6
@@ -183,7 +201,7 @@ def test_no_line_of_the_table_is_longer_than_a_screen(paper: Profile) -> None:
 
 
 def test_data_holds_the_contract(paper: Profile) -> None:
-    result = plan(paper, wanted={"bus.nodes": 4})
+    result = planned(paper, bus__nodes=4)
     document = plan_document(result)
     to_json(document)  # refuses what is not finite
     assert (document["schema"], document["command"], document["profile"]) == (1, "plan", "paper-1ms")
@@ -193,7 +211,7 @@ def test_data_holds_the_contract(paper: Profile) -> None:
     assert recommended["circle_passed"] is None
     assert (document["free"], document["binding"]) == (["gap_count", "slice_ratio", "period"], None)
     assert [option["passes"] for option in document["options"]] == [False, True, True, True, True]
-    none = plan_document(plan(paper, wanted={"bus.nodes": 8, "cycle.period_us": 1000.0}))
+    none = plan_document(planned(paper, bus__nodes=8, cycle__period_us=1000.0))
     to_json(none)
     assert (none["recommended_changes"], none["period_is_kept"], none["binding"]["constraint"]) == (None, None, "time")
     assert [one["relaxed"] for one in none["relaxations"]] == ["responses", "schedule", "period", "nodes"]

@@ -15,7 +15,7 @@ from busplan.answers.sensitivity import sensitivity_document, sensitivity_report
 from busplan.forms import render
 from busplan.forms.blocks import Report
 from busplan.forms.json_document import to_json
-from busplan.profile.shipped import load, shipped_names
+from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -35,7 +35,7 @@ def lines(profile: Profile) -> list[str]:
     return text[text.index("What moves the margin") :].splitlines()
 
 
-@pytest.mark.parametrize("name", shipped_names())
+@pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8"])
 def test_a_figure_stands_at_its_place_at_every_period(
     name: str, values_in_their_places: Callable[[Report], int]
 ) -> None:

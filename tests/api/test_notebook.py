@@ -60,10 +60,11 @@ def test_an_answer_without_a_picture_gives_none() -> None:
 
 
 def test_a_page_is_text_and_is_saved_in_the_form_of_its_ending(tmp_path: Path) -> None:
-    page = busplan.report(["paper-4ms", "paper-1ms"], circle=False, title="Two <lines>")
-    assert page.html.startswith("<!DOCTYPE html>")
-    assert "<h1>Two &lt;lines&gt;</h1>" in page.html
-    for ending, text in ((".html", page.html), (".txt", f"{page}\n"), (".json", page.to_json())):
+    page = busplan.report(["sercos2-servo-8", "sercos3-servo-8"], circle=False, title="Two <lines>")
+    html = page.html
+    assert html.startswith("<!DOCTYPE html>")
+    assert "<h1>Two &lt;lines&gt;</h1>" in html
+    for ending, text in ((".html", html), (".txt", f"{page}\n"), (".json", page.to_json())):
         page.save(tmp_path / f"page{ending}")
         assert (tmp_path / f"page{ending}").read_text(encoding="utf-8") == text
     assert [one.verdict.deciding.verdict for one in page.answers] == ["fits", "fits"]
@@ -80,13 +81,13 @@ def test_every_row_of_a_sweep_is_saved(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({}, "busplan latency paper-4ms --format json"),
-        ({"bus.nodes": 3}, "busplan latency paper-4ms --set bus.nodes=3 --format json"),
+        ({}, "busplan latency sercos2-servo-8 --format json"),
+        ({"bus.nodes": 3}, "busplan latency sercos2-servo-8 --set bus.nodes=3 --format json"),
         ({"name": "mine"}, "busplan latency mine.toml --format json"),
     ],
 )
 def test_the_commands_of_a_page_give_its_profile(changes: dict[str, object], words: str) -> None:
-    page = busplan.report(busplan.load_profile("paper-4ms", changes=changes), circle=False)
+    page = busplan.report(busplan.load_profile("sercos2-servo-8", changes=changes), circle=False)
     assert f"$ {words}\n" in str(page)
 
 

@@ -14,8 +14,8 @@ from busplan.cli import app
 
 OLD: dict[str, tuple[Callable[[], Answer], Callable[[], Answer]]] = {
     "periods_us of busplan.capacity is now called period_us": (
-        lambda: busplan.capacity("paper-4ms", periods_us=[500]),  # type: ignore[call-arg]
-        lambda: busplan.capacity("paper-4ms", period_us=500),
+        lambda: busplan.capacity("paper-4ms", periods_us=[2000]),  # type: ignore[call-arg]
+        lambda: busplan.capacity("paper-4ms", period_us=2000),
     ),
     "timing_models of busplan.capacity is now called timing_model": (
         lambda: busplan.capacity("paper-4ms", timing_models=["paper"]),  # type: ignore[call-arg]
@@ -26,8 +26,8 @@ OLD: dict[str, tuple[Callable[[], Answer], Callable[[], Answer]]] = {
         lambda: busplan.latency("paper-4ms", payload_bytes=16),
     ),
     "with_contributions of busplan.circle_test is now called contributions": (
-        lambda: busplan.circle_test("paper-4ms", with_contributions=True),  # type: ignore[call-arg]
-        lambda: busplan.circle_test("paper-4ms", contributions=True),
+        lambda: busplan.circle_test("paper-optimal-gap", with_contributions=True),  # type: ignore[call-arg]
+        lambda: busplan.circle_test("paper-optimal-gap", contributions=True),
     ),
     "with_circle of busplan.sweep is now called circle": (
         lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": [1]}, with_circle=False),  # type: ignore[call-arg]

@@ -63,7 +63,7 @@ def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
 
 
 def test_a_point_is_what_capacity_says_of_it() -> None:
-    periods = range(250, 4001, 250)
+    periods = range(250, 4001, 750)
     answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_model=["standard"])
     found = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
     for name in ("max_axes", "margin_us", "limited_by", "fits", "safe_axes", "safe_required_us", "verdict"):
@@ -84,9 +84,9 @@ def test_whole_numbers_as_floats_count_nodes() -> None:
 
 
 def test_many_blocks_are_one_table() -> None:
-    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": range(100, 40_100)}, timing_model=["paper"])
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": range(100, 20_100)}, timing_model=["paper"])
     assert len(answer.blocks) > 1
-    assert answer["cycle.period_us"].tolist() == list(range(100, 40_100))
+    assert answer["cycle.period_us"].tolist() == list(range(100, 20_100))
     assert [row["period_us"] for row in answer.to_dict()["rows"]] == answer["period_us"].tolist()
 
 

@@ -33,8 +33,8 @@ def test_the_types_are_seen_through_the_lazy_names() -> None:
     assert_type(busplan.explain("paper-4ms", "margin_us").derivations[0].steps, tuple[Step, ...])
     assert_type(busplan.calibrate("paper-two-node", [(4, 48.7)]).payloads[0].execution_us, float)
     assert_type(busplan.calibrate("paper-two-node", {"payload_bytes": [4], "latency_us": [48.7]}).source, str)
-    assert_type(busplan.report("paper-4ms", circle=False).html, str)
-    assert_type(busplan.report([busplan.load_profile("paper-4ms"), "paper-1ms"], circle=False), busplan.ReportAnswer)
+    assert_type(busplan.report("sercos2-servo-8", circle=False).html, str)
+    assert_type(busplan.report([busplan.load_profile("dvrk"), "dvrk"], circle=False), busplan.ReportAnswer)
     assert_type(busplan.capacity("paper-4ms", period_us=500, timing_model="paper"), busplan.CapacityAnswer)
     assert_type(busplan.circle_test("paper-4ms", period_us=[100]).results[0].max_contour_error_mm, float | None)
 

@@ -31,19 +31,28 @@ def values(given: Sequence[Any] | range) -> Values:
     return listed(list(given), name="vary", words=("optimal",))
 
 
-def plotted(figure: str, profile: Any = PAPER, **vary: Any) -> Plotted:
+def added(figure: str, profile: Any = PAPER, **vary: Any) -> FigureData:
     grid = checked_grid(profile, {key.replace("__", "."): values(one) for key, one in vary.items()}, with_circle=False)
     data = FigureData(profile, grid, figure=figure, timing_models=MODELS)
     for block in sweep(profile, grid, timing_models=MODELS, chunk_points=7):
         data.add(block)
-    assert data.draw("x", file_format="png") == data.draw("x", file_format="png")
-    return data.plotted()
+    return data
+
+
+def plotted(figure: str, profile: Any = PAPER, **vary: Any) -> Plotted:
+    return added(figure, profile, **vary).plotted()
 
 
 def drawn(one: Plotted) -> Any:
     figure = Figure()
     (draw_maps if len(one.scales) == 2 else draw_curves)(figure, one)
     return figure
+
+
+@pytest.mark.parametrize("vary", [{"bus__nodes": (1, 2)}, {"bus__gap_count": (7, 63), "cycle__period_us": (250, 4000)}])
+def test_the_same_sweep_draws_the_same_bytes(vary: dict[str, Any]) -> None:
+    data = added("margin_us", **vary)
+    assert data.draw("x", file_format="png") == data.draw("x", file_format="png")
 
 
 @pytest.mark.parametrize("given", [(5, 7, 63), (63, "optimal"), ("optimal",), range(5, 64)])
