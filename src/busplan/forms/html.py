@@ -1,6 +1,7 @@
 """An answer as one self-contained HTML file: no network, no script; light, dark, narrow and printed styles."""
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from importlib.resources import files
 from itertools import groupby
 from typing import Final
@@ -62,6 +63,12 @@ def fragment(report: Report) -> str:
 
 
 def _template(name: str) -> Template:
+    return _environment().get_template(name)
+
+
+@cache
+def _environment() -> Environment:
+    """What all templates share, and each of them once it is compiled."""
     environment = Environment(
         loader=PackageLoader("busplan.forms"),
         autoescape=True,
@@ -88,7 +95,7 @@ def _template(name: str) -> Template:
         "svg": Markup,
         "holds_sections": lambda section: any(isinstance(one, Chapter) for one in section.blocks),
     }
-    return environment.get_template(name)
+    return environment
 
 
 def _colours(blocks: Sequence[Block]) -> str:
