@@ -196,18 +196,18 @@ def test_refusals(run: Run, tmp_path: Path, line: str, words: str) -> None:
 
 
 def test_a_sweep_that_was_killed_goes_on_to_the_same_bytes(run: Run, tmp_path: Path) -> None:
-    grid = (*SMALL[:-1], "servo.position_gain_per_s=100:179", "--jobs", "2")
-    command = ("sweep", "paper-1ms", *grid, "-o")
-    with subprocess.Popen([sys.executable, "-m", "busplan", *command, "r.csv"], cwd=tmp_path) as process:
+    grid = (*SMALL[:-1], "servo.position_gain_per_s=100:179", "--jobs")
+    command = ("sweep", "paper-1ms", *grid, "2", "-o", "r.csv")
+    with subprocess.Popen([sys.executable, "-m", "busplan", *command], cwd=tmp_path) as process:
         deadline = time.monotonic() + 30
         while not list(tmp_path.glob("r.csv.parts/*.npy")) and time.monotonic() < deadline:
             time.sleep(0.01)
         process.kill()
     assert process.returncode == -signal.SIGKILL
     assert [path.name for path in tmp_path.iterdir()] == ["r.csv.parts"]
-    done = run(*command, "r.csv", "--resume", cwd=tmp_path)
+    done = run("sweep", "paper-1ms", *grid, "1", "-o", "r.csv", "--resume", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["r.csv"]
     # Its rows are those of a sweep without parts.
-    streamed = run("sweep", "paper-1ms", *grid[:-1], "1", "--format", "csv", cwd=tmp_path)
+    streamed = run("sweep", "paper-1ms", *grid, "1", "--format", "csv", cwd=tmp_path)
     assert (tmp_path / "r.csv").read_text(encoding="utf-8") == streamed.stdout
