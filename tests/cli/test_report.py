@@ -28,7 +28,7 @@ position_gain_per_s = 50
 velocity_feedforward = 0
 drive_lag_us = 500
 [circle]
-radius_mm = 25
+radius_mm = 5
 feed_mm_per_min = 3000
 ramp_periods = 20
 """
@@ -213,12 +213,11 @@ def test_a_profile_without_a_circle_has_none_and_says_so(run: Run, tmp_path: Pat
 
 def test_the_same_profile_gives_the_same_bytes_to_a_file_and_to_standard_output(run: Run, tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_text(QUICK + CIRCLE, encoding="utf-8")
-    for name, form in (("a.HTML", "html"), ("a.md", "markdown")):
-        assert run("report", "x.toml", "-o", name, cwd=tmp_path).returncode == 0
-        shown = run("report", "x.toml", "--format", form, cwd=tmp_path, env={"PYTHONHASHSEED": "7"}).stdout
+    for name, *form in (("a.HTML",), ("page", "--format", "markdown")):
+        assert run("report", "x.toml", "-o", name, *form, cwd=tmp_path).returncode == 0
+    for name, form, seed in (("a.HTML", "html", {"PYTHONHASHSEED": "7"}), ("page", "markdown", None)):
+        shown = run("report", "x.toml", "--format", form, cwd=tmp_path, env=seed).stdout
         assert (tmp_path / name).read_text(encoding="utf-8") == shown
-    assert run("report", "x.toml", "-o", "page", "--format", "markdown", cwd=tmp_path).returncode == 0
-    assert (tmp_path / "page").read_bytes() == (tmp_path / "a.md").read_bytes()
 
 
 def test_standard_input_and_a_title(run: Run, tmp_path: Path) -> None:
