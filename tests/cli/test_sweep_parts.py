@@ -20,6 +20,8 @@ from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, CircleChunk, run_chun
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 SMALL = ("--circle", "--vary", "circle.radius_mm=10", "--vary", "servo.position_gain_per_s=100:119")
+FORMS = ("csv", "json", "parquet")
+"""Rows, a document with an end, and groups of rows."""
 SEEDS = (*SMALL, "--vary", "delivery.seed=1:3", "--summary")
 
 
@@ -28,7 +30,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, run: Run) -> dict[str, bytes
     """The file of a sweep without an interruption, by its ending."""
     folder = tmp_path_factory.mktemp("whole")
     found = {}
-    for form in ("csv", "json", "jsonl", "parquet", "md"):
+    for form in FORMS:
         assert sweep(run, folder, form).returncode == 0
         found[form] = (folder / f"r.{form}").read_bytes()
     assert sorted(path.name for path in folder.iterdir()) == sorted(f"r.{form}" for form in found)
@@ -61,7 +63,7 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int | None], 
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.parametrize("form", ["csv", "json", "jsonl", "parquet", "md"])
+@pytest.mark.parametrize("form", FORMS)
 def test_a_sweep_goes_on_to_the_same_bytes_and_runs_no_test_twice(
     run: Run, tmp_path: Path, whole: dict[str, bytes], stopped: Callable[[int | None], list[int]], form: str
 ) -> None:
