@@ -6,8 +6,9 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import chdir
-from io import BytesIO, TextIOWrapper
+from io import BufferedWriter, BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
+from threading import Thread
 from typing import IO, Any
 from unittest import mock
 
@@ -135,30 +136,48 @@ def run_busplan(
     )
 
 
+CLOSED = -1
+"""Descriptor of a stream that the caller has closed."""
+
+
+def opened(descriptor: int, *, encoding: str) -> TextIOWrapper | None:
+    """A standard stream as an interpreter makes it of a descriptor."""
+    if descriptor == CLOSED:
+        return None
+    return TextIOWrapper(BufferedWriter(FileIO(descriptor, "wb", closefd=False)), encoding=encoding)
+
+
 def run_inside(
     *arguments: str,
     cwd: Path,
     stdin: str | bytes | None = None,
     encoding: str = "utf-8",
     variables: Mapping[str, str] | None = None,
+    stdout: int | None = None,
+    stderr: int | None = None,
 ) -> "subprocess.CompletedProcess[str]":
     """Run the program's command line in this process: what hundreds of messages need no interpreter each for.
 
-    Standard output and standard error have an encoding, as PYTHONIOENCODING sets it.
+    Standard output and standard error have an encoding, as PYTHONIOENCODING sets it. Each may be a descriptor, which
+    the program gets as an interpreter would open it, or CLOSED; what it takes is not in the answer.
     """
     content = stdin.encode() if isinstance(stdin, str) else stdin or b""
     written = BytesIO(), BytesIO()
     stdin_stream = TextIOWrapper(BytesIO(content), encoding="utf-8")
-    stdout, stderr = (TextIOWrapper(stream, encoding=encoding) for stream in written)
+    out, err = (
+        TextIOWrapper(kept, encoding=encoding) if descriptor is None else opened(descriptor, encoding=encoding)
+        for kept, descriptor in zip(written, (stdout, stderr), strict=True)
+    )
     with (
         chdir(cwd),
         mock.patch.dict(os.environ, environment(**(variables or {})), clear=True),
-        mock.patch.multiple(sys, argv=["busplan", *arguments], stdin=stdin_stream, stdout=stdout, stderr=stderr),
+        mock.patch.multiple(sys, argv=["busplan", *arguments], stdin=stdin_stream, stdout=out, stderr=err),
         pytest.raises(SystemExit) as leaving,
     ):
         run_command_line()
-    stdout.flush()
-    stderr.flush()
+    for stream in (out, err):
+        if stream is not None:
+            stream.flush()
     code = leaving.value.code or 0
     assert isinstance(code, int)
     return subprocess.CompletedProcess(
@@ -260,29 +279,46 @@ def refused(run: Run) -> Callable[..., str]:
 
 
 @pytest.fixture(scope="session")
-def on_terminal() -> Callable[..., tuple[int, str]]:
-    """Run the program with a terminal for its standard output; gives exit code and what the terminal got."""
+def on_terminal(run: Run) -> Callable[..., tuple[int, str]]:
+    """Run the program with a terminal for its standard output and error; gives exit code and what the terminal got.
 
-    def call(*arguments: str, cwd: Path, env: Mapping[str, str] | None = None) -> tuple[int, str]:
+    In this process, as `run` does, unless a process is asked for.
+    """
+
+    def call(
+        *arguments: str, cwd: Path, env: Mapping[str, str] | None = None, process: bool = False
+    ) -> tuple[int, str]:
         ours, theirs = pty.openpty()
+        shown = bytearray()
+        reading = Thread(target=_read_all, args=(ours, shown))
+        reading.start()
         try:
-            with subprocess.Popen(
-                [sys.executable, "-m", "busplan", *arguments],
-                cwd=cwd,
-                env=environment(**(env or {})),
-                stdin=subprocess.DEVNULL,
-                stdout=theirs,
-                stderr=theirs,
-            ) as process:
-                os.close(theirs)
-                shown = b""
-                while piece := _read(ours):
-                    shown += piece
-                return process.wait(timeout=30), shown.decode().replace("\r\n", "\n")
+            if process:
+                code = subprocess.run(
+                    [sys.executable, "-m", "busplan", *arguments],
+                    check=False,
+                    cwd=cwd,
+                    env=environment(**(env or {})),
+                    stdin=subprocess.DEVNULL,
+                    stdout=theirs,
+                    stderr=theirs,
+                    timeout=30,
+                ).returncode
+            else:
+                inside = {"stdout": theirs, "stderr": theirs, "variables": env}
+                code = run(*arguments, cwd=cwd, inside=inside).returncode
         finally:
+            os.close(theirs)
+            reading.join()
             os.close(ours)
+        return code, shown.decode().replace("\r\n", "\n")
 
     return call
+
+
+def _read_all(terminal: int, shown: bytearray) -> None:
+    while piece := _read(terminal):
+        shown += piece
 
 
 def _read(terminal: int) -> bytes:

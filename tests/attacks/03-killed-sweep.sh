@@ -1,7 +1,7 @@
 # Row 3: SIGKILL to a sweep with workers: their common standard output ends, and no temporary file stays.
 # exits: 0
 sweep() {
-    busplan sweep p.toml --vary circle.radius_mm=10 --vary servo.position_gain_per_s=100:500 --circle --jobs 2 -o c.csv &
+    busplan sweep p.toml --vary circle.radius_mm=640 --vary servo.position_gain_per_s=100:139 --circle --jobs 2 -o c.csv &
     until test "$(wc -w < "/proc/$!/task/$!/children")" -eq 3; do sleep 0.05; done
     kill -KILL $!
 }

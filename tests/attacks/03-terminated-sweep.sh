@@ -1,7 +1,7 @@
 # Row 3: SIGTERM to a sweep with workers: they end, the rows so far stay, and nothing else does.
 # exits: 143
-# says: interrupted after \d+ of 401 points; kept in c\.partial\.csv
-busplan sweep p.toml --vary circle.radius_mm=10 --vary servo.position_gain_per_s=100:500 --circle --jobs 2 -o c.csv &
+# says: interrupted after \d+ of 40 points; kept in c\.partial\.csv
+busplan sweep p.toml --vary circle.radius_mm=640 --vary servo.position_gain_per_s=100:139 --circle --jobs 2 -o c.csv &
 until workers=$(< "/proc/$!/task/$!/children") && test "$(wc -w <<< "$workers")" -eq 3; do sleep 0.05; done
 kill -TERM $!
 wait $!

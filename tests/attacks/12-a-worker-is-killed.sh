@@ -3,7 +3,7 @@
 # exits: 2
 # says: a worker was killed \(out of memory\?\)
 # says: kept in c\.partial\.csv
-busplan sweep p.toml --vary circle.radius_mm=10 --vary servo.position_gain_per_s=100:500 --circle --jobs 2 -o c.csv &
+busplan sweep p.toml --vary circle.radius_mm=640 --vary servo.position_gain_per_s=100:139 --circle --jobs 2 -o c.csv &
 sweep=$!
 until test "$(wc -w < "/proc/$sweep/task/$sweep/children")" -eq 3; do sleep 0.05; done
 set -- $(cat "/proc/$sweep/task/$sweep/children")

@@ -7,11 +7,10 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, chdir, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from ruamel.yaml import YAML
@@ -97,7 +96,7 @@ def test_exit_codes(busplan: Busplan, folder: Path, arguments: list[str], code: 
     assert code == 0 or run.stdout or run.stderr
 
 
-@pytest.mark.parametrize("arguments", [["p/clean.toml"], ["p"], ["p", "gone.toml"], ["p", "--format", "xml"]])
+@pytest.mark.parametrize("arguments", [["p"], ["p", "gone.toml"]])
 def test_a_process_says_what_the_command_line_says(busplan: Busplan, folder: Path, arguments: list[str]) -> None:
     # The other tests call the command line without a process where none is needed.
     inside, outside = busplan("check", *arguments, cwd=folder), process("check", *arguments, cwd=folder)
@@ -183,14 +182,6 @@ def test_standard_input(busplan: Busplan, folder: Path) -> None:
     assert busplan("check", "-", cwd=folder, stdin="").returncode == 1
 
 
-def test_standard_input_is_read_whatever_the_number_of_jobs(busplan: Busplan, folder: Path) -> None:
-    given = ["check", "p/clean.toml", "-", "p/warns.toml"]
-    one, two = (call(*given, "--jobs", jobs, cwd=folder, stdin=FAILS) for call, jobs in ((busplan, 1), (process, 2)))
-    assert one.returncode == two.returncode == 1
-    assert one.stdout == two.stdout
-    assert [line.partition(":")[0] for line in one.stdout.splitlines()] == ["<stdin>", "p/warns.toml"]
-
-
 def test_a_shells_process_substitution_is_read(folder: Path) -> None:
     run = subprocess.run(
         ["bash", "-c", f"{sys.executable} -m busplan check <(sleep 0.2; cat p/fails.toml) -q"],
@@ -258,22 +249,27 @@ module.Shout = Shout
 sys.modules[module.__name__] = module
 FORMATS["shout"] = Registered("shout", "Shout", "builds")
 from busplan.__main__ import main
-main()
+for line in sys.argv[1:]:
+    sys.argv = ["busplan", "check", *line.split()]
+    try:
+        main()
+    except SystemExit as leaving:
+        print(leaving.code)
 """
 
 
 def test_a_format_is_added_by_a_class_and_a_line_of_the_register(folder: Path) -> None:
-    def call(*arguments: str) -> Run:
-        return subprocess.run(
-            [sys.executable, "-c", ADDED, "check", *arguments],
-            capture_output=True, text=True, cwd=folder, check=False, timeout=60, env=environment(COLUMNS="100"),
-        )  # fmt: skip
-
-    words = " ".join(call("--help").stdout.split())
+    lines = ("p/fails.toml --format shout -q", "p --format xml", "--help")
+    run = subprocess.run(
+        [sys.executable, "-c", ADDED, *lines],
+        capture_output=True, text=True, cwd=folder, check=False, timeout=60, env=environment(COLUMNS="100"),
+    )  # fmt: skip
+    assert run.stdout.startswith("BP101!\n1\n2\n")
+    words = " ".join(run.stdout.split())
     assert "github, gitlab, junit, sarif, markdown and shout are for the build service" in words
-    run = call("p/fails.toml", "--format", "shout", "-q")
-    assert (run.returncode, run.stdout, run.stderr) == (1, "BP101!\n", "shouted\n")
-    assert "'shout'" in call("p", "--format", "xml").stderr
+    shouted, refused = run.stderr.split("\n", 1)
+    assert shouted == "shouted"
+    assert "'shout'" in refused
 
 
 def test_github_has_the_plain_report_on_stderr(busplan: Busplan, folder: Path) -> None:
@@ -284,40 +280,71 @@ def test_github_has_the_plain_report_on_stderr(busplan: Busplan, folder: Path) -
     assert busplan("check", "p", "--format", "github", "-q", cwd=folder).stderr == plain.stdout
 
 
-def test_any_number_of_jobs_gives_the_same_bytes(
-    busplan: Busplan, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (folder / "p" / "bytes.toml").write_bytes(b"schema_version = 1\n\xff\n")
-    circle = CLEAN + "[servo]\nposition_gain_per_s = 30000\n"
-    for number in range(8):
-        (folder / "p" / f"{number}.toml").write_text((FAILS, WARNS, circle, BROKEN)[number % 4], encoding="utf-8")
-    given = ["check", "p/warns.toml", "gone.toml", "p", "paper-1ms"]
-    asked: list[int] = []
-    monkeypatch.chdir(folder)  # where workers start, they work
-    # The same two workers for every form: their start is most of the time of a process.
-    with workers(2) as shared:
+class Crew(NamedTuple):
+    """A folder, and two workers that were started in it: where workers start, they work."""
+
+    folder: Path
+    executor: Workers
+
+
+@pytest.fixture(scope="module")
+def crew(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Crew]:
+    folder = tmp_path_factory.mktemp("crew")
+    with chdir(folder), workers(2) as executor:
+        yield Crew(folder, executor)
+
+
+@pytest.fixture
+def by_two(busplan: Busplan, crew: Crew, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Run]:
+    """Call `check --jobs 2` in the crew's folder with the crew, whose start is most of the time of a process."""
+
+    def call(*arguments: object, stdin: str | None = None, jobs: int = 2, workers: int = 2) -> Run:
+        asked: list[int] = []
 
         def again(number: int) -> AbstractContextManager[Workers]:
             asked.append(number)
-            return nullcontext(shared)
+            return nullcontext(crew.executor)
 
-        monkeypatch.setattr("busplan.cli.workers.workers", again)
-        for format_ in FORMATS:
-            one, two = (
-                busplan(*given, "--no-circle", "--format", format_, "--jobs", jobs, cwd=folder) for jobs in (1, 2)
-            )
-            assert one.returncode == 2
-            assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
-            assert one.stdout
-    assert asked == [2] * len(FORMATS)
-    monkeypatch.undo()
-    one, two = (call(*given, "--jobs", jobs, cwd=folder) for call, jobs in ((busplan, 1), (process, 2)))
+        with monkeypatch.context() as patch:
+            patch.setattr("busplan.cli.workers.workers", again)
+            done = busplan("check", *arguments, "--jobs", jobs, cwd=crew.folder, stdin=stdin)
+        assert asked == [workers]
+        return done
+
+    return call
+
+
+def test_any_number_of_jobs_gives_the_same_bytes(busplan: Busplan, crew: Crew, by_two: Callable[..., Run]) -> None:
+    (crew.folder / "p").mkdir()
+    (crew.folder / "p" / "bytes.toml").write_bytes(b"schema_version = 1\n\xff\n")
+    circle = CLEAN + "[servo]\nposition_gain_per_s = 30000\n"
+    for number in range(8):
+        (crew.folder / "p" / f"{number}.toml").write_text((FAILS, WARNS, circle, BROKEN)[number % 4], encoding="utf-8")
+    given = ["p/1.toml", "gone.toml", "p", "paper-1ms"]
+    forms = ("full", "json", "markdown", "gitlab")  # they show all that a worker tells of a file
+    for more in (*(("--no-circle", "--format", form) for form in forms), ()):
+        one, two = busplan("check", *given, *more, "--jobs", 1, cwd=crew.folder), by_two(*given, *more)
+        assert one.returncode == two.returncode == 2
+        assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
+        assert one.stdout
     assert "BP202" in one.stdout
-    assert (one.stdout, one.stderr) == (two.stdout, two.stderr)
-    few = ["check", "p/warns.toml", "gone.toml", "p/2.toml", "--no-circle"]
-    one, many = (call(*few, "--jobs", jobs, cwd=folder) for call, jobs in ((busplan, 1), (process, 50)))
+    few = ["p/1.toml", "gone.toml", "p/2.toml", "--no-circle"]
+    one, many = busplan("check", *few, "--jobs", 1, cwd=crew.folder), by_two(*few, jobs=50, workers=3)
     assert "BP110" in one.stdout
     assert (one.stdout, one.stderr) == (many.stdout, many.stderr)
+
+
+def test_standard_input_is_read_whatever_the_number_of_jobs(
+    busplan: Busplan, crew: Crew, by_two: Callable[..., Run]
+) -> None:
+    for name, text in (("clean", CLEAN), ("warns", WARNS)):
+        (crew.folder / f"{name}.toml").write_text(text, encoding="utf-8")
+    given = ["clean.toml", "-", "warns.toml"]
+    one = busplan("check", *given, "--jobs", 1, cwd=crew.folder, stdin=FAILS)
+    two = by_two(*given, stdin=FAILS)
+    assert one.returncode == two.returncode == 1
+    assert one.stdout == two.stdout
+    assert [line.partition(":")[0] for line in one.stdout.splitlines()] == ["<stdin>", "warns.toml"]
 
 
 def test_the_circle_can_be_left_out(busplan: Busplan, folder: Path) -> None:
@@ -414,16 +441,17 @@ def test_a_baseline_of_other_timing_models_is_not_compared(busplan: Busplan, fol
     assert (folder / "b.json").read_text(encoding="utf-8") == before
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_an_older_baseline_is_not_compared_whatever_the_jobs_and_the_format(
-    busplan: Busplan, folder: Path, jobs: str
+    busplan: Busplan, folder: Path, crew: Crew, by_two: Callable[..., Run]
 ) -> None:
+    shutil.copytree(folder / "p", crew.folder / "older" / "p")
     older_baseline(folder)
-    call = busplan if jobs == "1" else process
-    run = call("check", "p", "--baseline", "b.json", "--format", "json", "--jobs", jobs, cwd=folder)
-    assert run.returncode == 1
-    assert "BP301" not in run.stdout
-    assert run.stderr.count("recorded by other timing models") == 1
+    older_baseline(crew.folder)
+    given = ["--baseline", "b.json", "--format", "json"]
+    for run in (busplan("check", "p", *given, "--jobs", 1, cwd=folder), by_two("older", *given)):
+        assert run.returncode == 1
+        assert "BP301" not in run.stdout
+        assert run.stderr.count("recorded by other timing models") == 1
 
 
 def test_an_update_of_an_older_baseline_drops_what_was_not_checked_and_says_so(busplan: Busplan, folder: Path) -> None:
@@ -503,8 +531,15 @@ PATCHES = {
 }
 
 
-@pytest.mark.parametrize("when", PATCHES)
-@pytest.mark.parametrize("what", ["report", "baseline"])
+@pytest.mark.parametrize(
+    ("what", "when"),
+    [
+        ("report", "before anything is written"),
+        ("report", "before it has its name"),
+        ("baseline", "before it is on the disk"),
+        ("baseline", "before it has its name"),
+    ],
+)
 def test_a_kill_leaves_the_old_file_whole(busplan: Busplan, folder: Path, what: str, when: str) -> None:
     options = ["-o", "report"] if what == "report" else ["--baseline", "baseline", "--update-baseline"]
     busplan("check", "p/clean.toml", *options, "--format", "json", cwd=folder)
@@ -527,29 +562,58 @@ def test_a_kill_leaves_the_old_file_whole(busplan: Busplan, folder: Path, what: 
     assert (folder / what).read_bytes() != old
 
 
-def test_a_kill_at_any_time_leaves_one_file_or_the_other(folder: Path) -> None:
-    given = ["--baseline", "baseline", "--update-baseline", "-o", "report", "--format", "sarif"]
-    wholes: dict[str, set[bytes]] = {"baseline": set(), "report": set()}
-    for paths in (["p/clean.toml"], ["p"]):
-        start = time.perf_counter()
-        process("check", *paths, *given, cwd=folder)
+FORKED = """
+import os, sys, time
+from pathlib import Path
+from busplan.__main__ import main
+
+def child():
+    pid = os.fork()
+    if not pid:
+        try:
+            main()
+        finally:
+            os._exit(0)
+    return pid
+
+kills, *arguments = sys.argv[1:]
+sys.argv = ["busplan", "check", *arguments]
+for _ in range(2):  # the second loads no more modules than those that are killed
+    start = time.perf_counter()
+    try:
+        main()
+    except SystemExit:
         seconds = time.perf_counter() - start
-        for name, whole in wholes.items():
-            whole.add((folder / name).read_bytes())
-    (folder / "baseline").write_bytes(min(wholes["baseline"], key=len))
-    for number in range(12):
-        with subprocess.Popen(
-            [*PROGRAM, "check", "p", *given],
-            cwd=folder,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            env=environment(),
-        ) as killed:
-            # Most of the time is start-up: the last third is when files are written.
-            time.sleep(seconds * (0.65 + 0.4 * number / 12))
-            killed.kill()
-        for name, whole in wholes.items():
-            assert (folder / name).read_bytes() in whole
+for number in range(int(kills)):
+    for name in ("baseline", "report"):
+        Path(name).write_bytes(Path(f"{name}.old").read_bytes())
+    pid = child()
+    time.sleep(seconds * 2 * number / int(kills))
+    os.kill(pid, 9)
+    os.waitpid(pid, 0)
+    for name in ("baseline", "report"):
+        os.link(name, f"{name}.{number}")
+        os.unlink(name)
+"""
+
+
+def test_a_kill_at_any_time_leaves_one_file_or_the_other(busplan: Busplan, folder: Path) -> None:
+    given = ["--baseline", "baseline", "--update-baseline", "-o", "report", "--format", "sarif"]
+    wholes: dict[str, set[bytes]] = {}
+    busplan("check", "p/clean.toml", *given, cwd=folder)
+    for name in ("baseline", "report"):
+        (folder / name).rename(folder / f"{name}.old")
+        wholes[name] = {(folder / f"{name}.old").read_bytes()}
+    # The program is killed when it has been loaded: what takes long is not what writes.
+    run = subprocess.run(
+        [sys.executable, "-c", FORKED, "24", "p", *given],
+        cwd=folder, env=environment(), capture_output=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    busplan("check", "p", *given, cwd=folder)
+    for name, whole in wholes.items():
+        whole.add((folder / name).read_bytes())
+        assert {(folder / f"{name}.{number}").read_bytes() for number in range(24)} == whole
 
 
 # rule and schema
@@ -806,51 +870,42 @@ def test_the_action_is_one() -> None:
     assert run.returncode == 0, run.stdout
 
 
-def test_the_action_checks_and_annotates(folder: Path) -> None:
-    program_folder(folder / "runner temp" / "busplan" / "bin")
-    run = action_step(CHECK, folder, path=os.environ["PATH"])
-    assert run.returncode == 1
-    assert run.stdout.startswith("::error file=p/fails.toml,line=11,col=1,title=BP101 slice-overrun::")
-    assert "p/warns.toml:7:1: BP110" in run.stderr
-    run = action_step(
-        CHECK, folder, path=os.environ["PATH"], paths="p/clean.toml p/warns.toml", args="--fail-on warning"
-    )
-    assert (run.returncode, run.stdout[:28]) == (1, "::warning file=p/warns.toml,")
-    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="p/clean.toml").returncode == 0
-    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="gone.toml").returncode == 2
-    hostile = action_step(CHECK, folder, path=os.environ["PATH"], paths="p/clean.toml; touch owned $(touch owned)")
-    assert hostile.returncode == 2
-    assert not (folder / "owned").exists()
-
-
-def test_the_action_writes_a_summary_and_says_what_came_of_it(folder: Path) -> None:
+def test_the_action_checks_annotates_and_writes_a_summary(folder: Path) -> None:
     program_folder(folder / "work" / "runner temp" / "busplan" / "bin")
     work = folder / "work"
     (folder / "p").rename(work / "p")
 
-    def outputs(**inputs: Any) -> list[str]:
+    def check(**inputs: Any) -> tuple[Run, list[str]]:
         for name in ("output", "summary"):
             (folder / name).unlink(missing_ok=True)
-        action_step(CHECK, work, path=os.environ["PATH"], **inputs)
-        return (folder / "output").read_text(encoding="utf-8").splitlines()
+        run = action_step(CHECK, work, path=os.environ["PATH"], **inputs)
+        return run, (folder / "output").read_text(encoding="utf-8").splitlines()
 
-    assert outputs() == ["exit-code=1", "result=fails"]
+    run, outputs = check()
+    assert (run.returncode, outputs) == (1, ["exit-code=1", "result=fails"])
+    assert run.stdout.startswith("::error file=p/fails.toml,line=11,col=1,title=BP101 slice-overrun::")
+    assert "p/warns.toml:7:1: BP110" in run.stderr
     summary = (folder / "summary").read_text(encoding="utf-8")
     assert summary.startswith("### Check of profiles\n")
     assert "| `p/clean.toml` | passes | fits |" in summary
     assert "| `p/fails.toml` | **1 error** | does not fit |" in summary
-    assert outputs(paths="p/clean.toml") == ["exit-code=0", "result=passes"]
-    assert outputs(paths="gone.toml") == ["exit-code=2", "result=could not check"]
+    run, outputs = check(paths="p/clean.toml p/warns.toml", args="--fail-on warning")
+    assert (run.returncode, run.stdout[:28], outputs[0]) == (1, "::warning file=p/warns.toml,", "exit-code=1")
+    run, outputs = check(paths=str(work / "p" / "clean.toml"))
+    assert (run.returncode, outputs) == (0, ["exit-code=0", "result=passes"])
+    run, outputs = check(paths="gone.toml; touch owned $(touch owned)")
+    assert (run.returncode, outputs) == (2, ["exit-code=2", "result=could not check"])
+    assert not (work / "owned").exists()
     # A file of the pull request is no report of ours, nor is what it points to written.
     (work / "target").write_text("kept", encoding="utf-8")
     (work / "b.sarif").symlink_to("target")
-    assert outputs(sarif="b.sarif") == ["sarif=b.sarif", "exit-code=1", "result=fails"]
+    assert check(sarif="b.sarif")[1] == ["sarif=b.sarif", "exit-code=1", "result=fails"]
     assert json.loads((work / "b.sarif").read_text(encoding="utf-8"))["version"] == "2.1.0"
     assert (work / "target").read_text(encoding="utf-8") == "kept"
-    assert outputs(sarif="b.sarif", args="--no-such-option") == ["exit-code=2", "result=could not check"]
+    assert check(sarif="b.sarif", args="--no-such-option")[1] == ["exit-code=2", "result=could not check"]
     assert not (work / "b.sarif").exists()
     # A report of the workflow's own is not written over.
-    assert outputs(paths="p/warns.toml", args="--format json -o own.json") == ["exit-code=0", "result=passes"]
+    assert check(paths="p/warns.toml", args="--format json -o own.json")[1] == ["exit-code=0", "result=passes"]
     assert "| `p/warns.toml` | 1 warning | fits |" in (folder / "summary").read_text(encoding="utf-8")
     assert json.loads((work / "own.json").read_text(encoding="utf-8"))["command"] == "check"
 
@@ -859,7 +914,7 @@ HOSTILE_FILES = ("--exit-zero", "--help", "-o", "--baseline=b", "-", "-qv")
 """Names that a pull request may give, each an option of `check` or standard input."""
 
 
-@pytest.mark.parametrize("paths", ["*", "-* p", "* nothing-here", "./* p/fails.toml"])
+@pytest.mark.parametrize("paths", ["-* p", "* nothing-here", "./* p/fails.toml"])
 def test_no_file_of_a_pull_request_is_an_option_of_the_action(folder: Path, paths: str) -> None:
     program_folder(folder / "runner temp" / "busplan" / "bin")
     work = folder / "work"
@@ -877,13 +932,10 @@ def test_no_file_of_a_pull_request_is_an_option_of_the_action(folder: Path, path
 def test_a_folder_called_like_a_shipped_profile_is_that_folder(folder: Path) -> None:
     program_folder(folder / "runner temp" / "busplan" / "bin")
     (folder / "p").rename(folder / "paper-1ms")
-    run = action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms")
-    assert run.returncode == 1
-    assert "file=paper-1ms/fails.toml,line=11," in run.stdout
-    run = action_step(CHECK, folder, path=os.environ["PATH"], paths=str(folder / "paper-1ms" / "clean.toml"))
-    assert run.returncode == 0
     # Options are the workflow's own, and no wildcards.
-    assert action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms", args="--exit-zero").returncode == 0
+    run = action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms", args="--exit-zero")
+    assert run.returncode == 0
+    assert "file=paper-1ms/fails.toml,line=11," in run.stdout
     assert action_step(CHECK, folder, path=os.environ["PATH"], paths="paper-1ms", args="--baseline *").returncode == 2
 
 

@@ -122,29 +122,33 @@ def test_workers_with_another_version_are_refused_by_its_name(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("--cluster tcp://127.0.0.1:1", "--cluster: goes with --circle"),
-        ("--circle --jobs 2 --cluster tcp://127.0.0.1:1", "--jobs: is the number of processes here"),
-        ("--circle --cluster localhost", "--cluster localhost: expected the address of a Dask scheduler, as tcp://"),
-        ("--circle --cluster tcp://127.0.0.1:1", "--cluster tcp://127.0.0.1:1: no Dask scheduler answers there: "),
-    ],
-)
-def test_refusals(run: Run, tmp_path: Path, line: str, words: str) -> None:
+REFUSED = {
+    "--cluster tcp://127.0.0.1:1": "--cluster: goes with --circle",
+    "--circle --jobs 2 --cluster tcp://127.0.0.1:1": "--jobs: is the number of processes here",
+    "--circle --cluster localhost": "--cluster localhost: expected the address of a Dask scheduler, as tcp://",
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_refusals(refused: Callable[..., str], tmp_path: Path, line: str) -> None:
+    said = refused("sweep", "paper-1ms", "--vary", "bus.nodes=1:2", *line.split(), cwd=tmp_path)
+    assert REFUSED[line] in said
+    assert "\n" not in said
+
+
+def test_a_scheduler_that_does_not_answer_is_said(refused: Callable[..., str], tmp_path: Path) -> None:
     impatient = "import busplan.cli.cluster as cluster; cluster._PATIENCE_S = 0.5\n"
     impatient += "from busplan.__main__ import main; main()"
-    asked = ("sweep", "paper-1ms", "--vary", "bus.nodes=1:2", *line.split())
-    done = run(*asked, cwd=tmp_path, python=("-c", impatient))
-    assert (done.returncode, done.stdout) == (2, "")
-    assert words in done.stderr
-    assert done.stderr.count("\n") == 1
-
-
-def test_without_the_extra_it_is_said(run: Run, tmp_path: Path) -> None:
-    hidden = "import busplan.extras as extras; extras.find_spec = lambda _: None\n"
-    hidden += "from busplan.__main__ import main; main()"
     asked = ("sweep", "paper-1ms", "--vary", "bus.nodes=1:2", "--circle", "--cluster", "tcp://127.0.0.1:1")
-    done = run(*asked, cwd=tmp_path, python=("-c", hidden))
-    assert done.returncode == 2
-    assert "--cluster needs distributed: install it with the extra, as in pip install 'busplan[cluster]'" in done.stderr
+    said = refused(*asked, cwd=tmp_path, python=("-c", impatient))
+    assert "--cluster tcp://127.0.0.1:1: no Dask scheduler answers there: " in said
+    assert "\n" not in said
+
+
+def test_without_the_extra_it_is_said(
+    refused: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("busplan.extras.find_spec", lambda _: None)
+    asked = ("sweep", "paper-1ms", "--vary", "bus.nodes=1:2", "--circle", "--cluster", "tcp://127.0.0.1:1")
+    said = refused(*asked, cwd=tmp_path)
+    assert "--cluster needs distributed: install it with the extra, as in pip install 'busplan[cluster]'" in said

@@ -198,4 +198,4 @@ def test_without_a_circle_numpy_is_not_loaded(run: Run) -> None:
     )
     pair = ("diff", "paper-1ms", "paper-optimal-gap")
     assert run(*pair, "--no-circle", python=("-c", code)).stderr == "False\n"
-    assert run(*pair, python=("-c", code)).stderr == "True\n"
+    assert run(*pair, "--set", "circle.radius_mm=10", python=("-c", code)).stderr == "True\n"

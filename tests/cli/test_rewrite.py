@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import stat
 import threading
 import time
@@ -30,6 +31,14 @@ CHANGES = {
 """Each changes p.toml, but for the last, which changes b.json."""
 
 
+def profile() -> str:
+    """A shipped profile with a short execution table: a plan searches the largest payload over all that it holds."""
+    text = (SHIPPED / "paper-1ms.toml").read_text(encoding="utf-8")
+    for key in ("payload_bytes", "time_us"):
+        text = re.sub(rf"^({key} = \[[^,]+, [^,]+, [^,]+, [^,]+).*\]$", r"\1]", text, flags=re.MULTILINE)
+    return text
+
+
 class Change(NamedTuple):
     """A command, and the file that it changes."""
 
@@ -40,7 +49,7 @@ class Change(NamedTuple):
 @pytest.fixture(params=CHANGES)
 def change(request: pytest.FixtureRequest, tmp_path: Path, run: Run) -> Change:
     """A command, beside the file that it changes."""
-    text = (SHIPPED / "paper-1ms.toml").read_text(encoding="utf-8")
+    text = profile()
     (tmp_path / "other.toml").write_text(text, encoding="utf-8")
     if request.param == "baseline":
         run("check", "paper-4ms", "--no-circle", "--baseline", "b.json", "--update-baseline", cwd=tmp_path)
@@ -146,7 +155,7 @@ def test_records_that_are_written_at_once_are_all_kept(tmp_path: Path, run: Run)
 @pytest.mark.parametrize("command", ["plan", "calibrate"])
 def test_what_another_run_writes_into_a_profile_is_not_lost(command: str, tmp_path: Path, refused: Refused) -> None:
     path = tmp_path / "p.toml"
-    text = (SHIPPED / "paper-1ms.toml").read_text(encoding="utf-8")
+    text = profile()
     path.write_text(text, encoding="utf-8")
     Locked(tmp_path, lambda: path.write_text(f"# theirs\n{text}", encoding="utf-8"))
     said = refused(*CHANGES[command], cwd=tmp_path)

@@ -20,6 +20,8 @@ from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, CircleChunk, run_chun
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 SMALL = ("--circle", "--vary", "circle.radius_mm=10", "--vary", "servo.position_gain_per_s=100:119")
+FORMS = ("csv", "json", "parquet")
+"""Rows, a document with an end, and groups of rows."""
 SEEDS = (*SMALL, "--vary", "delivery.seed=1:3", "--summary")
 
 
@@ -28,7 +30,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, run: Run) -> dict[str, bytes
     """The file of a sweep without an interruption, by its ending."""
     folder = tmp_path_factory.mktemp("whole")
     found = {}
-    for form in ("csv", "json", "jsonl", "parquet", "md"):
+    for form in FORMS:
         assert sweep(run, folder, form).returncode == 0
         found[form] = (folder / f"r.{form}").read_bytes()
     assert sorted(path.name for path in folder.iterdir()) == sorted(f"r.{form}" for form in found)
@@ -61,7 +63,7 @@ def stopped(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int | None], 
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.parametrize("form", ["csv", "json", "jsonl", "parquet", "md"])
+@pytest.mark.parametrize("form", FORMS)
 def test_a_sweep_goes_on_to_the_same_bytes_and_runs_no_test_twice(
     run: Run, tmp_path: Path, whole: dict[str, bytes], stopped: Callable[[int | None], list[int]], form: str
 ) -> None:
@@ -196,20 +198,20 @@ def test_refusals(run: Run, tmp_path: Path, line: str, words: str) -> None:
 
 
 def test_a_sweep_that_was_killed_goes_on_to_the_same_bytes(run: Run, tmp_path: Path) -> None:
-    grid = (*SMALL[:-1], "servo.position_gain_per_s=100:179", "--jobs", "2")
-    command = ("sweep", "paper-1ms", *grid, "-o")
-    with subprocess.Popen([sys.executable, "-m", "busplan", *command, "r.csv"], cwd=tmp_path) as process:
+    grid = (*SMALL[:-1], "servo.position_gain_per_s=100:179", "--jobs")
+    command = ("sweep", "paper-1ms", *grid, "2", "-o", "r.csv")
+    with subprocess.Popen([sys.executable, "-m", "busplan", *command], cwd=tmp_path) as process:
         deadline = time.monotonic() + 30
         while not list(tmp_path.glob("r.csv.parts/*.npy")) and time.monotonic() < deadline:
             time.sleep(0.01)
         process.kill()
     assert process.returncode == -signal.SIGKILL
     assert [path.name for path in tmp_path.iterdir()] == ["r.csv.parts"]
-    done = run(*command, "r.csv", "--resume", cwd=tmp_path)
+    done = run("sweep", "paper-1ms", *grid, "1", "-o", "r.csv", "--resume", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["r.csv"]
     # Its rows are those of a sweep without parts.
-    streamed = run("sweep", "paper-1ms", *grid[:-1], "1", "--format", "csv", cwd=tmp_path)
+    streamed = run("sweep", "paper-1ms", *grid, "1", "--format", "csv", cwd=tmp_path)
     assert (tmp_path / "r.csv").read_text(encoding="utf-8") == streamed.stdout
 
 

@@ -38,8 +38,7 @@ def test_the_ending_chooses_parquet_and_a_pipe_gets_the_same_bytes(run: Run, tmp
     found = parquet(tmp_path / "rows.parquet").read().to_pylist()
     assert [row["margin_us"] for row in found] == [row["margin_us"] for row in rows]
     with (tmp_path / "piped").open("wb") as pipe:
-        program = [sys.executable, "-m", "busplan", *grid, "--format", "parquet"]
-        subprocess.run(program, stdout=pipe, stderr=subprocess.DEVNULL, check=True)
+        assert run(*grid, "--format", "parquet", inside={"stdout": pipe.fileno()}).returncode == 0
     assert (tmp_path / "piped").read_bytes() == (tmp_path / "rows.parquet").read_bytes()
 
 

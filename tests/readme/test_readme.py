@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from subprocess import CompletedProcess
 from types import UnionType
@@ -123,8 +124,15 @@ def reference_row(model: type[BaseModel], name: str, key: str) -> str:
         if key == "bus.nodes"
         else repr(field.default).replace("'", '"').replace("False", "false")
     )
-    range_ = allowed(model.model_json_schema()["properties"][name])
+    range_ = allowed(properties(model)[name])
     return f"| `{key}` | {range_} | {default.replace('None', 'none')} | {field.description} |"
+
+
+@cache
+def properties(model: type[BaseModel]) -> dict[str, Any]:
+    """JSON Schema of each key of a section."""
+    found: dict[str, Any] = model.model_json_schema()["properties"]
+    return found
 
 
 def allowed(schema: dict[str, Any]) -> str:
@@ -220,7 +228,7 @@ def test_the_example_profile_is_the_shipped_one() -> None:
 DOCUMENTS = {
     "latency": "paper-4ms",
     "capacity": "paper-1ms --period 600us --sensitivity",
-    "circle-test": "paper-4ms --period 4ms --period 100us --contributions",
+    "circle-test": "paper-4ms --period 4ms --period 100us --radius 20 --contributions",
     "explain": "paper-4ms required_us",
     "report": "paper-4ms --no-circle",
     "check": "paper-optimal-gap nowhere.toml --no-circle",
