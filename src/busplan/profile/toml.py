@@ -5,6 +5,7 @@ names file, line, column and value, and says what would be right.
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -20,6 +21,7 @@ MAX_FILE_BYTES: Final = 100_000
 """A profile is a page of text; a larger file is something else."""
 _OPENED: Final = ("/dev/fd/", "/dev/stdin", "/proc/")
 """Paths of pipes that have a writer: in a shell, <(command) is /dev/fd/N."""
+PERIOD_KEY: Final = "cycle.period_us"
 
 
 class LoadedProfile(NamedTuple):
@@ -171,3 +173,16 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
     from busplan.profile.problems import refused_changes  # as above
 
     raise refused_changes(found, data, changes, origin)
+
+
+def at_periods(profile: Profile, periods_us: Sequence[float] | None) -> list[Profile]:
+    """Return a profile at each of some communication periods [us]; without them, as it is.
+
+    Raises
+    ------
+    BusplanError
+        A period that the profile's schema refuses.
+    """
+    if periods_us is None:
+        return [profile]
+    return [override(profile, {PERIOD_KEY: one}, origin={PERIOD_KEY: f"period {one}"}) for one in periods_us]

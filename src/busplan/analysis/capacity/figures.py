@@ -16,7 +16,7 @@ from busplan.buses.figure import CERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, plain
-from busplan.profile.toml import override
+from busplan.profile.toml import at_periods
 from busplan.sections.profile import Profile
 
 
@@ -148,20 +148,26 @@ def capacity(
     ----------
     Paper, equations (1), (2), (11).
     """
-    periods = [profile.cycle.period_us] if periods_us is None else periods_us
     models = model_names(profile) if timing_models is None else timing_models
-    variants = [
-        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": f"period {period}"})
-        for period in periods
-    ]
+    variants = at_periods(profile, periods_us)
     return Capacity(
         profile,
         tuple(tuple(figures(variant, model=model) for model in models) for variant in variants),
     )
 
 
-def figures(profile: Profile, *, model: str) -> CapacityFigures:
-    """Compute all figures of a profile at its own period under one timing model."""
+def figures(profile: Profile, *, model: str, with_counts: bool = True) -> CapacityFigures:
+    """Compute all figures of a profile at its own period under one timing model.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    model
+        Timing model.
+    with_counts
+        If False, leave out the largest numbers of nodes, which take most of the time: `COUNTS` are None.
+    """
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
@@ -171,8 +177,8 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     broken = broken_limits(profile)
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
-    groups = tuple(_group_capacity(profile, name, model=model) for name in network.names)
-    whole = groups[0] if network.is_uniform else None
+    groups = tuple(_group_capacity(profile, name, model=model) for name in network.names) if with_counts else ()
+    whole = groups[0] if groups and network.is_uniform else None
     counts: dict[str, Any] = {key: getattr(whole, key, None) for key in COUNTS}
     return CapacityFigures(
         kind=bus.kind,

@@ -18,7 +18,7 @@ from busplan.analysis.circle.failures import (
     tightest_margins,
 )
 from busplan.analysis.circle.setup import bus, loop_timing, path_setpoints, setup
-from busplan.profile.toml import override
+from busplan.profile.toml import at_periods
 from busplan.progress import Progress
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -171,23 +171,23 @@ def circle_test(
     ----------
     ISO 230-4 for the measures; the paper's section IV-B for the test.
     """
-    periods = [profile.cycle.period_us] if periods_us is None else periods_us
-    variants = [
-        override(profile, {"cycle.period_us": period}, origin={"cycle.period_us": f"period {period}"})
-        for period in periods
-    ]
+    variants = at_periods(profile, periods_us)
     counter = _Counter(progress)
     # Set up every period before the first simulation, so that errors come at once. A period that does not fit the bus
     # needs no path.
-    setups = [setup(variant) if bus(variant).fits else loop_timing(variant) for variant in variants]
+    capacities = [bus(variant) for variant in variants]
+    setups = [
+        setup(variant) if capacity.fits else loop_timing(variant)
+        for variant, capacity in zip(variants, capacities, strict=True)
+    ]
     simulated = [one for one in setups if isinstance(one, Setup)]
     ranked = [sources(one) if with_contributions and isinstance(one, Setup) else {} for one in setups]
     passing = [source for each in ranked for source in each.values()]
     counter.expect(*simulated, *passing)
     announce(estimate(simulated, passing))
     pairs = [
-        _test(variant, one, without if with_contributions else None, explain=explain, counter=counter)
-        for variant, one, without in zip(variants, setups, ranked, strict=True)
+        _test(variant, capacity, one, without if with_contributions else None, explain=explain, counter=counter)
+        for variant, capacity, one, without in zip(variants, capacities, setups, ranked, strict=True)
     ]
     return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
 
@@ -225,10 +225,15 @@ class _Counter:
 
 
 def _test(
-    profile: Profile, one: Setup | LoopTiming, without: Mapping[str, Setup] | None, *, explain: bool, counter: _Counter
+    profile: Profile,
+    capacity: CapacityFigures,
+    one: Setup | LoopTiming,
+    without: Mapping[str, Setup] | None,
+    *,
+    explain: bool,
+    counter: _Counter,
 ) -> tuple[CircleFigures, CircleRun | None]:
     """Test one period; `without` has the setup without each error source, if they are to be ranked."""
-    capacity = bus(profile)
     if isinstance(one, LoopTiming):
         return _figures(profile, one, capacity, None, settled=True), None
     run = counter.run(one)

@@ -16,7 +16,7 @@ from busplan.analysis.network import bus_of, leading_model, model_names, network
 from busplan.analysis.register import CommandName, figure_named, figures_of
 from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure
 from busplan.errors import BusplanError
-from busplan.profile.toml import override
+from busplan.profile.toml import at_periods
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
@@ -139,15 +139,23 @@ def explain(
     if command != "latency" and transactions is not None:
         raise BusplanError(f"{one.key}: not a figure of latency, so it has no transaction")
     found = []
-    for period_us in [profile.cycle.period_us] if periods_us is None else periods_us:
-        where = override(profile, {"cycle.period_us": period_us}, origin={"cycle.period_us": f"period {period_us}"})
+    for where in at_periods(profile, periods_us):
         for kind in kinds:
             for model in models:
                 for each in (one, *_BESIDE.get(one.key, ())):
                     traced = _traced(where, command, each.key, model=model, kind=kind, progress=progress)
                     steps = tuple(_steps(where, traced, command, each))
                     found.append(
-                        Derivation(command, each, model, kind, period_us, traced.value, steps, tuple(inputs(traced)))
+                        Derivation(
+                            command,
+                            each,
+                            model,
+                            kind,
+                            where.cycle.period_us,
+                            traced.value,
+                            steps,
+                            tuple(inputs(traced)),
+                        )
                     )
     return Explanation(profile, tuple(found))
 
