@@ -416,7 +416,7 @@ def test_each_new_key_is_an_input_of_what_it_changes(make: Make, changes: dict[s
     "place",
     [
         {"servo.loop": "node", "circle.path": "iso230-4"},
-        {"servo.loop": "host"},
+        {"servo.loop": "host", "mechanics.backlash_mm": 0.002},
         {"servo.loop": "host", "servo.update": "on_arrival"},
     ],
     ids=["node", "host", "on arrival"],

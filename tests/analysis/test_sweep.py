@@ -89,7 +89,7 @@ def assert_rows_are_those_of_capacity(profile: Profile, grid: Grid, *, chunk_poi
     assert points == grid.points
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(data=st.data())
 def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile: st.SearchStrategy[Profile]) -> None:
     profile = data.draw(any_profile)
@@ -108,7 +108,7 @@ def test_every_row_equals_capacity_of_its_point(data: st.DataObject, any_profile
     assert_rows_are_those_of_capacity(profile, grid, chunk_points=data.draw(st.integers(1, 40)))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data(), nodes=st.integers(1, 20), model=st.sampled_from(BOTH))
 def test_points_that_fit_exactly_are_decided_as_capacity_decides_them(
     data: st.DataObject, nodes: int, model: TimingModelName, any_profile: st.SearchStrategy[Profile]

@@ -229,6 +229,7 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
         assert set((name[1] or name[2] or next(iter(parts))).split(".")) <= parts, f"{line!r} is new"
 
 
+@settings(max_examples=50, deadline=None)
 @given(
     st.sampled_from(
         [one for one in shipped_names() if not (found := load(one).profile).group and found.bus.kind == "ieee1394"]
@@ -243,13 +244,13 @@ MARKS = st.sampled_from([b"", b"\xef\xbb\xbf"])
 LINE_ENDS = st.sampled_from(["\n", "\r\n"])
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(layouts(usual=True), edits(), LINE_ENDS, MARKS)
 def test_sections_with_comments(chunks: list[Chunk], changes: dict[str, Any], line_end: str, mark: bytes) -> None:
     check(chunks, changes, usual=True, line_end=line_end, mark=mark)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(layouts(usual=False), edits(), LINE_ENDS)
 def test_any_layout(chunks: list[Chunk], changes: dict[str, Any], line_end: str) -> None:
     check(chunks, changes, usual=False, line_end=line_end)
