@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import cache
 from itertools import count
 from typing import Any
 
@@ -122,9 +123,14 @@ class Writer:
             yield from self.table(section, value)
 
 
+@cache
+def shipped(name: str) -> Document:
+    return load(name).document
+
+
 @st.composite
 def layouts(draw: st.DrawFn, *, usual: bool) -> list[Chunk]:
-    data = load("paper-two-node").document.data()
+    data = shipped("paper-two-node").data()
     if draw(st.booleans()):
         data["node"]["execution"] = LINEAR
     return list(Writer(draw, usual=usual).table((), data))
@@ -237,7 +243,7 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
     edits(),
 )
 def test_shipped_profiles(name: str, changes: dict[str, Any]) -> None:
-    check(chunks_of(load(name).document.text), changes, usual=True)
+    check(chunks_of(shipped(name).text), changes, usual=True)
 
 
 MARKS = st.sampled_from([b"", b"\xef\xbb\xbf"])
