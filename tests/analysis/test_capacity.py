@@ -44,7 +44,7 @@ def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
         hops = nodes if profile.bus.max_hops is None else profile.bus.max_hops
         # A float's rounding in the product of two floats is no reason to refuse an exact fit.
         return (
-            network_of(profile).largest_payload_bytes <= limit
+            bool(network_of(profile).largest_payload_bytes <= limit)
             and hops <= 16
             and carries(profile, nodes)
             and start(profile, nodes) <= 124

@@ -235,6 +235,7 @@ def test_an_integral_may_not_be_weakened_below_its_own_margin_either() -> None:
     axis = an_axis(position_gain_per_s=40.0, integral_gain_per_s2=3000.0, derivative_gain=0.8, drive_lag_us=20_000.0)
     timing = LoopTiming(period_us=1000.0, step_us=10.0)
     margin_db = loop_margins(axis, timing=timing).gain_margin_db
+    assert margin_db is not None
     assert margin_db == pytest.approx(-20 * math.log10(0.625), rel=0.01)
 
     def is_stable(change_db: float) -> bool:
