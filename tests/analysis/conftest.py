@@ -307,54 +307,64 @@ def make_profile(**changes: Any) -> Profile:
         *tables, last = key.split("__")
         table = data
         for name in tables:
-            table = table[name]
+            table = table.setdefault(name, {})
         table[last] = value
     return Ieee1394Profile.model_validate(data)
+
+
+# A strategy costs more to make than to draw from: each is made once.
+TRUTHS = st.booleans()
+OF_ALL: dict[str, st.SearchStrategy[Any]] = {
+    "node__execution__grade": st.sampled_from([None, "measured", "derived", "assumed"]),
+    "node__execution__residual": st.sampled_from(["none", "paper", "standard"]),
+    "node__execution__measured_gap_count": st.integers(0, 63),
+    "bus__speed": st.sampled_from(["S100", "S200", "S400"]),
+    "bus__gap_count": st.one_of(st.integers(0, 63), st.just("optimal")),
+    "bus__nodes": st.integers(1, 80),
+    "bus__max_hops": st.one_of(st.none(), st.integers(1, 20)),
+    "bus__cable_length_m": st.sampled_from([0.5, 2.0, 4.5]),
+    "bus__timing_model": st.sampled_from(["paper", "standard"]),
+    "cycle__period_us": st.floats(1.0, 50_000.0),
+    "cycle__slice_ratio": st.floats(0.01, 1.0),
+    "cycle__nonperiodic_us": st.one_of(st.just(0.0), st.floats(0.0, 500.0)),
+    "cycle__sync__ping_us": st.floats(0.0, 5.0),
+    "cycle__sync__ping_per_node_us": st.floats(0.0, 5.0),
+    "payload__read_bytes": st.integers(1, 3000),
+    "payload__write_bytes": st.integers(1, 3000),
+    "payload__overhead_bytes": st.integers(0, 40),
+    "node__axes": st.integers(1, 8),
+    "node__execution__base_us": st.floats(0.0, 100.0),
+    "node__execution__per_byte_us": st.floats(0.0, 1.0),
+}
+OF_STANDARD: dict[str, st.SearchStrategy[Any]] = {
+    "bus__phy_delay_us": st.one_of(st.none(), st.floats(0.01, 0.2)),
+    "cycle__retries": st.integers(0, 5),
+    "cycle__schedule": st.sampled_from(["individual", "broadcast"]),
+    "cycle__broadcast_request": st.sampled_from(["isochronous", "priority", "timed"]),
+    "host__transaction_us": st.one_of(st.just(0.0), st.floats(0.0, 60.0)),
+    "node__read_response": st.sampled_from(["split", "concatenated"]),
+    "node__write_response": st.sampled_from(["split", "unified"]),
+    "node__response_us": st.floats(0.0, 1.63),
+    "node__execution__worst_extra_us": st.floats(0.0, 10.0),
+}
+"""What the paper cannot express."""
+ISOCHRONOUS_US = st.floats(0.0, 40.0)
+HUB_NODES = st.integers(1, 18)
+"""A hub collects of 16 nodes; some are beyond it."""
 
 
 @st.composite
 def profiles(draw: st.DrawFn) -> Profile:
     """Random profiles over the whole range that a plan may have; half of them with what the paper cannot express."""
-    master = draw(st.booleans())
-    own: dict[str, Any] = {
-        "bus__cycle_master": master,
-        "bus__isochronous_us": draw(st.floats(0.0, 40.0)) if master else 0.0,
-        "bus__phy_delay_us": draw(st.one_of(st.none(), st.floats(0.01, 0.2))),
-        "cycle__retries": draw(st.integers(0, 5)),
-        "cycle__schedule": draw(st.sampled_from(["individual", "broadcast"])),
-        "cycle__broadcast_request": draw(st.sampled_from(["isochronous", "priority", "timed"])),
-        "host": {"transaction_us": draw(st.one_of(st.just(0.0), st.floats(0.0, 60.0)))},
-        "node__read_response": draw(st.sampled_from(["split", "concatenated"])),
-        "node__write_response": draw(st.sampled_from(["split", "unified"])),
-        "node__response_us": draw(st.floats(0.0, 1.63)),
-        "node__execution__worst_extra_us": draw(st.floats(0.0, 10.0)),
-    }
-    chosen = own if draw(st.booleans()) else {}
-    # A hub collects of 16 nodes; some are beyond it.
-    most = 18 if chosen.get("cycle__schedule") == "broadcast" else 80
-    return make_profile(
-        **chosen,
-        node__execution__grade=draw(st.sampled_from([None, "measured", "derived", "assumed"])),
-        node__execution__residual=draw(st.sampled_from(["none", "paper", "standard"])),
-        node__execution__measured_gap_count=draw(st.integers(0, 63)),
-        bus__speed=draw(st.sampled_from(["S100", "S200", "S400"])),
-        bus__gap_count=draw(st.one_of(st.integers(0, 63), st.just("optimal"))),
-        bus__nodes=draw(st.integers(1, most)),
-        bus__max_hops=draw(st.one_of(st.none(), st.integers(1, 20))),
-        bus__cable_length_m=draw(st.sampled_from([0.5, 2.0, 4.5])),
-        bus__timing_model=draw(st.sampled_from(["paper", "standard"])),
-        cycle__period_us=draw(st.floats(1.0, 50_000.0)),
-        cycle__slice_ratio=draw(st.floats(0.01, 1.0)),
-        cycle__nonperiodic_us=draw(st.one_of(st.just(0.0), st.floats(0.0, 500.0))),
-        cycle__sync__ping_us=draw(st.floats(0.0, 5.0)),
-        cycle__sync__ping_per_node_us=draw(st.floats(0.0, 5.0)),
-        payload__read_bytes=draw(st.integers(1, 3000)),
-        payload__write_bytes=draw(st.integers(1, 3000)),
-        payload__overhead_bytes=draw(st.integers(0, 40)),
-        node__axes=draw(st.integers(1, 8)),
-        node__execution__base_us=draw(st.floats(0.0, 100.0)),
-        node__execution__per_byte_us=draw(st.floats(0.0, 1.0)),
-    )
+    chosen: dict[str, Any] = {key: draw(one) for key, one in OF_ALL.items()}
+    if draw(TRUTHS):
+        chosen |= {key: draw(one) for key, one in OF_STANDARD.items()}
+        chosen["bus__cycle_master"] = draw(TRUTHS)
+        if chosen["bus__cycle_master"]:
+            chosen["bus__isochronous_us"] = draw(ISOCHRONOUS_US)
+        if chosen["cycle__schedule"] == "broadcast":
+            chosen["bus__nodes"] = draw(HUB_NODES)
+    return make_profile(**chosen)
 
 
 @pytest.fixture(scope="session")
@@ -385,6 +395,22 @@ def carries() -> Callable[[Profile, int], bool]:
 def start() -> Callable[[Profile, int], Fraction]:
     """The second implementation of what one cycle start costs."""
     return exact_cycle_start_us
+
+
+def good_around(found: int, is_good: Callable[[int], bool]) -> list[int]:
+    """Which of a number of nodes, the next ones and some up to the most of a bus are good.
+
+    Of a largest number it is that number alone, or none of 0. What is good has no gaps: once broken, a limit stays
+    broken, as is tested of every kind.
+    """
+    asked = {found, found + 1, found + 2, (found + 62) // 2, 62}
+    return [nodes for nodes in sorted(asked) if 1 <= nodes <= 62 and is_good(nodes)]
+
+
+@pytest.fixture(scope="session")
+def around() -> Callable[[int, Callable[[int], bool]], list[int]]:
+    """What decides whether a number of nodes is the largest."""
+    return good_around
 
 
 @pytest.fixture(scope="session")

@@ -27,6 +27,7 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 Make = Callable[..., Profile]
 MODELS: tuple[TimingModelName, ...] = ("paper", "standard")
+SOME = settings(max_examples=50, deadline=None)
 
 
 def phases(profile: Profile, kind: TransactionKind, *, model: TimingModelName, payload_bytes: int) -> Phases:
@@ -110,6 +111,7 @@ def test_what_the_model_leaves_of_table_1_is_measured_less_equation_13(model: Ti
     assert result.payloads[0].unexplained_us == pytest.approx(6 - half_us, abs=1e-9)
 
 
+@SOME
 @given(data=st.data())
 def test_latencies_of_a_profile_give_its_own_execution_time(
     any_profile: st.SearchStrategy[Profile], data: st.DataObject
@@ -145,6 +147,7 @@ def test_latencies_of_a_profile_give_its_own_execution_time(
 points = st.lists(st.tuples(st.integers(1, 2048), st.floats(0, 500)), min_size=2, max_size=30)
 
 
+@SOME
 @given(points=points)
 def test_lines_agree_with_numpy_and_scipy(make: Make, points: list[tuple[int, float]]) -> None:
     profile = make()
@@ -168,6 +171,7 @@ def test_lines_agree_with_numpy_and_scipy(make: Make, points: list[tuple[int, fl
         assert (line.base_us, line.per_byte_us) == pytest.approx((one, other), abs=2e-3)
 
 
+@SOME
 @given(points=points)
 def test_figures_by_payload_and_residuals_agree_with_numpy(make: Make, points: list[tuple[int, float]]) -> None:
     result = run(make(), of_execution(make(), points), form="table", keep_outliers=True)
@@ -277,6 +281,7 @@ def test_a_fit_says_which_model_and_gap_count_it_was_fitted_against(make: Make, 
     assert result.fit_keys == {"residual": model, "measured_gap_count": 8}
 
 
+@SOME
 @given(points=points)
 def test_the_uncertainty_of_a_fit_is_the_spread_about_it(make: Make, points: list[tuple[int, float]]) -> None:
     profile, sizes = make(), {size for size, _ in points}

@@ -21,7 +21,7 @@ from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]
-SOME = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def of(profile: Profile) -> CapacityFigures:
@@ -63,7 +63,7 @@ def test_six_nodes_by_hand(make: Maker, gap_count: int, required_us: float, bias
     assert one.uncertainty_us == pytest.approx(2 * sqrt(sum(us**2 for us in parts_us.values())), rel=1e-4)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(data=st.data(), nodes=st.integers(1, 62), reserve=st.floats(0.0, 0.9))
 def test_what_a_slice_must_give_is_what_the_second_implementation_says(
     data: st.DataObject,

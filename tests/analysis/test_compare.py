@@ -32,7 +32,7 @@ from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 Profiles = Mapping[str, st.SearchStrategy[Profile]]
-SOME = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 KINDS = pytest.mark.parametrize("kind", kind_names())
 BOTH = ("ieee1394", "can")
 GANTRY = load("gantry-24").profile
@@ -97,18 +97,18 @@ def test_on_its_own_kind_it_is_what_capacity_gives(kind: str, data: st.DataObjec
     assert one.safe.axes == expected.safe_axes
 
 
-@pytest.mark.parametrize("other", kind_names())
 @KINDS
 @SOME
 @given(data=st.data())
 def test_the_machine_stays_and_every_key_is_accounted_for(
-    kind: str, other: str, data: st.DataObject, profiles_by_kind: Profiles
+    kind: str, data: st.DataObject, profiles_by_kind: Profiles
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
-    found = converted(profile, other)
-    assert found.profile.bus.kind == other
-    assert_same_machine(profile, found.profile)
-    assert_accounted(profile, other)
+    for other in kind_names():
+        found = converted(profile, other)
+        assert found.profile.bus.kind == other
+        assert_same_machine(profile, found.profile)
+        assert_accounted(profile, other)
 
 
 @pytest.mark.parametrize("other", kind_names())
@@ -168,7 +168,7 @@ def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
     assert smallest_period(load("sercos3-servo-8").profile).us == 250
 
 
-@pytest.mark.parametrize("name", ["paper-1ms", "can-servo-8", "gantry-24", "dvrk"])
+@pytest.mark.parametrize("name", ["can-servo-8", "gantry-24", "dvrk"])
 def test_the_points_of_the_curves_are_what_capacity_gives(name: str) -> None:
     profile = load(name).profile
     found = compare(profile)

@@ -33,7 +33,7 @@ from busplan.profile.write import profile_text
 from busplan.rules.gate import check_document
 from busplan.sections.profile import Profile
 
-SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 GANTRY = load("gantry-24").profile
 
 
@@ -225,7 +225,7 @@ def test_a_derivation_gives_the_figures(profile: Profile) -> None:
                 assert value is None
 
 
-@SOME
+@settings(SOME, max_examples=12)
 @given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
 def test_a_sweep_gives_what_each_profile_gives(profile: Profile, nodes: list[int]) -> None:
     name = profile.group[-1].name
@@ -345,7 +345,7 @@ def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., Profile]) ->
 # --- what to set ------------------------------------------------------------------------------------------
 
 
-@settings(SOME, max_examples=25)
+@settings(SOME, max_examples=15)
 @given(
     profile=grouped(),
     limits=st.fixed_dictionaries(

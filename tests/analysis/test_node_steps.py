@@ -18,7 +18,7 @@ BASE = load("paper-4ms").profile
 MODELS = st.sampled_from(["paper", "standard"])
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     model=MODELS,
     period_us=st.floats(1.0, 1e6),

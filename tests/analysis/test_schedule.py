@@ -22,7 +22,7 @@ from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]
 Exact = Callable[[Profile, str, int], Fraction]
-SOME = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 MOST_REQUIRED_US = 1e6
 
 

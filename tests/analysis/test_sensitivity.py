@@ -18,7 +18,7 @@ from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]
-SOME = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
 
 

@@ -1,8 +1,6 @@
 """What both kinds of SERCOS hold: periods that they know, every question in some form, and a start of their own."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,9 +12,10 @@ from hypothesis import strategies as st
 
 import busplan
 from busplan.analysis.all_answers import all_answers
+from busplan.analysis.capacity.figures import figures
 from busplan.analysis.capacity.node_steps import node_steps
 from busplan.analysis.map.ranges import default_direction
-from busplan.analysis.network import network_of
+from busplan.analysis.network import model_names, network_of
 from busplan.buses import kind_named
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.profile.shipped import load
@@ -79,15 +78,17 @@ def test_capacity_check_and_sweep_name_an_unknown_period(kind: str, period_us: f
 def test_the_smallest_period_is_known_and_the_one_before_is_too_short(kind: str, data: st.DataObject) -> None:
     nodes = data.draw(st.integers(1, 60))
     profile = override(load(f"{kind}-servo-8").profile, {"bus.nodes": nodes})
-    (found, _) = busplan.capacity(profile).results
+    deciding = kind_named(kind).deciding_model
+    first = model_names(profile)[0]
+    found = figures(profile, model=first)
     smallest_us, known = found.min_period_us, kind_named(kind).periods
     assert smallest_us is not None
     assert known.knows(smallest_us)
-    assert busplan.capacity(override(profile, {"cycle.period_us": smallest_us})).results[0].fits
+    assert figures(override(profile, {"cycle.period_us": smallest_us}), model=first).fits
     shorter = [one for one in known.us if one < smallest_us]
     if shorter:
-        assert not busplan.capacity(override(profile, {"cycle.period_us": shorter[-1]})).results[0].fits
-    steps = node_steps(profile, model=kind_named(kind).deciding_model)
+        assert not figures(override(profile, {"cycle.period_us": shorter[-1]}), model=first).fits
+    steps = node_steps(profile, model=deciding)
     assert steps.from_us[nodes - 1] == found.safe_min_period_us
 
 
@@ -117,7 +118,7 @@ def test_every_row_of_a_sweep_equals_capacity_of_its_point(kind: str, run: Run, 
     assert len(rows) == 2 * 4 * 3 * 2
     for row in rows:
         own = override(load(f"{kind}-servo-8").profile, {key: row.pop(key) for key in vary})
-        (found,) = busplan.capacity(own, timing_model=[row["timing_model"]]).results
+        found = figures(own, model=row["timing_model"])
         for key, value in row.items():
             expected = getattr(found, key)
             expected = list(expected) if key == "exceeded" else expected
@@ -200,8 +201,15 @@ FORMS = {
 }
 
 
-@KINDS
-@pytest.mark.parametrize(("line", "form"), [(one, form) for one, forms in FORMS.items() for form in forms])
+# Each question of both, in each of its forms of one.
+@pytest.mark.parametrize(
+    ("kind", "line", "form"),
+    [
+        (("sercos3", "sercos2")[(row + column) % 2], line, form)
+        for row, (line, forms) in enumerate(FORMS.items())
+        for column, form in enumerate(forms)
+    ],
+)
 def test_every_question_is_answered(run: Run, tmp_path: Path, kind: str, line: str, form: str) -> None:
     command, *options = line.split()
     done = run(command, f"{kind}-servo-8", *options, "--format", form, cwd=tmp_path)
@@ -219,20 +227,6 @@ def test_groups_of_unlike_nodes_are_answered(kind: str, run: Run, tmp_path: Path
     assert one.required_us == pytest.approx(
         sum(event.duration_us for event in busplan.timeline(found).cycle_events if event.term)
     )
-
-
-@KINDS
-def test_a_profile_of_it_alone_loads_it(kind: str) -> None:
-    def loaded(name: str) -> set[str]:
-        program = (
-            f"import sys, busplan; busplan.capacity({name!r});"
-            "print(*(one for one in sys.modules if one.startswith('busplan.buses.')))"
-        )
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        return {one.split(".")[2] for one in done.stdout.split()}
-
-    assert not loaded("paper-4ms") & {"sercos", "sercos2", "sercos3"}
-    assert not loaded(f"{kind}-servo-8") & {"ieee1394", "can", {"sercos2": "sercos3", "sercos3": "sercos2"}[kind]}
 
 
 @KINDS

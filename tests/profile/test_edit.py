@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import cache
 from itertools import count
 from typing import Any
 
@@ -122,9 +123,14 @@ class Writer:
             yield from self.table(section, value)
 
 
+@cache
+def shipped(name: str) -> Document:
+    return load(name).document
+
+
 @st.composite
 def layouts(draw: st.DrawFn, *, usual: bool) -> list[Chunk]:
-    data = load("paper-two-node").document.data()
+    data = shipped("paper-two-node").data()
     if draw(st.booleans()):
         data["node"]["execution"] = LINEAR
     return list(Writer(draw, usual=usual).table((), data))
@@ -229,6 +235,7 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
         assert set((name[1] or name[2] or next(iter(parts))).split(".")) <= parts, f"{line!r} is new"
 
 
+@settings(max_examples=50, deadline=None)
 @given(
     st.sampled_from(
         [one for one in shipped_names() if not (found := load(one).profile).group and found.bus.kind == "ieee1394"]
@@ -236,20 +243,20 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
     edits(),
 )
 def test_shipped_profiles(name: str, changes: dict[str, Any]) -> None:
-    check(chunks_of(load(name).document.text), changes, usual=True)
+    check(chunks_of(shipped(name).text), changes, usual=True)
 
 
 MARKS = st.sampled_from([b"", b"\xef\xbb\xbf"])
 LINE_ENDS = st.sampled_from(["\n", "\r\n"])
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(layouts(usual=True), edits(), LINE_ENDS, MARKS)
 def test_sections_with_comments(chunks: list[Chunk], changes: dict[str, Any], line_end: str, mark: bytes) -> None:
     check(chunks, changes, usual=True, line_end=line_end, mark=mark)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(layouts(usual=False), edits(), LINE_ENDS)
 def test_any_layout(chunks: list[Chunk], changes: dict[str, Any], line_end: str) -> None:
     check(chunks, changes, usual=False, line_end=line_end)

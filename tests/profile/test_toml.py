@@ -679,7 +679,7 @@ def mutations(draw: st.DrawFn) -> bytes:
     return content
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(content=mutations())
 def test_a_shipped_profile_after_any_accident_loads_or_is_refused_with_places_inside_it(content: bytes) -> None:
     check_outcome(content)

@@ -1,8 +1,6 @@
 """A CAN bus: its cycle by hand, its identifiers, its limits and rules, and every question in some form."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -311,19 +309,6 @@ def test_every_question_is_answered(run: Run, tmp_path: Path, line: str, form: s
     done = run(command, "can-servo-8", *options, "--format", form, cwd=tmp_path)
     assert done.returncode in (0, 1) if command == "check" else done.returncode == 0, done
     assert "gap count" not in done.stdout or command in ("check", "diff")
-
-
-def test_a_profile_of_it_alone_loads_it() -> None:
-    def loaded(name: str) -> set[str]:
-        program = (
-            f"import sys, busplan; busplan.capacity({name!r});"
-            "print(*(one for one in sys.modules if one.startswith('busplan.buses.')))"
-        )
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        return {one.split(".")[2] for one in done.stdout.split()}
-
-    assert "can" not in loaded("paper-4ms")
-    assert "ieee1394" not in loaded("can-servo-8")
 
 
 def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None:

@@ -1,8 +1,6 @@
 """An EtherCAT segment: its cycle by hand, latencies, clocks, limits and rules, and every question in some form."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -333,19 +331,6 @@ def test_groups_are_answered_one_by_one() -> None:
         assert any(limit.is_broken(asked.with_nodes(group.max_nodes + 1)) for limit in limits)
     transactions = busplan.latency(one, timing_model=["last-byte"]).transactions
     assert {each.group for each in transactions} == {"drives", "io"}
-
-
-def test_a_profile_of_it_alone_loads_it() -> None:
-    def loaded(name: str) -> set[str]:
-        program = (
-            f"import sys, busplan; busplan.capacity({name!r});"
-            "print(*(one for one in sys.modules if one.startswith('busplan.buses.')))"
-        )
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        return {one.split(".")[2] for one in done.stdout.split()}
-
-    assert "ethercat" not in loaded("can-servo-8")
-    assert not {"can", "ieee1394"} & loaded("ethercat-servo-8")
 
 
 def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None:

@@ -215,7 +215,7 @@ def allowance_us(case: Case) -> float:
 
 @pytest.mark.parametrize("alone", [False, True])
 def test_the_bus_never_takes_longer_than_the_closed_form(*, alone: bool) -> None:
-    @settings(max_examples=150, deadline=None)
+    @settings(max_examples=100, deadline=None)
     @given(cases(alone=alone))
     def holds(case: Case) -> None:
         found_us = allowance_us(case)

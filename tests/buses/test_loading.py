@@ -1,0 +1,34 @@
+"""A profile loads the code of its own kind of bus, and of no other."""
+
+import json
+import subprocess
+import sys
+
+from busplan.buses import kind_names
+from busplan.profile.shipped import load, shipped_names
+
+# One interpreter, from which each profile has a process of its own.
+PROGRAM = """
+import json, os, sys
+import busplan
+for name in sys.argv[1:]:
+    child = os.fork()
+    if not child:
+        busplan.capacity(name)
+        print(json.dumps([name, *(one for one in sys.modules if one.startswith("busplan.buses."))]), flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+
+
+def test_a_profile_loads_its_own_kind_of_bus_alone() -> None:
+    kind_of = {load(name).profile.bus.kind: name for name in shipped_names()}
+    assert set(kind_of) == set(kind_names())
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *kind_of.values()], capture_output=True, text=True, check=True
+    )
+    loaded = {
+        name: {one.split(".")[2] for one in modules} for name, *modules in map(json.loads, done.stdout.split("\n")[:-1])
+    }
+    assert {kind: loaded[name] & set(kind_of) for kind, name in kind_of.items()} == {kind: {kind} for kind in kind_of}
+    assert {kind for kind, name in kind_of.items() if "sercos" in loaded[name]} == {"sercos2", "sercos3"}
