@@ -124,8 +124,8 @@ def test_the_gate_names_the_limit_and_the_way_out(busplan: Run, own: Path) -> No
     assert "less bus.isochronous_us, or no cycle master, leaves time" in done.stdout
 
 
-@pytest.mark.parametrize("line", ["cycle_master = true", "retries = 100_000"])
-def test_a_timeline_of_too_many_events_is_refused(busplan: Run, own: Path, line: str) -> None:
+@pytest.mark.parametrize("line", ["cycle_master = true", "retries = 1_000_000"])
+def test_a_timeline_of_millions_of_events_is_refused_at_once(busplan: Run, own: Path, line: str) -> None:
     text = TEXT.replace("period_us = 4000", "period_us = 1e9").replace("nonperiodic_us = 0", "nonperiodic_us = 4e8")
     header = "[bus]" if line.startswith("cycle") else "[cycle]"
     own.write_text(text.replace(f"\n{header}\n", f"\n{header}\n{line}\n"), encoding="utf-8")

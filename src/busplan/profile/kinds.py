@@ -1,6 +1,7 @@
 """Model and keys of a profile, by its kind of bus."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 from itertools import product
 from types import UnionType
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
@@ -83,7 +84,12 @@ def cycle_keys(profile: Profile) -> tuple[str, ...]:
     """Keys of a profile that its cycle, or its verdict, may depend on."""
     model = profile_model(profile.bus.kind)
     several = [name for name, field in model.model_fields.items() if _are_several(field.annotation)]
-    names = {name: [one.name for one in getattr(profile, name)] for name in several}
+    return _cycle_keys(model, tuple((name, tuple(one.name for one in getattr(profile, name))) for name in several))
+
+
+@cache
+def _cycle_keys(model: type[Profile], several: tuple[tuple[str, tuple[str, ...]], ...]) -> tuple[str, ...]:
+    names = dict(several)
     groups = names["group"]
     others = {key for key in value_keys(Profile, {}) if key.partition(".")[0] in _NO_PART_OF_A_CYCLE}
     without = {*others, *_CHANGE_NO_FIGURE, *(f"group.{one}.{key}" for one in groups for key in _OF_GROUP)}

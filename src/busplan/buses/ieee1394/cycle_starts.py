@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
+from itertools import chain, repeat
 
 from busplan.buses.cycle import BusCycle, BusEvent, LeftOut, Term
 from busplan.buses.ieee1394 import equations
@@ -157,7 +158,7 @@ class CycleWithStarts(BusCycle):
         starts = self.number_of_starts
         sent, now_us = 0, 0.0
         start = BusEvent("cycle_start", "cycle_starts_us", plain(self.cycle_start_us) if starts else 0.0, "cycle start")
-        for stretch in (*self.stretches(), *self._behind()):
+        for stretch in chain(self.stretches(), self._behind()):
             while sent < starts and now_us >= sent * CYCLE_US:
                 yield start
                 sent, now_us = sent + 1, now_us + start.us
@@ -170,7 +171,9 @@ class CycleWithStarts(BusCycle):
     def _behind(self) -> Iterator[tuple[BusEvent]]:
         """Retries and the non-periodic window, behind what a schedule sends."""
         retries = 0 if self.model == "paper" else self.network.profile.cycle.retries
-        for _ in range(retries):
+        if retries:
             retry_us = plain(self.retries_us) / retries
-            yield (BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),)
+            yield from repeat(
+                (BusEvent("retry", "retries_us", retry_us, "busy retry of the longest request"),), retries
+            )
         yield (BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window"),)
