@@ -13,6 +13,7 @@ from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.check import CircleCheck
 from busplan.analysis.circle.roundness import circle_test
+from busplan.analysis.circle.setup import path_steps
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import Change, cure
 from busplan.analysis.planning.plan import plan
@@ -157,7 +158,8 @@ def test_no_gap_count_is_advised_for_cables_that_the_table_does_not_know(make: M
 
 def test_nothing_is_advised_where_the_standard_ends(make: Make) -> None:
     (verdict,) = verdicts(capacity(make(cycle__period_us=1e6)))
-    assert (verdict.all_well, verdict.change, verdict.no_change) == (True, None, "")
+    assert (verdict.all_well, verdict.change) == (True, None)
+    assert verdict.no_change.startswith("17 hops are over the 16 of one bus (a tree with")
     (verdict,) = verdicts(capacity(make(bus__nodes=20)))
     assert verdict.change is None
     assert verdict.no_change.startswith("20 hops are over the 16 of one bus (a tree with")
@@ -257,3 +259,27 @@ def test_a_loop_on_the_node_that_lacks_its_margin_is_tried_once(make: Make) -> N
             for each in circle_test(one, periods_us=[600.0, 900.0, 4000.0], explain=False).results
         }
         assert len(margins) == 1
+
+
+def test_no_period_is_advised_whose_circle_is_too_long_to_be_run() -> None:
+    # Lost set-points spoil the circle at every period; ramps of a hundred periods of minutes are millions of steps.
+    profile = override(load("ethercat-servo-8").profile, {"delivery.loss_probability": 0.02})
+    (verdict,) = (one for one in verdicts(capacity(profile)) if one.all_well)
+    assert (verdict.change, verdict.no_change) == (None, "no period that was tried passes the circle")
+
+
+def test_a_circle_that_is_longer_than_is_run_fails_unless_the_own_one_is_as_long(make: Make) -> None:
+    own = make(servo={"step_us": 1.0}, cycle__period_us=4000.0)
+    longer = override(own, {"cycle.period_us": 5000.0})
+    steps = path_steps(own)
+    assert CircleCheck(most_steps=steps - 1, own=own)(own) == ()
+    (said,) = CircleCheck(most_steps=steps, own=own)(longer)
+    assert said == f"a circle of {path_steps(longer):,} steps is too long to be run here"
+
+
+def test_more_nodes_of_a_loaded_can_bus_take_a_longer_period() -> None:
+    profile = override(load("can-servo-8").profile, {"limits.max_load": 0.6})
+    (verdict,) = verdicts(capacity(profile))
+    assert (verdict.all_well, verdict.deciding.safe_limited_by) == (True, "load")
+    assert verdict.change is not None
+    assert (verdict.change.nodes, verdict.change.changes) == (9, {"cycle.period_us": 4250.0})

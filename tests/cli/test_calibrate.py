@@ -29,11 +29,11 @@ run()
 """
 KILLS = {
     "half-written": """
-from busplan.cli import output
+from busplan import files
 def half(self, data):
     os.write(self.fileno(), bytes(data)[: len(data) // 2])
     die()
-output._Raw.write = half
+files._Raw.write = half
 """,
     "not yet on the disk": "os.fsync = die",
     "not yet renamed": "import pathlib\npathlib.Path.replace = die",

@@ -78,8 +78,8 @@ def rows_written(process: "subprocess.Popen[str]", folder: Path) -> bool:
     """Whether bytes stand in the file in the making."""
     with suppress(OSError):
         for path in Path(f"/proc/{process.pid}/fd").iterdir():
-            # Parts are written in a folder of their own.
-            if path.readlink().parent == folder and path.stat().st_size:
+            # Parts are written in a folder of their own, which is open, too.
+            if path.readlink().parent == folder and path.is_file() and path.stat().st_size:
                 return True
     return False
 

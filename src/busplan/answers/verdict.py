@@ -346,14 +346,10 @@ def period_must_change(profile: Profile) -> str:
 
 def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     """Say that no change is advised, and why."""
-    bus, figures = bus_of(profile), verdict.deciding
-    limit = bus.limit(figures.safe_limited_by or TIME)
-    if verdict.no_change or limit is None:
-        purpose = "helps" if verdict.all_well else "makes it safe" if figures.verdict == FITS else "makes it fit"
-        words = f"No change of {listed(changeable(profile), 'and')} {purpose}: {verdict.no_change}."
-        return Sentence((words,), "neutral" if verdict.all_well else "fails")
-    most = count_value(plain(limit.most(network_of(profile))))
-    return sentence(f"No setting carries more nodes: {{}} {limit.key} are the {bus.limits_of}'s limit.", most)
+    fits = verdict.deciding.verdict == FITS
+    purpose = "carries more nodes" if verdict.all_well else "makes it safe" if fits else "makes it fit"
+    words = f"No change of {listed(changeable(profile), 'and')} {purpose}: {verdict.no_change}."
+    return Sentence((words,), "neutral" if verdict.all_well else "fails")
 
 
 def places_of(results: Sequence[CapacityFigures], *, start: int, change: int) -> dict[str, str]:

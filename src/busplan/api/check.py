@@ -3,17 +3,21 @@
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 from busplan.analysis.circle.check import MOST_STEPS
 from busplan.answers.check import check_report, summary_sentence
 from busplan.api.answer import Answer
-from busplan.api.inputs import Path, argument, items
+from busplan.api.inputs import ProfileLike, argument, items
 from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.profile.collect import collect
-from busplan.rules.gate import FileResult, check_source
+from busplan.profile.document import Document
+from busplan.profile.write import profile_text
+from busplan.rules.gate import FileResult, check_document, check_source
 from busplan.rules.report import CheckReport, Located, Summary
+from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -55,13 +59,16 @@ class CheckAnswer(Answer):
 
 
 @renamed(with_circle="circle")
-def check(paths: Path | Iterable[Path], *, circle: bool = True, circle_steps: int = MOST_STEPS) -> CheckAnswer:
+def check(
+    paths: ProfileLike | Iterable[ProfileLike], *, circle: bool = True, circle_steps: int = MOST_STEPS
+) -> CheckAnswer:
     """Check whether profiles fit their bus and hold their circle.
 
     Parameters
     ----------
     paths
-        One or several files, folders (every *.toml below with a `schema_version`) or shipped names.
+        One or several files, folders (every *.toml below with a `schema_version`), shipped names or a `Profile` each. A
+        `Profile` is checked as the file that `busplan` would write of it, NAME.toml.
     circle
         Run the circle test of profiles that ask for one.
     circle_steps
@@ -85,6 +92,11 @@ def check(paths: Path | Iterable[Path], *, circle: bool = True, circle_steps: in
     >>> answer.passed, answer.summary
     (True, Summary(files=2, errors=0, warnings=0))
     """
-    several = [paths] if isinstance(paths, str | os.PathLike) else items(paths, name="paths")
-    sources = collect([argument(path) for path in several]).sources
-    return CheckAnswer(tuple(check_source(source, with_circle=circle, circle_steps=circle_steps) for source in sources))
+    # A profile is iterable, too: over its sections.
+    several = [paths] if isinstance(paths, str | os.PathLike | Profile) else items(paths, name="paths")
+    checks = partial(check_document, with_circle=circle, circle_steps=circle_steps, record=False)
+    written = [Document(f"{one.name}.toml", profile_text(one)) for one in several if isinstance(one, Profile)]
+    files = [argument(one) for one in several if not isinstance(one, Profile)]
+    sources = collect(files).sources if files else ()
+    found = [check_source(source, with_circle=circle, circle_steps=circle_steps) for source in sources]
+    return CheckAnswer((*found, *map(checks, written)))

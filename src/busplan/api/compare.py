@@ -9,7 +9,8 @@ from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, Not
 from busplan.answers.compare import compare_report, headline, require_drawn
 from busplan.api.answer import DrawnAnswer
 from busplan.api.inputs import ProfileLike, load_profile, one_or_several
-from busplan.drawings.pictures import PICTURES, Picture, compare_picture
+from busplan.drawings.pictures import compare_picture
+from busplan.forms import PICTURES, Picture
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.progress import Progress

@@ -13,8 +13,9 @@ from busplan.api.answer import DrawnAnswer
 from busplan.api.inputs import ProfileLike, load_profile
 from busplan.api.renamed import renamed
 from busplan.api.sweep import axis_values
-from busplan.drawings.pictures import PICTURES, map_picture
+from busplan.drawings.pictures import map_picture
 from busplan.errors import BusplanError
+from busplan.forms import PICTURES
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.sections.profile import Profile

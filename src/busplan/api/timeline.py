@@ -9,8 +9,9 @@ from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule,
 from busplan.answers.timeline import timeline_report
 from busplan.api.answer import DrawnAnswer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
-from busplan.drawings.pictures import TIMELINE_PICTURES, timeline_picture
+from busplan.drawings.pictures import timeline_picture
 from busplan.errors import BusplanError
+from busplan.forms import TIMELINE_PICTURES
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 

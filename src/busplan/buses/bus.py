@@ -69,8 +69,6 @@ class Bus(ABC):
     """Whether the table of `latency` has a row for each transaction, and a column for each figure."""
     limits: ClassVar[tuple[Limit, ...]]
     """In the order in which they are reported; at least one grows with the nodes."""
-    limits_of: ClassVar[str] = "bus"
-    """Who sets them, as a message says it."""
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
     starter: "ClassVar[Starter]"

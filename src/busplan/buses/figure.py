@@ -189,7 +189,12 @@ LIMITED_BY: Final = Figure(
     "limited_by", "limit", _CYCLE, "what keeps the most nodes from being more", "limited by", sort="word"
 )
 MIN_PERIOD: Final = Figure(
-    "min_period_us", "T_s,min", _CYCLE, "smallest period that these nodes fit in", "smallest period", better="less"
+    "min_period_us",
+    "T_s,min",
+    _CYCLE,
+    "smallest period that gives these nodes their time; a limit of the bus may allow none",
+    "smallest period",
+    better="less",
 )
 MIN_SLICE_RATIO: Final = Figure(
     "min_slice_ratio",
@@ -257,7 +262,7 @@ SAFE_MIN_PERIOD: Final = Figure(
     "safe_min_period_us",
     "T_s,safe",
     _CERTAINTY,
-    "smallest period that these nodes are shown to fit in",
+    "smallest period that is shown to give these nodes their time; a limit of the bus may allow none",
     "smallest safe period",
     better="less",
 )

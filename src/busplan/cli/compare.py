@@ -13,8 +13,7 @@ from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.output import write_document
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
-from busplan.drawings.pictures import PICTURES, Picture
-from busplan.forms import ENDINGS, Form
+from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:

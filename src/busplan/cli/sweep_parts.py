@@ -3,7 +3,7 @@
 import io
 import json
 import os
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from time import monotonic
@@ -18,7 +18,7 @@ from busplan.files import lock, naming_errors, write_file
 from busplan.profile.write import profile_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from busplan.analysis.sweep.grid import Array, Values
     from busplan.cli.sweep_job import SweepJob
@@ -42,8 +42,8 @@ def kept_parts(job: "SweepJob", output: Path) -> "Iterator[Parts]":
     BusplanError
         As `Parts`, or another run has them.
     """
-    with _locked(parts_path(output), output):
-        parts = Parts(job, output)
+    with ExitStack() as stack:
+        parts = Parts(job, output, lambda: stack.enter_context(_locked(parts_path(output), output)))
         yield parts
         parts.remove()
 
@@ -89,6 +89,8 @@ class Parts:
         The sweep; it has an output file.
     output
         That file.
+    claim
+        Makes the folder, and keeps other runs out of it.
 
     Raises
     ------
@@ -96,8 +98,11 @@ class Parts:
         There are parts, and they are of another sweep, or are not to be used.
     """
 
-    def __init__(self, job: "SweepJob", output: Path) -> None:
+    def __init__(self, job: "SweepJob", output: Path, claim: "Callable[[], None]") -> None:
         self.folder = parts_path(output)
+        self._claim, self._is_ours = claim, self.folder.exists()
+        if self._is_ours:
+            claim()
         self._facts = _facts(job)
         self._pending: list[Array] = []
         self._written_s = -_OFTEN_S
@@ -142,6 +147,9 @@ class Parts:
         self._pending = []
         content = io.BytesIO()
         np.save(content, part)
+        if not self._is_ours:
+            self._claim()
+            self._is_ours = True
         if not (self.folder / _MANIFEST).exists():
             write_file(self.folder / _MANIFEST, json.dumps(self._facts, indent=2).encode(), overwrite=True)
         # No other part has this test, so none has this name.
@@ -159,6 +167,8 @@ class Parts:
         """Files to go on with."""
         try:
             inside = list(self.folder.iterdir())
+        except FileNotFoundError:
+            return []
         except OSError as error:
             raise BusplanError(f"{self.folder}: cannot be read: {error.strerror}") from None
         parts = sorted(path for path in inside if path.suffix == ".npy")

@@ -20,9 +20,8 @@ from busplan.cli.options import (
 )
 from busplan.cli.output import write_document
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
-from busplan.drawings.pictures import TIMELINE_PICTURES, TimelinePicture
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, Form
+from busplan.forms import ENDINGS, TIMELINE_PICTURES, Form, TimelinePicture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:

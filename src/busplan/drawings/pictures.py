@@ -1,22 +1,15 @@
-"""Answers as files of pictures: which forms there are, and what draws each."""
+"""Answers as files of pictures: what draws each form."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Final, Literal, assert_never
+from typing import TYPE_CHECKING, assert_never
 
 if TYPE_CHECKING:
     from busplan.analysis.comparison.kinds import KindComparison
     from busplan.analysis.map.trade_off import TradeOff
     from busplan.analysis.timeline.schedule import Schedule
-
-Picture = Literal["svg", "png"]
-TimelinePicture = Literal["mermaid", "svg", "png"]
-PICTURES: Final[Mapping[str, Picture]] = MappingProxyType({".svg": "svg", ".png": "png"})
-TIMELINE_PICTURES: Final[Mapping[str, TimelinePicture]] = MappingProxyType({".mmd": "mermaid", **PICTURES})
-"""Form by file name extension. A PNG needs the extra `plot` (matplotlib)."""
+    from busplan.forms import Picture, TimelinePicture
 
 
-def map_picture(found: "TradeOff", form: Picture, *, title: str) -> str | bytes:
+def map_picture(found: "TradeOff", form: "Picture", *, title: str) -> str | bytes:
     """Draw a map as a file of its own.
 
     Parameters
@@ -41,7 +34,7 @@ def map_picture(found: "TradeOff", form: Picture, *, title: str) -> str | bytes:
             assert_never(form)
 
 
-def compare_picture(found: "KindComparison", form: Picture, *, title: str) -> str | bytes:
+def compare_picture(found: "KindComparison", form: "Picture", *, title: str) -> str | bytes:
     """Draw a comparison of buses, of which at least one has the machine; otherwise as `map_picture`."""
     match form:
         case "svg":
@@ -56,7 +49,7 @@ def compare_picture(found: "KindComparison", form: Picture, *, title: str) -> st
             assert_never(form)
 
 
-def timeline_picture(found: "Schedule", form: TimelinePicture, *, title: str) -> str | bytes:
+def timeline_picture(found: "Schedule", form: "TimelinePicture", *, title: str) -> str | bytes:
     """Draw a timeline; otherwise as `map_picture`."""
     match form:
         case "mermaid":

@@ -10,12 +10,17 @@ if TYPE_CHECKING:
 Form = Literal["table", "markdown", "html", "csv", "json"]
 RowsForm = Literal["csv", "json", "jsonl", "parquet"]
 """Forms with every row of a sweep, written during it."""
+Picture = Literal["svg", "png"]
+"""Forms of a picture that is a file of its own. A PNG needs the extra `plot` (matplotlib)."""
+TimelinePicture = Literal["mermaid", "svg", "png"]
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )
 ROWS_ENDINGS: Final[Mapping[str, RowsForm]] = MappingProxyType(
     {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".parquet": "parquet"}
 )
+PICTURES: Final[Mapping[str, Picture]] = MappingProxyType({".svg": "svg", ".png": "png"})
+TIMELINE_PICTURES: Final[Mapping[str, TimelinePicture]] = MappingProxyType({".mmd": "mermaid", **PICTURES})
 """Form by file name extension."""
 
 

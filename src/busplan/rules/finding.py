@@ -121,7 +121,7 @@ class Subject:
 
     @cached_property
     def _cure(self) -> Mending:
-        circle = None if self._circle_steps is None else CircleCheck(most_steps=self._circle_steps)
+        circle = None if self._circle_steps is None else CircleCheck(most_steps=self._circle_steps, own=self.profile)
         found = cure(self.profile, circle=circle)
         if found.changes is None:
             return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}")

@@ -23,9 +23,12 @@ class CircleCheck:
     expected
         Number of tests expected [1].
     most_steps
-        Most simulated steps of each axis: a longer circle is not run, and is not said to fail. None for any number.
-    taken
-        Profile whose own circle, at its own period and with its own delays, is taken to pass.
+        Most simulated steps of each axis; None for any number. A longer circle is not run, and fails unless it is no
+        longer than that of `own`.
+    own
+        Profile that the variants are of.
+    is_taken
+        Whether its circle, at its own period and with its own delays, is taken to pass.
     """
 
     def __init__(
@@ -34,7 +37,8 @@ class CircleCheck:
         progress: Progress | None = None,
         expected: int = 1,
         most_steps: int | None = None,
-        taken: Profile | None = None,
+        own: Profile | None = None,
+        is_taken: bool = False,
     ) -> None:
         self._progress = progress
         self._expected = expected
@@ -42,8 +46,9 @@ class CircleCheck:
         self._known: dict[tuple[float, tuple[float, float], float], tuple[str, ...]] = {}
         self._always: tuple[str, ...] = ()
         """Failures that no period mends."""
-        if taken is not None:
-            self._known[_key(taken)] = ()
+        self._own = own
+        if own is not None and is_taken:
+            self._known[_key(own)] = ()
 
     def __call__(self, profile: Profile) -> tuple[str, ...]:
         """Run the circle test and list its failures, or why it cannot be run; empty if it passes.
@@ -64,8 +69,10 @@ class CircleCheck:
         from busplan.analysis.circle.setup import path_steps
 
         try:
-            if self._most_steps is not None and path_steps(profile) > self._most_steps:
-                return ()
+            steps = path_steps(profile)
+            if self._most_steps is not None and steps > self._most_steps:
+                own_steps = 0 if self._own is None else path_steps(self._own)
+                return () if steps <= own_steps else (f"a circle of {steps:,} steps is too long to be run here",)
             result = circle_test(profile, explain=False, progress=self._report).results[0]
         except BusplanError as error:
             return error.problems

@@ -3,7 +3,6 @@
 from typing import NamedTuple
 
 from busplan.analysis.capacity.certainty import FITS
-from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.check import MOST_STEPS, CircleCheck
 from busplan.analysis.network import bus_of
@@ -75,16 +74,15 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
         The change, None if there is none; and if so, what stands in the way.
     """
     fits = now.verdict == FITS and now.safe
-    circle = CircleCheck(most_steps=MOST_STEPS, taken=profile if fits else None)
+    circle = CircleCheck(most_steps=MOST_STEPS, own=profile, is_taken=fits)
     own = cure(profile, circle=circle)
     if own.changes is None or own.changes:
         return _change(profile, own, nodes=now.nodes), own.why
     if now.safe_nodes is None:
         return None, ""  # nodes differ, and nobody asked for more of which
-    bound = bus_of(profile).limit(now.safe_limited_by or TIME)
     nodes = now.safe_nodes + 1
-    if nodes > MAX_COUNT or (bound is not None and not bound.is_safety):
-        return None, ""
+    if nodes > MAX_COUNT:
+        return None, f"{MAX_COUNT} nodes are the most of a profile"
     more = cure(override(profile, dict(with_nodes(nodes))), circle=circle)
     return _change(profile, more, nodes=nodes), more.why
 

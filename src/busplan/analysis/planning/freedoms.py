@@ -101,8 +101,9 @@ def freed(
     if names is None:
         return tuple(one for one in still if one.cost in DEFAULT_COSTS)
     said = ", ".join(one.name for one in known)
+    kind = f"{profile.bus.kind} with groups" if profile.group else profile.bus.kind
     unknown = [
-        f"{option} {name}: there is nothing of that name to free on a bus of kind {profile.bus.kind}; there are {said}"
+        f"{option} {name}: there is nothing of that name to free on a bus of kind {kind}; there are {said}"
         for name in names
         if name not in {one.name for one in known}
     ]

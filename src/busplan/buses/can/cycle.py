@@ -92,7 +92,9 @@ class CanCycle(BusCycle):
             return ()
         numbers = [number for one, us in self._messages for number in (us, one.period_us, one.jitter_us)]
         lasts_us = named(
-            pointwise(_settled, others_us, *numbers, words="least w = others + sum of ceil((w + J) / T) C"),
+            pointwise(
+                _settled, others_us, *numbers, words="w = others + sum of ceil((w + J) / T) C, a bound at high load"
+            ),
             "busy_us",
             "w",
         )

@@ -76,7 +76,6 @@ class Ieee1394(Bus):
     safety = "gap count"
     safety_figure = figures.GAP_COUNT_SAFE
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
-    limits_of = "standard"
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
     starter = Starter(
         """\
