@@ -233,5 +233,5 @@ def test_a_warning_passes_and_a_file_that_is_not_there_does_not(own: Path) -> No
 def test_a_profile_is_checked_as_the_file_that_would_be_written_of_it() -> None:
     fast = busplan.load_profile("paper-4ms", changes={"cycle.period_us": 300})
     answer = busplan.check([fast, "paper-1ms"], circle=False)
-    assert (answer.passed, [one.path for one in answer.files]) == (False, ["paper-1ms", "paper-4ms.toml"])
+    assert (answer.passed, [one.path for one in answer.files]) == (False, ["paper-1ms.toml", "paper-4ms.toml"])
     assert "BP101" in [one.finding.code for one in busplan.check(fast, circle=False).findings]
