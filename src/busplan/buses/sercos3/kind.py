@@ -136,7 +136,7 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say what each device is charged."""
-        return "every device its service channel, its control and its data"
+        return "every device its connection control and its data"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Version, timing method and gap."""
