@@ -21,6 +21,8 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 # Hundreds of runs of the program compile its modules once, as those of a user do, and not in each run again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Matrices are small, and every processor has a test of its own.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from busplan.buses import kind_names
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
-SOME = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SOME = settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.mark.parametrize("kind", kind_names())
@@ -48,4 +48,4 @@ def test_it_is_good_and_no_larger_one_is(
     assert not largest or is_good(largest)
     above = range(largest + step, most + 1, step)
     if above:
-        assert not any(map(is_good, {above[0], *data.draw(st.lists(st.sampled_from(above), max_size=8))}))
+        assert not any(map(is_good, {above[0], *data.draw(st.lists(st.sampled_from(above), max_size=4))}))
