@@ -18,7 +18,7 @@ from busplan.analysis.capacity.node_limit import most_nodes
 from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.table_1 import TABLE_1, residual
-from busplan.buses.parts import Limit
+from busplan.buses.parts import Limit, share_limit
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -280,3 +280,20 @@ def test_a_limit_with_a_doubt_has_three_verdicts(make: Maker, most: float, code:
     assert limit.words(network) == f"12.5 +/- 2.5 of {most:g}"
     assert most_nodes(network, [limit]).nodes == most // 2
     assert most_nodes(network, [limit.shown]).nodes == shown
+
+
+def test_a_limit_of_a_share_of_the_period_says_the_shortest_period(make: Maker) -> None:
+    limit = share_limit(
+        "early",
+        "{value:g} of {most:g} us",
+        lambda network: 100.0 * network.nodes,
+        share=lambda _network: 0.3,
+        doubt=lambda _network: 7.0,
+    )
+    network = network_of(make(bus__nodes=3, cycle__slice_ratio=0.7))
+    assert limit.slice_us is not None
+    ends = limit.period_us(network), limit.shown.period_us(network), limit.slice_us(network) / 0.7
+    assert ends == pytest.approx((286 / 0.3, 314 / 0.3, 314 / 0.3))
+    for end, kept, code in ((ends[0], 1, 2), (ends[1], 0, 1)):
+        assert limit.verdict_code(network._replace(period_us=end)) == kept
+        assert limit.verdict_code(network._replace(period_us=end * (1 - 1e-9))) == code

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from enum import IntEnum
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, Ink
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, larger
+from busplan.elementwise import Number, choose, larger, plain
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -68,6 +68,8 @@ class Limit(NamedTuple):
     slice_us: Callable[[Network], float] | None = None
     """The slice from which on plain numbers are shown to keep it, the slice ratio as it is, where a longer period is a
     cure [us]; without it no period is."""
+    share: Callable[[Network], Number] | None = None
+    """The share of the period that is its most, of a time that rests on no period: see `share_limit`."""
 
     def uncertainty(self, network: Network) -> Number:
         """Expanded uncertainty U of its value, two standard uncertainties; 0 where it is exact."""
@@ -88,6 +90,10 @@ class Limit(NamedTuple):
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
         return self.least_value(network) > self.most(network)
 
+    def period_us(self, network: Network) -> Number:
+        """The shortest period that keeps a limit that has a share [us]; 0 for any other."""
+        return 0.0 if self.share is None else self.least_value(network) / self.share(network)
+
     def verdict_code(self, network: Network) -> Number:
         """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
         surely = choose(self.is_broken(network), BROKEN, KEPT)
@@ -101,6 +107,43 @@ class Limit(NamedTuple):
             return self.says(network)
         value, most = self.value(network), self.most(network)
         return self.over.format(value=value, uncertainty=self.uncertainty(network), most=most, bus=network.profile.bus)
+
+
+FIT_ROUNDING: Final = 1e-12
+"""Relative allowance for the rounding of floats, so that what fills its time exactly fits it. It is a billionth of a
+crystal's tolerance and buys no time."""
+
+
+def share_limit(
+    key: str,
+    over: str,
+    value: Callable[[Network], Number],
+    *,
+    share: Callable[[Network], Number],
+    doubt: Callable[[Network], Number] | None = None,
+    **more: Any,
+) -> Limit:
+    """The limit of a time that must be over within a share of the period, and that a longer period keeps.
+
+    Parameters
+    ----------
+    key, over, doubt, more
+        As `Limit` has them.
+    value
+        The time, which rests on no period [us].
+    share
+        The share [1].
+    """
+    limit = Limit(
+        key,
+        over,
+        value,
+        lambda network: share(network) * network.period_us * (1 + FIT_ROUNDING),
+        doubt=doubt,
+        share=share,
+        **more,
+    )
+    return limit._replace(slice_us=lambda network: plain(limit.shown.period_us(network) * network.slice_ratio))
 
 
 class Starter(NamedTuple):

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from functools import reduce
 from typing import Final, Literal, NamedTuple, Protocol
 
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME, available_us, fits_in, time_limit
+from busplan.analysis.capacity.cycle import TIME, available_us, fits_in, time_limit
 from busplan.analysis.network import bus_of
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
-from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
+from busplan.buses.parts import BROKEN, COVERAGE, FIT_ROUNDING, KEPT, NOT_SHOWN_KEPT, Limit
 from busplan.elementwise import Number, choose, larger, named, square_root, total
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]

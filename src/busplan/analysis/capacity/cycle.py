@@ -6,16 +6,13 @@ from typing import Final
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
-from busplan.buses.parts import Limit
+from busplan.buses.parts import FIT_ROUNDING, Limit
 from busplan.buses.time_slice import time_slice_us
 from busplan.elementwise import Number
 from busplan.sections.profile import Profile
 
 TIME: Final = "time"
 """Key of the limit that is none of the bus: the cycle takes longer than its slice."""
-FIT_ROUNDING: Final = 1e-12
-"""Relative allowance for the rounding of floats, so that a cycle that fills its slice exactly fits it. It is a
-billionth of a crystal's tolerance and buys no time."""
 
 
 def cycle_of(profile: Profile, *, model: str, nodes: int | None = None) -> BusCycle:

@@ -24,7 +24,7 @@ from busplan.buses.figure import CERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, plain
+from busplan.elementwise import Number, choose, larger, plain
 from busplan.profile.toml import at_periods
 from busplan.sections.profile import Profile
 
@@ -263,7 +263,7 @@ def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | N
         "margin_corrected_us": found.margin_corrected_us,
         "uncertainty_us": found.uncertainty_us,
         "safe_required_us": found.safe_required_us,
-        "safe_min_period_us": _shortest_us(cycle.network, found.safe_required_us),
+        "safe_min_period_us": shortest_us(cycle.network, found.safe_required_us, is_shown=True),
     }
 
 
@@ -295,7 +295,7 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "utilisation": required_us / given_us,
         # What fits by rounding alone has no margin, and no negative one either.
         "margin_us": choose(spare_us < 0, choose(fits_in(required_us, available_us=given_us), 0.0, spare_us), spare_us),
-        "min_period_us": _shortest_us(network, required_us),
+        "min_period_us": shortest_us(network, required_us),
         "min_slice_ratio": required_us / period_us,
     }
 
@@ -305,6 +305,21 @@ def _existing(number: Number) -> float | None:
     return None if isinf(found := plain(number)) else found
 
 
-def _shortest_us(network: Network, needed_us: Number) -> Number:
-    """The shortest period that gives a cycle its time, and that the bus knows; infinite where it knows none [us]."""
-    return bus_of(network.profile).shortest_period_us(network, needed_us)
+def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) -> Number:
+    """The shortest period that gives a cycle its time, and that the bus knows; infinite where it knows none [us].
+
+    Parameters
+    ----------
+    network
+        The network; its own period plays no part. Its numbers may be of any sort.
+    needed_us
+        What the cycle needs [us].
+    is_shown
+        Whether limits must be shown to be kept.
+    """
+    bus = bus_of(network.profile)
+    found = bus.shortest_period_us(network, needed_us)
+    for limit in bus.limits:
+        if limit.share is not None:
+            found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit).period_us(network)))
+    return found

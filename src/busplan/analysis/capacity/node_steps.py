@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import FIT_ROUNDING
+from busplan.analysis.capacity.figures import shortest_us
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.network import bus_of, network_of
+from busplan.buses.parts import FIT_ROUNDING
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile
@@ -69,8 +70,15 @@ def node_steps(profile: Profile, *, model: str, group: str = "") -> NodeSteps:
     cycle = bus.cycle(network.with_nodes(counts), model=model)
     needed_us = np.asarray(certainty(cycle).safe_required_us if is_safe else cycle.most_required_us)
     said = network.asked_nodes
-    from_us = np.broadcast_to(np.asarray(bus.shortest_period_us(cycle.network, needed_us)), counts.shape).tolist()
-    return NodeSteps(model, said.node.axes, tuple(from_us), limit, is_safe, int(said.nodes))
+    from_us = shortest_us(cycle.network, needed_us, is_shown=is_safe)
+    return NodeSteps(
+        model,
+        said.node.axes,
+        tuple(np.broadcast_to(np.asarray(from_us), counts.shape).tolist()),
+        limit,
+        is_safe,
+        int(said.nodes),
+    )
 
 
 def telling_periods(profile: Profile, steps: Sequence[NodeSteps]) -> tuple[float, float]:

@@ -5,10 +5,11 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
+from busplan.buses.parts import FIT_ROUNDING
 from busplan.elementwise import plain
 from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
