@@ -542,12 +542,15 @@ def ethercat_profiles(draw: st.DrawFn) -> Profile:
         "bus": {
             "kind": "ethercat",
             "nodes": draw(st.integers(1, 40)),
-            "command": draw(st.sampled_from(["LRW", "LRD-LWR"])),
+            "master": draw(st.sampled_from([None, "SOEM", "TwinCAT"])),
+            "process_data": draw(st.sampled_from([None, "LRW-shared", "LRD-LWR"])),
             "distributed_clocks": draw(st.booleans()),
             "mailbox_polls": draw(st.integers(0, 2)),
             "mailbox_bytes": draw(st.sampled_from([1, 128, 1486])),
             "master_us": draw(st.sampled_from([0.0, 12.5])),
             "master_uncertainty_us": draw(st.sampled_from([None, 2.0])),
+            "master_jitter_us": draw(st.sampled_from([0.0, 7.5])),
+            "sync_shift": draw(st.sampled_from([0.0, 0.5])),
         },
         "cycle": {
             "period_us": draw(st.floats(60.0, 900.0)),

@@ -3,10 +3,10 @@
 import pytest
 
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
-from busplan.analysis.evidence import kind_evidence, paper_evidence, published
+from busplan.analysis.evidence import kind_evidence, paper_evidence
 from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES
 from busplan.buses.ieee1394 import table_1
-from busplan.buses.published import Comparison
+from busplan.buses.published import Comparison, published
 from busplan.profile.shipped import load
 
 # As printed in Table I: payload, T_lant, T1+T2, T1+T2 theory.

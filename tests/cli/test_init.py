@@ -145,7 +145,7 @@ def test_init_asks_in_a_terminal_for_what_is_missing(tmp_path: Path) -> None:
 def test_an_input_that_ends_is_no_answer(tmp_path: Path) -> None:
     code, said = answered(tmp_path, b"\x04")
     assert code == 2
-    assert "no answer: give --nodes, --axes, --period and --bytes-per-axis" in said
+    assert "no answer: give --nodes, --axes, --period, --bytes-per-axis and --host" in said
     assert files(tmp_path) == {}
 
 

@@ -21,7 +21,7 @@ def test_a_written_profile_reads_to_the_same(name: str) -> None:
     key, value = {
         "ieee1394": ("bus.gap_count", "optimal"),
         "can": ("bus.sync_counter", True),
-        "ethercat": ("bus.command", "LRD-LWR"),
+        "ethercat": ("bus.process_data", "LRD-LWR"),
         "sercos3": ("bus.version", "V1.0"),
         "sercos2": ("bus.data_rate_mbit_s", 4),
     }[profile.bus.kind]

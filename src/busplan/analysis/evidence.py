@@ -1,22 +1,17 @@
 """Figures that others have published or measured, beside computed ones, for each kind of bus."""
 
-import tomllib
 from collections.abc import Callable, Sequence
-from functools import cache
-from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import NamedTuple
 
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, PAPER, circle_sections
 from busplan.buses import kind_named, kind_names
 from busplan.buses.bus import Bus
-from busplan.buses.published import EvidenceSection
+from busplan.buses.published import EvidenceSection, published
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.progress import Progress
-
-_DATA: Final = Path(__file__).resolve().parents[1] / "data"
 
 
 class KindEvidence(NamedTuple):
@@ -28,18 +23,6 @@ class KindEvidence(NamedTuple):
     untested: str
     """What of it nobody else's figure tests; empty where all of it is tested."""
     sections: tuple[EvidenceSection, ...]
-
-
-@cache
-def published(name: str) -> dict[str, Any]:
-    """Published figures, as a data file of the package holds them.
-
-    Parameters
-    ----------
-    name
-        Name of the file.
-    """
-    return tomllib.loads((_DATA / f"{name}.toml").read_text(encoding="utf-8"))
 
 
 def bus_evidence(bus: Bus) -> tuple[EvidenceSection, ...]:

@@ -150,7 +150,11 @@ class Starter(NamedTuple):
     """What of a new profile is a matter of the kind."""
 
     bus: str
-    """Section [bus], as TOML without its nodes."""
+    """Section [bus], as TOML without its nodes and its host."""
+    hosts: Mapping[str, str] = {}
+    """Hosts to choose from by name, each with its lines of [bus]; none where the host plays no part."""
+    host: str = ""
+    """The one that is taken unless another is asked for."""
     period: str = "1ms"
     """Communication period, unless another is asked for."""
     slice_ratio: str = "1            # the whole period is for communication"
@@ -159,6 +163,10 @@ class Starter(NamedTuple):
     """How execution times are found, a format of `file`, the profile, and `group`, an option of `calibrate`."""
     base: str = "what a node does in each cycle"
     """What execution.base_us is."""
+
+    def section(self, host: str | None = None) -> str:
+        """Section [bus] with the lines of a host, or of the one that is usually taken."""
+        return "\n".join(filter(None, (self.bus, self.hosts.get(host or self.host))))
 
 
 class Cost(IntEnum):

@@ -1,8 +1,50 @@
 """Published figures beside computed ones."""
 
-from typing import Literal, NamedTuple
+import tomllib
+from collections.abc import Sequence
+from functools import cache
+from math import fsum, sqrt
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
 
 from busplan.sourced import Grade
+
+_DATA: Final = Path(__file__).resolve().parents[1] / "data"
+
+
+@cache
+def published(name: str) -> dict[str, Any]:
+    """Published figures, as a data file of the package holds them.
+
+    Parameters
+    ----------
+    name
+        Name of the file.
+    """
+    return tomllib.loads((_DATA / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+class Spread(NamedTuple):
+    """Several measurements of one quantity, in their unit."""
+
+    mean: float
+    uncertainty: float
+    """Standard uncertainty of the next one: sd sqrt(1 + 1/n) (JCGM 100, 4.2)."""
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> "Spread":
+        """Mean and spread of two values or more.
+
+        Examples
+        --------
+        >>> Spread.of([1.0, 2.0, 3.0])
+        Spread(mean=2.0, uncertainty=1.1547005383792515)
+        """
+        count = len(values)
+        mean = fsum(values) / count
+        variance = fsum((one - mean) ** 2 for one in values) / (count - 1)
+        return cls(mean, sqrt(variance * (1 + 1 / count)))
+
 
 Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
 

@@ -108,6 +108,9 @@ class RuleSubject(Protocol):
     def after(self, changes: Mapping[str, object]) -> RuleFigures:
         """Capacity under the timing model that decides, with other values by dotted key."""
 
+    def limit_words(self, key: str) -> str:
+        """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
+
     def cure(self) -> Mending:
         """The least change after which the profile holds every constraint of a plan."""
 

@@ -64,6 +64,15 @@ def init_command(
             help="Payload of each axis, in either direction [bytes].  [default: 8]",
         ),
     ] = None,
+    host: Annotated[
+        str | None,
+        typer.Option(
+            "--host",
+            metavar="HOST",
+            help="Host of the master, whose own time is assumed by it; of EtherCAT hardware, tuned, real-time or stock."
+            "  [default: tuned]",
+        ),
+    ] = None,
     source: Annotated[
         str | None,
         typer.Option(
@@ -89,14 +98,21 @@ def init_command(
         raise BusplanError(f"{name!r}: no name for a profile; expected a name or a path, as press-line")
     # A name that begins with a dash would be an option.
     shown = shlex.quote(f"./{path}" if str(path).startswith("-") else str(path))
-    asked = {"--bus": bus, "--nodes": nodes, "--axes": axes, "--period": period, "--bytes-per-axis": bytes_per_axis}
+    asked = {
+        "--bus": bus,
+        "--nodes": nodes,
+        "--axes": axes,
+        "--period": period,
+        "--bytes-per-axis": bytes_per_axis,
+        "--host": host,
+    }
     from busplan.profile.starter import machine_text, starter_text
 
     if bus not in (None, *kind_names()):
         raise BusplanError(f"--bus {bus}: no kind of bus; there are {', '.join(kind_names())}")
     if source is None:
         kind = bus or _KIND
-        machine, taken = _machine(kind, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis)
+        machine, taken = _machine(kind, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis, host=host)
         text = machine_text(machine, kind=kind, name=path.stem, file=shown)
     else:
         given = [option for option, value in asked.items() if value is not None]
@@ -109,13 +125,20 @@ def init_command(
 
 
 def _machine(
-    kind: str, *, nodes: int | None, axes: int | None, period: str | None, bytes_per_axis: int | None
+    kind: str,
+    *,
+    nodes: int | None,
+    axes: int | None,
+    period: str | None,
+    bytes_per_axis: int | None,
+    host: str | None,
 ) -> "tuple[Machine, list[str]]":
     """Take what is given, ask for the rest in a terminal, and take defaults elsewhere, which come second."""
     from busplan.profile.starter import Machine
     from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 
-    usual_period = kind_named(kind).starter.period
+    starter = kind_named(kind).starter
+    usual_period = starter.period
     asks = sys.stdin.isatty() and sys.stderr.isatty()
     taken: list[str] = []
 
@@ -140,7 +163,20 @@ def _machine(
     if not MIN_STEP_US <= period_us <= MAX_TIME_US:
         raise BusplanError(f"--period {period}: must be between {MIN_STEP_US:g} and {MAX_TIME_US:g} us")
     size = number(bytes_per_axis, "--bytes-per-axis", "Bytes for each axis, in either direction", _BYTES_PER_AXIS)
-    return Machine(count, total, period_us, size), taken
+    if host is None and starter.hosts:
+        if asks:
+            host = _asked(f"Host of the master: {', '.join(starter.hosts)}", starter.host)
+        else:
+            taken.append(f"--host {starter.host}")
+    _require_host(kind, host)
+    return Machine(count, total, period_us, size, host), taken
+
+
+def _require_host(kind: str, host: str | None) -> None:
+    known = kind_named(kind).starter.hosts
+    if host is not None and host not in known:
+        there = f"there are {', '.join(known)}" if known else f"a new profile of kind {kind} has no host"
+        raise BusplanError(f"--host {host}: {there}")
 
 
 def _asked(words: str, default: _Answer) -> _Answer:
@@ -150,7 +186,7 @@ def _asked(words: str, default: _Answer) -> _Answer:
     except typer.Abort as stopped:
         if isinstance(stopped.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from None
-        raise BusplanError("no answer: give --nodes, --axes, --period and --bytes-per-axis") from None
+        raise BusplanError("no answer: give --nodes, --axes, --period, --bytes-per-axis and --host") from None
     return answer
 
 

@@ -110,7 +110,7 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
 
 def _new_bus(starter: Starter) -> TomlTable:
     """The sections of a new profile that are a matter of its kind."""
-    found = tomllib.loads(starter.bus)
+    found = tomllib.loads(starter.section())
     ratio = tomllib.loads(f"{_RATIO} = {starter.slice_ratio}")
     return {**found, "cycle": {**found.get("cycle", {}), **ratio}}
 

@@ -196,6 +196,9 @@ def _missing(path: KeyPath, section: type[BaseModel]) -> str:
 
 
 def _unknown(path: KeyPath, section: type[BaseModel]) -> str:
+    instead = getattr(section, "removed", {}).get(path[-1])
+    if instead is not None:
+        return f"removed key: {instead}"
     known = list(section.model_fields)
     close = get_close_matches(str(path[-1]), known, n=1)
     if close:

@@ -100,6 +100,8 @@ class Machine(NamedTuple):
     period_us: float
     bytes_per_axis: int
     """Payload of each axis, in either direction."""
+    host: str | None = None
+    """Name among the hosts of the kind; None for its usual one."""
 
 
 def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
@@ -140,7 +142,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
     step_us = machine.period_us / ceil(machine.period_us / _LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
-        bus=starter.bus,
+        bus=starter.section(machine.host),
         ratio=starter.slice_ratio,
         nodes=machine.nodes,
         axes=machine.axes,

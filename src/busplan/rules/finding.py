@@ -115,6 +115,11 @@ class Subject:
         """Capacity under the timing model that decides, with new values by dotted key."""
         return figures(override(self.profile, dict(changes)), model=self.deciding.timing_model)
 
+    def limit_words(self, key: str) -> str:
+        """Say by how much a limit of the bus is broken, or why it is not shown to be kept."""
+        limit = bus_of(self.profile).limit(key)
+        return "" if limit is None else limit.words(network_of(self.profile))
+
     def cure(self) -> Mending:
         """The least change after which the profile holds every constraint of a plan; one for all rules."""
         return self._cure

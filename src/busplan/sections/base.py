@@ -1,6 +1,7 @@
 """What all sections of a profile share: strictness, ranges, and errors in our own words."""
 
-from typing import Annotated, Any, Final, NamedTuple, TypeVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Final, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -46,6 +47,8 @@ def _title(section: type) -> str:
 class Section(BaseModel):
     """What all sections of a profile share."""
 
+    removed: ClassVar[Mapping[str, str]] = {}
+    """Keys that it had once, each with what to write instead."""
     model_config = ConfigDict(
         strict=True,
         frozen=True,

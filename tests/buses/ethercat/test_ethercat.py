@@ -2,7 +2,9 @@
 
 import json
 from collections.abc import Callable
+from math import sqrt
 from pathlib import Path
+from statistics import fmean, stdev
 from typing import Any
 
 import pytest
@@ -20,7 +22,6 @@ from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
-from busplan.profile.write import profile_text
 from busplan.sections.profile import Profile
 
 Run = Callable[..., Any]
@@ -28,7 +29,7 @@ Run = Callable[..., Any]
 DATA: dict[str, Any] = {
     "schema_version": 1,
     "name": "press",
-    "bus": {"kind": "ethercat", "nodes": 3, "master_us": 20.0},
+    "bus": {"kind": "ethercat", "nodes": 3, "master": "SOEM", "process_data": "LRW-shared", "master_us": 20.0},
     "cycle": {"period_us": 500.0},
     "payload": {"read_bytes": 20, "write_bytes": 12},
     "node": {
@@ -38,6 +39,12 @@ DATA: dict[str, Any] = {
     },
 }
 BYTE_US = 0.08
+E_BUS_US = 2 * 0.1507
+"""A device there and back: the mean of 18 hops."""
+DELAYS_US = (0.641, 1.013, 0.515, 0.595, 0.72, 0.68, 0.72, 0.66, 0.69, 0.78, 0.76, 0.70, 0.55, 0.75)
+"""One way, of 14 machines or pairs with 100BASE-TX."""
+BYTE_COSTS_US = (0.0839, 0.0841, 0.0826)
+"""What a byte adds to a round trip, in three captures."""
 
 
 def profile(**changes: Any) -> Profile:
@@ -63,10 +70,11 @@ def test_its_cycle_is_that_by_hand() -> None:
     assert terms(profile()) == pytest.approx(
         {
             "master": 20,
+            "jitter": 0,
             "frames": (frame - 60) * BYTE_US,
             "data": 60 * BYTE_US,
             "mailbox": 0,
-            "devices": 3 * 0.3,
+            "devices": 3 * E_BUS_US,
             "cable": 0,
             "receive": 0,
             "nonperiodic": 0,
@@ -77,15 +85,16 @@ def test_its_cycle_is_that_by_hand() -> None:
 
 def test_options_add_datagrams_frames_and_ways() -> None:
     plain_ = terms(profile())
-    apart = terms(profile(bus__command="LRD-LWR"))
+    apart = terms(profile(bus__process_data="LRD-LWR"))
     assert apart["data"] == pytest.approx(3 * (20 + 12) * BYTE_US)
     assert apart["frames"] == pytest.approx(plain_["frames"] + 12 * BYTE_US)
     assert terms(profile(bus__distributed_clocks=True))["frames"] == pytest.approx(plain_["frames"] + 20 * BYTE_US)
     polled = terms(profile(bus__mailbox_polls=2, bus__mailbox_bytes=100))
     assert polled["mailbox"] == pytest.approx(2 * (40 + 12 + 100) * BYTE_US)
     assert terms(profile(bus__mailbox_polls=1, bus__mailbox_bytes=1), "vendors")["receive"] == pytest.approx(84 * 0.08)
-    assert terms(profile(node__port="100BASE-TX"))["devices"] == pytest.approx(3 * (0.485 + 0.725))
+    assert terms(profile(node__port="100BASE-TX"))["devices"] == pytest.approx(3 * 2 * fmean(DELAYS_US))
     assert terms(profile(node__delay_us=0.7))["devices"] == pytest.approx(3 * 2 * 0.7)
+    assert terms(profile(bus__master_jitter_us=7.0))["jitter"] == 7
     assert terms(profile(node__cable_m=10.0))["cable"] == pytest.approx(3 * 10 * 2 * 0.005)
 
 
@@ -99,9 +108,9 @@ def test_three_frames_in_a_cycle() -> None:
     assert (found.frames, found.process_bytes) == (3, 100 * 20 + 2 * 900)
     last = 52 + 900
     sent = (3 * 52 + 3800) * BYTE_US
-    assert found.required_us == pytest.approx(20 + sent + 102 * 0.3)
+    assert found.required_us == pytest.approx(20 + sent + 102 * E_BUS_US)
     (vendors,) = busplan.capacity(one, timing_model=["vendors"]).results
-    assert vendors.required_us == pytest.approx(20 + sent + 102 * 0.3 + last * BYTE_US)
+    assert vendors.required_us == pytest.approx(20 + sent + 102 * E_BUS_US + last * BYTE_US)
     events = busplan.timeline(one).cycle_events
     assert [one.label for one in events if one.kind == "overhead"] == [f"headers of frame {n}" for n in (1, 2, 3)]
     assert sum(one.duration_us for one in events if one.term) == pytest.approx(found.required_us, rel=1e-12)
@@ -116,7 +125,7 @@ def test_what_most_devices_rest_on_never_falls_and_is_no_less_than_any_cycle_so_
         payload__read_bytes=size,
         payload__write_bytes=1,
         bus__distributed_clocks=clocks,
-        bus__command="LRD-LWR" if apart and size < 1474 else "LRW",
+        bus__process_data="LRD-LWR" if apart and size < 1474 else "LRW-shared",
         bus__mailbox_polls=polls,
     )
     for model in ("last-byte", "vendors"):
@@ -125,34 +134,144 @@ def test_what_most_devices_rest_on_never_falls_and_is_no_less_than_any_cycle_so_
             cycle = cycle_of(one, model=model, nodes=nodes)
             longest, most = max(longest, plain(cycle.required_us)), plain(cycle.most_required_us)
             # What it is more than the longest are the devices of the last frame.
-            assert longest - 1e-9 <= most <= longest + nodes * 0.3 + 1e-9
+            assert longest - 1e-9 <= most <= longest + nodes * E_BUS_US + 1e-9
             assert before <= most
             assert model == "vendors" or most == longest == plain(cycle.required_us)
             before = most
 
 
-def test_the_delay_of_a_port_is_not_known_exactly_and_a_measured_one_is() -> None:
-    (by_port,) = busplan.capacity(profile(node__port="100BASE-TX"), timing_model=["last-byte"]).results
-    doubts = {one.key: plain(one.us) for one in by_port.doubts}
-    assert doubts == pytest.approx({"node.delay_us": 3 * 2 * 0.12 / 3**0.5, "bus.master_us": 2.0})
-    (measured,) = busplan.capacity(
-        profile(node__delay_us=0.7, bus__master_uncertainty_us=0.0), timing_model=["last-byte"]
-    ).results
-    assert measured.uncertainty_us == 0
+def of(one: Profile) -> Any:
+    (found,) = busplan.capacity(one, timing_model=["last-byte"]).results
+    return found
+
+
+def doubts(one: Profile) -> dict[str, float]:
+    return {each.key: plain(each.us) for each in of(one).doubts}
+
+
+def test_all_devices_of_a_port_err_together_and_measured_ones_each_by_itself() -> None:
+    kind_us = stdev(DELAYS_US) * sqrt(1 + 1 / 14)
+    bytes_us = 60 * stdev(BYTE_COSTS_US) * sqrt(1 + 1 / 3)
+    by_port = {"node.delay_us": 3 * 2 * kind_us, "bus.master_us": 10.0, "bytes": bytes_us}
+    assert doubts(profile(node__port="100BASE-TX")) == pytest.approx(by_port)
+    assert doubts(profile())["node.delay_us"] == pytest.approx(3 * 2 * 0.0079)
+    step_us = sqrt(3) * 2 * 0.010 / sqrt(12)
+    assert doubts(profile(node__delay_us=0.7))["node.delay_us"] == pytest.approx(step_us)
+    mixed = doubts(
+        grouped(
+            {"name": "drives", "nodes": 4, "read_bytes": 12, "write_bytes": 8, "port": "100BASE-TX"},
+            {"name": "io", "nodes": 20, "axes": 0, "read_bytes": 1, "write_bytes": 1},
+            {"name": "more", "nodes": 2, "read_bytes": 12, "write_bytes": 8, "port": "100BASE-TX"},
+        )
+    )
+    assert mixed["group.drives.delay_us"] == pytest.approx(6 * 2 * kind_us)
+    assert mixed["group.io.delay_us"] == pytest.approx(20 * 2 * 0.0079)
+
+
+@pytest.mark.parametrize(
+    ("changes", "uncertainty_us"),
+    [
+        ({}, 10.0),
+        ({"bus__master_grade": "assumed"}, 10.0),
+        ({"bus__master_grade": "measured"}, 2.0),
+        ({"bus__master_grade": "measured", "bus__master_uncertainty_us": 0.5}, 0.5),
+    ],
+)
+def test_a_masters_time_that_nobody_measured_is_doubted_by_half(changes: dict[str, Any], uncertainty_us: float) -> None:
+    assert doubts(profile(**changes))["bus.master_us"] == pytest.approx(uncertainty_us)
+
+
+def test_bytes_take_longer_than_the_wire() -> None:
+    one = of(profile())
+    assert one.bias_us == pytest.approx(60 * (fmean(BYTE_COSTS_US) - 0.08))
+    assert one.margin_corrected_us == pytest.approx(500 - one.required_us - one.bias_us)
+
+
+@pytest.mark.parametrize(
+    ("master", "layout", "without", "with_clocks"),
+    [
+        # Datagrams of 12 bytes and their data: what each master adds to the first frame.
+        ("SOEM", "separate", [], [8]),
+        ("IgH", "separate", [2], [2, 4]),
+        ("ethercrab", "separate", [], [8]),
+        ("TwinCAT", "shared", [4, 2, 1], [4, 4, 2, 1]),
+        ("acontis", "shared", [4, 4, 2], [4, 4, 4, 2]),
+        (None, "separate", [4, 4, 2], [4, 4, 4, 2]),
+    ],
+)
+def test_masters_lay_out_process_data_and_add_their_own_datagrams(
+    master: str | None, layout: str, without: list[int], with_clocks: list[int]
+) -> None:
+    size = 32 if layout == "separate" else 20
+    for clocks, added in ((False, without), (True, with_clocks)):
+        changes = {"bus__master": master, "bus__process_data": None, "bus__distributed_clocks": clocks}
+        one = profile(**changes, bus__sync_shift=0.0)
+        wire = 40 + 12 + 3 * size + sum(12 + each for each in added)
+        found = terms(one)
+        assert found["frames"] + found["data"] == pytest.approx(wire * BYTE_US)
+        assert found["data"] == pytest.approx(3 * size * BYTE_US)
+        said = override(one, {"bus.housekeeping_bytes": added, "bus.process_data": f"LRW-{layout}", "bus.master": None})
+        assert terms(said) == pytest.approx(found)
+
+
+def test_the_masters_datagrams_leave_the_first_frame_less_room() -> None:
+    added = {"bus__housekeeping_bytes": [4, 4, 4, 2], "payload__write_bytes": 1}
+    # 1486 bytes less 62 of datagrams: a device of 1424 has room beside them, one of 1425 has a frame of its own.
+    assert [of(profile(bus__nodes=1, payload__read_bytes=size, **added)).frames for size in (1424, 1425)] == [1, 2]
+
+
+def test_the_removed_key_names_the_new_ones() -> None:
+    for word in ("LRW", "LRD-LWR"):
+        with pytest.raises(BusplanError, match=r'removed key: .*process_data = "LRW-shared".*"LRW-separate"'):
+            override(profile(), {"bus.command": word})
+
+
+@pytest.mark.parametrize(
+    ("jitter_us", "verdict", "key"),
+    # Taken at 20 + 10.56 + 0.45 + 40 us and J, doubted by twice the master's 10 us.
+    [
+        (0.0, "fits", None),
+        (155.0, "fits", None),
+        (165.0, "not shown to fit", "not_shown"),
+        (200.0, "does not fit", "exceeded"),
+    ],
+)
+def test_a_command_must_be_taken_before_sync0(jitter_us: float, verdict: str, key: str | None) -> None:
+    one = of(profile(bus__distributed_clocks=True, bus__master_jitter_us=jitter_us))
+    assert one.command_us == pytest.approx(jitter_us + 20 + (52 + 20 + 60) * BYTE_US + 3 * 0.1507 + 40)
+    assert one.sync0_us == 250
+    assert one.verdict == verdict
+    assert {name for name in ("exceeded", "not_shown") if getattr(one, name)} == ({key} if key else set())
+    assert key is None or getattr(one, key) == ("sync0",)
+    assert of(profile(bus__master_jitter_us=jitter_us)).verdict == "fits"
+    late = of(profile(bus__distributed_clocks=True, bus__master_jitter_us=jitter_us, bus__sync_shift=0.0))
+    assert (late.verdict, late.sync0_us) == ("fits", 500)
+
+
+def test_the_smallest_period_keeps_commands_before_sync0() -> None:
+    one = profile(bus__distributed_clocks=True, bus__master_jitter_us=200.0, bus__sync_shift=0.25)
+    found = of(one)
+    u_us = sqrt(10**2 + (3 * 0.0079) ** 2 + (60 * stdev(BYTE_COSTS_US) * sqrt(4 / 3)) ** 2 + 0.1**2 / 12)
+    taken_us = found.command_us + found.bias_us
+    assert found.safe_min_period_us == pytest.approx((taken_us + 2 * u_us) / 0.25, rel=1e-9)
+    assert found.min_period_us == pytest.approx((taken_us - 2 * u_us) / 0.25, rel=1e-9)
+    assert of(override(one, {"cycle.period_us": found.safe_min_period_us * 1.0001})).verdict == "fits"
+    assert of(override(one, {"cycle.period_us": found.safe_min_period_us * 0.999})).verdict == "not shown to fit"
+    assert of(override(one, {"cycle.period_us": found.min_period_us * 0.999})).verdict == "does not fit"
 
 
 def test_a_loop_takes_whole_periods_with_distributed_clocks() -> None:
     def loops(one: Profile) -> dict[str, float]:
         found = busplan.latency(one, timing_model=["last-byte"]).transactions
         for each in found:
-            parts = ("drive", "frame_wait", "pipeline", "master", "sending", "path", "sync_wait")
+            parts = ("drive", "frame_wait", "pipeline", "master", "jitter", "sending", "path", "sync_wait")
             assert each.end_to_end_us == pytest.approx(sum(getattr(each, f"{key}_us") for key in parts))
         return {each.transaction: each.end_to_end_us for each in found}
 
     clocked = profile(bus__distributed_clocks=True)
-    own_us = 20 + (52 + 20 + 60) * BYTE_US + 3 * 0.15
+    own_us = 20 + (52 + 20 + 60) * BYTE_US + 3 * 0.1507
     # SYNC0 at 250 us: feedback is ready at 290, goes with the frame at 500; a command sent at 500 acts at 750.
-    assert loops(clocked) == pytest.approx({"command": 750, "feedback": 250 + own_us + 3 * 0.15, "loop": 1000})
+    assert loops(clocked) == pytest.approx({"command": 750, "feedback": 250 + own_us + 3 * 0.1507, "loop": 1000})
     assert loops(profile(bus__distributed_clocks=True, bus__pipeline_cycles=3))["loop"] == pytest.approx(2000)
     # SYNC0 before the frames: a command waits for the next one.
     assert loops(profile(bus__distributed_clocks=True, bus__sync_shift=0.0))["command"] == pytest.approx(1000)
@@ -160,7 +279,7 @@ def test_a_loop_takes_whole_periods_with_distributed_clocks() -> None:
     assert loops(profile(bus__distributed_clocks=True, bus__sync_shift=0.1))["command"] == pytest.approx(1050)
     free = loops(profile())
     assert free["command"] == pytest.approx(500 + own_us - 20 * BYTE_US + 40)
-    assert free["feedback"] == pytest.approx(500 + own_us - 20 * BYTE_US + 3 * 0.15)
+    assert free["feedback"] == pytest.approx(500 + own_us - 20 * BYTE_US + 3 * 0.1507)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.1, 0.3, 0.9])
@@ -177,13 +296,13 @@ def test_the_circle_has_the_delay_of_the_loop(shift: float, pipeline: int) -> No
 def test_set_points_reach_the_drives_at_one_time_with_clocks_and_one_after_the_other_without() -> None:
     many = {"payload__read_bytes": 600, "payload__write_bytes": 600}
     assert skew_us(profile(bus__distributed_clocks=True, **many)) == 0
-    # Two devices have the first frame, the third is behind the second frame; each device on the way adds 0.15 us.
-    assert skew_us(profile(**many)) == pytest.approx((52 + 600) * BYTE_US + 2 * 0.15)
+    # Two devices have the first frame, the third is behind the second frame; each device on the way adds 0.1507 us.
+    assert skew_us(profile(**many)) == pytest.approx((52 + 600) * BYTE_US + 2 * 0.1507)
     arrival = override(profile(**many), {"servo.loop": "host", "servo.update": "on_arrival"})
     first, last = loop_delays_us(arrival)
-    assert last - first == pytest.approx((52 + 600) * BYTE_US + 2 * 0.15)
+    assert last - first == pytest.approx((52 + 600) * BYTE_US + 2 * 0.1507)
     # Feedback waits for the next frame, the master has one cycle, and the command comes with the first frame.
-    assert first == pytest.approx(1000 + 20 + (52 + 1200) * BYTE_US + 0.15)
+    assert first == pytest.approx(1000 + 20 + (52 + 1200) * BYTE_US + 0.1507)
 
 
 def test_a_circle_with_more_than_a_period_in_its_loop_is_not_simulated(run: Run, tmp_path: Path) -> None:
@@ -209,10 +328,11 @@ def test_a_missing_clock_moves_the_axes_of_a_circle_apart() -> None:
         ({}, ()),
         ({"payload.read_bytes": 1486}, ()),
         ({"payload.read_bytes": 1487}, ("payload",)),
-        ({"payload.read_bytes": 1463, "bus.command": "LRD-LWR"}, ("payload",)),
+        ({"payload.read_bytes": 1463, "bus.process_data": "LRD-LWR"}, ("payload",)),
+        ({"payload.read_bytes": 1475, "bus.process_data": "LRW-separate"}, ("payload",)),
         ({"node.cable_m": 100.5}, ("cable",)),
         ({"bus.nodes": 65536, "cycle.period_us": 1e7}, ("nodes",)),
-        ({"cycle.period_us": 25.0}, ("time",)),
+        ({"cycle.period_us": 9.0}, ("time",)),
     ],
 )
 def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[str, ...]) -> None:
@@ -221,19 +341,10 @@ def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[st
     assert (found.verdict == "does not fit") == bool(exceeded)
 
 
-def test_a_plan_may_let_inputs_and_outputs_share_their_bytes(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "press.toml"
-    path.write_text(profile_text(override(load("ethercat-servo-8").profile, {"bus.command": "LRD-LWR"})))
-    options = ("--nodes", "300", "--free", "command", "--no-circle", "--format", "json")
-    done = run("plan", path.name, *options, cwd=tmp_path)
-    assert done.returncode == 0, done
-    assert json.loads(done.stdout)["recommended_changes"]["bus.command"] == "LRW"
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"bus.command": "APRW"}, "LRW"),
+        ({"bus.process_data": "APRW"}, "LRW"),
         ({"bus.sync_shift": 1.0}, "0.999 or less"),
         ({"bus.mailbox_bytes": 1487}, "1,486 or less"),
         ({"node.port": "fibre"}, "E-bus"),
@@ -253,8 +364,8 @@ PUBLISHED = {
     ("1000 digital I/O", "vendors model"): 0.06,
     ("1486 bytes", "vendors model"): 0.18,
     ("100 servo axes", "last-byte model"): 0.32,
-    ("time on the wire", "last-byte model"): 0.004,
-    ("E-bus, there and back", "constant of busplan"): 0.0,
+    # Of it 0.0009 is that the source rounds the delay of an E-bus device, the rest that it counts a cable once.
+    ("time on the wire", "last-byte model"): 0.0041,
     ("command to drive", "one cycle in the master"): 0.0,
 }
 
@@ -274,14 +385,8 @@ def test_published_figures_are_met_within_what_their_sources_leave_open() -> Non
     assert all((found[name, "vendors model"] or 0) < 0 for name in ("1000 digital I/O", "1486 bytes"))
 
 
-def test_delays_are_within_what_was_measured() -> None:
-    constants = kind_named("ethercat").constants
-    assert 0.485 <= constants["DELAY_US[100BASE-TX]"] <= 0.725
-    assert 0.97 <= 2 * constants["DELAY_US[100BASE-TX]"] <= 1.45
-    assert 0.145 <= constants["DELAY_US[E-bus]"] <= 0.155
-    # Two standard uncertainties reach the ends of the range.
-    assert constants["DELAY_US[100BASE-TX]"] + 2 * constants["DELAY_UNCERTAINTY_US[100BASE-TX]"] > 0.725
-    assert all(one.source and one.grade for one in constants.values())
+def test_constants_have_a_source_and_a_grade() -> None:
+    assert all(one.source and one.grade for one in kind_named("ethercat").constants.values())
 
 
 FORMS = {
@@ -295,7 +400,9 @@ FORMS = {
     "explain": ("table", "json"),
     "diff can-servo-8 --no-circle": ("table", "json"),
     "circle-test": ("table",),
-    "sweep --vary bus.command=LRW,LRD-LWR --vary bus.distributed_clocks=true,false --vary bus.nodes=1,200": ("csv",),
+    "sweep --vary bus.process_data=LRW-shared,LRD-LWR --vary bus.distributed_clocks=true,false --vary bus.nodes=1,9": (
+        "csv",
+    ),
     "sweep --vary node.cable_m=0:100:50 --vary node.port=100BASE-TX,E-bus --vary cycle.period_us=250,1000": ("table",),
 }
 
@@ -331,6 +438,25 @@ def test_groups_are_answered_one_by_one() -> None:
         assert any(limit.is_broken(asked.with_nodes(group.max_nodes + 1)) for limit in limits)
     transactions = busplan.latency(one, timing_model=["last-byte"]).transactions
     assert {each.group for each in transactions} == {"drives", "io"}
+
+
+@pytest.mark.parametrize(("host", "master_us"), [("hardware", 5), ("real-time", 250), ("stock", 560), (None, 40)])
+def test_init_writes_the_time_of_the_host_as_an_assumption(
+    run: Run, tmp_path: Path, host: str | None, master_us: int
+) -> None:
+    options = () if host is None else ("--host", host)
+    done = run("init", "press", "--bus", "ethercat", *options, cwd=tmp_path)
+    assert done.returncode == 0
+    assert ("--host tuned" in done.stderr) == (host is None)
+    bus = busplan.load_profile(tmp_path / "press.toml").bus
+    assert (bus.master_us, bus.master_grade) == (master_us, "assumed")
+    assert bus.master_doubt_us == master_us / 2
+
+
+@pytest.mark.parametrize(("kind", "words"), [("ethercat", "hardware, tuned, real-time, stock"), ("can", "no host")])
+def test_init_knows_the_hosts_of_a_kind(run: Run, tmp_path: Path, kind: str, words: str) -> None:
+    done = run("init", "press", "--bus", kind, "--host", "abacus", cwd=tmp_path)
+    assert (done.returncode, words in done.stderr) == (2, True)
 
 
 def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None:

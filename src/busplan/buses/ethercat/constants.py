@@ -1,37 +1,51 @@
 """Figures of EtherCAT at 100 Mbit/s, each with its source and grade."""
 
 from collections.abc import Mapping
-from math import sqrt
 from types import MappingProxyType
 from typing import Final, Literal
 
+from busplan.buses.published import Spread, published
 from busplan.sourced import Grade, Sourced, constants
 
 Port = Literal["100BASE-TX", "E-bus"]
-Command = Literal["LRW", "LRD-LWR"]
-LRW: Final[Command] = "LRW"
-SPLIT: Final[Command] = "LRD-LWR"
+ProcessData = Literal["LRW-separate", "LRW-shared", "LRD-LWR"]
+SEPARATE: Final[ProcessData] = "LRW-separate"
+SHARED: Final[ProcessData] = "LRW-shared"
+SPLIT: Final[ProcessData] = "LRD-LWR"
+Master = Literal["SOEM", "IgH", "ethercrab", "TwinCAT", "acontis"]
+UNNAMED: Final = "unnamed"
+"""The master of a profile that names none."""
 
 _ETHERNET: Final = "IEEE 802.3"
 _ETG: Final = "ETG.1000; SOEM, ethercattype.h"
-_ETHERCRAB: Final = "time stamps of distributed clocks in the tests of ethercrab"
+_MEASURED: Final = published("ethercat")["delays"]
+_COPY: Final = published("ethercat")["byte_cost"]
 
 
 def _bytes(value: int, meaning: str, source: str) -> Sourced:
     return Sourced(value, unit="bytes", grade="published", source=source, meaning=meaning)
 
 
-def _delay(least_us: float, most_us: float, port: str) -> tuple[Sourced, Sourced]:
-    """The middle of a range of delays, and its standard uncertainty."""
-    said = f"{_ETHERCRAB}: {least_us:g} to {most_us:g} us"
+def _delay(spread: Spread, port: str, source: str) -> tuple[Sourced, Sourced]:
+    """The mean delay of the devices of a port, and the standard uncertainty of one more kind of device."""
+    of_mean, of_doubt = f"{source}, their mean", f"{source}, their sd sqrt(1 + 1/n)"
+    return (
+        Sourced(spread.mean, unit="us", grade="measured", source=of_mean, meaning=f"delay of a {port} device, one way"),
+        Sourced(
+            spread.uncertainty,
+            unit="us",
+            grade="derived",
+            source=of_doubt,
+            meaning=f"standard uncertainty of the delay of all {port} devices of a machine, one way",
+        ),
+    )
 
-    def of(value: float, grade: Grade, source: str, meaning: str) -> Sourced:
-        return Sourced(value, unit="us", grade=grade, source=source, meaning=meaning)
 
-    middle = of((least_us + most_us) / 2, "measured", f"{said}, the middle", f"delay of a device with {port}, one way")
-    half_us = (most_us - least_us) / 2
-    source = f"{said}, rectangular (JCGM 100, 4.3.7)"
-    return middle, of(half_us / sqrt(3), "derived", source, f"standard uncertainty of the delay with {port}")
+def _datagrams(*sizes: int, of: str, source: str, grade: Grade) -> Sourced:
+    """Datagrams of some data sizes, headers and working counters included [bytes]."""
+    meaning = f"datagrams of the master: {of}, data {' + '.join(map(str, sizes)) or '0'}"
+    value = sum(sizes) + len(sizes) * DATAGRAM_BYTES
+    return Sourced(value, unit="bytes", grade=grade, source=source, meaning=meaning)
 
 
 BYTE_US: Final = Sourced(
@@ -45,7 +59,6 @@ HEADER_BYTES: Final = _bytes(2, "EtherCAT header of a frame", _ETG)
 DATAGRAM_BYTES: Final = _bytes(12, "header of a datagram, 10, and its working counter, 2", _ETG)
 LEAST_FRAME_BYTES: Final = _bytes(84, "shortest frame on the wire, gap included; shorter ones are padded", _ETHERNET)
 MOST_FRAME_BYTES: Final = _bytes(1538, "longest frame on the wire, gap included", _ETHERNET)
-CLOCK_BYTES: Final = _bytes(8, "system time that the datagram of distributed clocks carries", "SOEM, ethercatmain.c")
 MAILBOX_BYTES: Final = _bytes(128, "data of a mailbox", "Lenze, communication manual E84AYCET: at most 128")
 MOST_DEVICES: Final = Sourced(
     65535, unit="1", grade="published", source="ETG.1000: addresses of 16 bits", meaning="devices of one segment"
@@ -56,10 +69,68 @@ MOST_CABLE_M: Final = Sourced(
 CABLE_US_PER_M: Final = Sourced(
     0.005, unit="us/m", grade="published", source="SOEM issue 585: 5 ns/m", meaning="delay of a metre of cable"
 )
-_TX, _TX_DOUBT = _delay(0.485, 0.725, "100BASE-TX")
-_EBUS, _EBUS_DOUBT = _delay(0.145, 0.155, "E-bus")
+_TX, _TX_DOUBT = _delay(Spread.of(_MEASURED["tx_one_way_us"]), "100BASE-TX", _MEASURED["source"])
+_EBUS, _EBUS_DOUBT = _delay(
+    Spread(_MEASURED["e_bus_one_way_us"], _MEASURED["e_bus_uncertainty_us"]), "E-bus", _MEASURED["source"]
+)
 DELAY_US: Final[Mapping[Port, Sourced]] = MappingProxyType({"100BASE-TX": _TX, "E-bus": _EBUS})
 DELAY_UNCERTAINTY_US: Final[Mapping[Port, Sourced]] = MappingProxyType({"100BASE-TX": _TX_DOUBT, "E-bus": _EBUS_DOUBT})
+MEASURED_DELAY_UNCERTAINTY_US: Final = Sourced(
+    0.010 / 12**0.5,
+    unit="us",
+    grade="derived",
+    source="a step of 10 ns of the devices' clocks, rectangular (JCGM 100, 4.3.7)",
+    meaning="standard uncertainty of a measured delay, each device by itself",
+)
+_PER_BYTE: Final = Spread.of(_COPY["us_per_byte"])
+BYTE_BIAS_US: Final = Sourced(
+    _PER_BYTE.mean - BYTE_US,
+    unit="us",
+    grade="derived",
+    source=f"{_COPY['source']}, their mean less the time on the wire",
+    meaning="what a byte of process data takes beyond the wire, about a copy in the host",
+)
+BYTE_BIAS_UNCERTAINTY_US: Final = Sourced(
+    _PER_BYTE.uncertainty,
+    unit="us",
+    grade="derived",
+    source=f"{_COPY['source']}, their sd sqrt(1 + 1/n)",
+    meaning="standard uncertainty of that, all bytes together",
+)
+UNMEASURED_MASTER_SHARE: Final = Sourced(
+    0.5,
+    unit="1",
+    grade="assumed",
+    source="chosen: published times of like hosts differ by as much",
+    meaning="standard uncertainty of a master's time that nobody has measured, as a share of it",
+)
+_ENI: Final = "ENI files that it wrote"
+LAYOUTS: Final[Mapping[str, ProcessData]] = MappingProxyType(
+    {"SOEM": SEPARATE, "IgH": SEPARATE, "ethercrab": SEPARATE, "TwinCAT": SHARED, "acontis": SHARED, UNNAMED: SEPARATE}
+)
+"""How each master lays out its process data."""
+HOUSEKEEPING_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
+    {
+        "SOEM": _datagrams(of="none", source="SOEM, ec_main.c", grade="published"),
+        "IgH": _datagrams(2, of="BRD", source="EtherLab master, its state machine", grade="published"),
+        "ethercrab": _datagrams(of="none", source="ethercrab", grade="published"),
+        "TwinCAT": _datagrams(4, 2, 1, of="NOP, BRD, LRD", source=_ENI, grade="published"),
+        "acontis": _datagrams(4, 4, 2, of="NOP, APWR, BRD", source=_ENI, grade="published"),
+        UNNAMED: _datagrams(4, 4, 2, of="as acontis", source="chosen: the most of those known", grade="assumed"),
+    }
+)
+"""Datagrams that each master adds to the first frame of every cycle, without those of distributed clocks."""
+CLOCK_BYTES: Final[Mapping[str, Sourced]] = MappingProxyType(
+    {
+        "SOEM": _datagrams(8, of="FRMW", source="SOEM, ec_main.c", grade="published"),
+        "IgH": _datagrams(4, of="FRMW", source="EtherLab master", grade="published"),
+        "ethercrab": _datagrams(8, of="FRMW", source="ethercrab", grade="published"),
+        "TwinCAT": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
+        "acontis": _datagrams(4, of="ARMW", source=_ENI, grade="published"),
+        UNNAMED: _datagrams(4, of="as acontis", source="chosen: the most of those known", grade="assumed"),
+    }
+)
+"""Datagrams of distributed clocks, which each master adds to them."""
 PIPELINE_CYCLES: Final = Sourced(
     1,
     unit="1",
@@ -72,7 +143,7 @@ SYNC_SHIFT: Final = Sourced(
     unit="1",
     grade="assumed",
     source="chosen: the middle of the cycle",
-    meaning="where SYNC0 of the distributed clocks lies in the cycle, as a share of the period",
+    meaning="where SYNC0 of the distributed clocks lies behind the master's task, as a share of the period",
 )
 
 CONSTANTS: Final = constants({key: one for key, one in globals().items() if not key.startswith("_")})

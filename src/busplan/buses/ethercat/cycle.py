@@ -5,14 +5,15 @@ from functools import cached_property
 from typing import Final, Literal
 
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
-from busplan.buses.ethercat.equations import frame_bytes, overhead_bytes, sending_us
+from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US, BYTE_BIAS_US
+from busplan.buses.ethercat.equations import device_us, frame_bytes, overhead_bytes, sending_us
 from busplan.buses.ethercat.latency import last_command_us, latencies, sync0_us
 from busplan.buses.ethercat.packing import Devices, Packing
 from busplan.buses.ethercat.traffic import (
     cables_us,
     data_bytes,
     devices,
-    devices_doubt_us,
+    devices_doubts,
     devices_us,
     frames,
     hop,
@@ -28,8 +29,16 @@ LAST_BYTE: Final[TimingModelName] = "last-byte"
 VENDORS: Final[TimingModelName] = "vendors"
 
 
+_LEFT_OUT: Final = {
+    "bus.master_us": "the master's own time",
+    "bus.master_jitter_us": "the master's jitter",
+    "bus.mailbox_polls": "mailbox polls",
+}
+"""Keys of [bus] that a cycle lacks where they are 0."""
+
+
 class EthercatCycle(BusCycle):
-    """The master's time, frames, devices and cables there and back, and the window."""
+    """The master's time and jitter, frames, devices and cables there and back, and the window."""
 
     def __init__(self, network: Network, model: str) -> None:
         self.network = network
@@ -79,6 +88,7 @@ class EthercatCycle(BusCycle):
         """The cycle in the order of the wire."""
         return (
             Term("cycle_master_us", self.network.profile.bus.master_us),
+            Term("cycle_jitter_us", self.network.profile.bus.master_jitter_us),
             Term("cycle_frames_us", sending_us(self._overhead_bytes)),
             Term("cycle_data_us", sending_us(self.process_bytes)),
             Term("cycle_mailbox_us", mailbox_us(self.network)),
@@ -88,26 +98,31 @@ class EthercatCycle(BusCycle):
             Term("nonperiodic_us", self.network.nonperiodic_us),
         )
 
+    def bias_us(self) -> Number:
+        """What process data take beyond the wire: about a copy in the host [us]."""
+        return self.process_bytes * BYTE_BIAS_US
+
     def doubts(self) -> tuple[Doubt, ...]:
-        """The delay of devices that nobody has measured, and the master's own time."""
-        key = "node.delay_us" if self.network.is_uniform else "group.delay_us"
+        """The delays of devices, the master's own time, and what bytes take beyond the wire."""
+        devices = (Doubt(one.key, one.label, device_us(one.one_way_us)) for one in devices_doubts(self.network))
         return (
-            Doubt(key, "delay of the devices", devices_doubt_us(self.network)),
+            *devices,
             Doubt("bus.master_us", "the master's own time", self.network.profile.bus.master_doubt_us),
+            Doubt("bytes", "what a byte takes beyond the wire", self.process_bytes * BYTE_BIAS_UNCERTAINTY_US),
         )
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """The master's own time, mailbox polls, and cables without a length."""
+        """The master's own time and jitter, mailbox polls, and cables without a length."""
         bus = self.network.profile.bus
-        found = {"bus.master_us": bus.master_us, "bus.mailbox_polls": bus.mailbox_polls}
+        found = {key: getattr(bus, key.removeprefix("bus.")) for key in _LEFT_OUT}
         found |= {one.key("cable_m"): one.node.cable_m for one in self.network.groups if one.node.port != "E-bus"}
-        labels = {"bus.master_us": "the master's own time", "bus.mailbox_polls": "mailbox polls"}
-        return tuple(LeftOut(labels.get(key, "cables"), key) for key, value in found.items() if not value)
+        return tuple(LeftOut(_LEFT_OUT.get(key, "cables"), key) for key, value in found.items() if not value)
 
     def events(self) -> Iterator[BusEvent]:
         """Frame by frame with the data of each device, then the last byte through all devices and back."""
         bus = self.network.profile.bus
         yield BusEvent("master", "cycle_master_us", plain(bus.master_us), "master")
+        yield BusEvent("jitter", "cycle_jitter_us", plain(bus.master_jitter_us), "latest start of the frames")
         yield from self._frames()
         for number in range(1, int(plain(bus.mailbox_polls)) + 1):
             yield BusEvent("mailbox", "cycle_mailbox_us", plain(mailbox_frame_us(self.network)), f"mailbox {number}")

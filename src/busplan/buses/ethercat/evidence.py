@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final
 
-from busplan.buses.ethercat.constants import CLOCK_BYTES, DELAY_US, LRW, Port
+from busplan.buses.ethercat.constants import CLOCK_BYTES, DELAY_US, SHARED
 from busplan.buses.ethercat.cycle import LAST_BYTE, VENDORS, EthercatCycle
 from busplan.buses.ethercat.equations import cable_us, datagram_bytes, device_us, frame_bytes, room_bytes, sending_us
 from busplan.buses.ethercat.latency import latencies
@@ -13,7 +13,6 @@ from busplan.elementwise import plain
 
 Published = Mapping[str, Any]
 _LAYOUT: Final = "frame layout"
-_CONSTANT: Final = "constant of busplan"
 _DATA: Final = "ethercat"
 
 
@@ -36,16 +35,23 @@ def sections(network: Network, published: Published) -> tuple[EvidenceSection, .
         _frame(published),
         _vendors(bare, published),
         _wire(published),
-        _hops(published),
         _pipeline(bare, published),
     )
 
 
 def _bare(network: Network) -> Network:
-    """One device that takes no time, of a master that takes none, and nothing but LRW."""
+    """One device that takes no time, of a master that takes none, and nothing but shared bytes."""
     profile = network.profile
     bus = profile.bus.model_copy(
-        update={"master_us": 0.0, "mailbox_polls": 0, "distributed_clocks": False, "sync_shift": 0.0, "command": LRW}
+        update={
+            "master_us": 0.0,
+            "master_jitter_us": 0.0,
+            "mailbox_polls": 0,
+            "distributed_clocks": False,
+            "sync_shift": 0.0,
+            "process_data": SHARED,
+            "housekeeping_bytes": (),
+        }
     )
     (group,) = network.groups
     said = group.said._replace(node=group.node.model_copy(update={"delay_us": 0.0, "cable_m": 0.0}))
@@ -64,7 +70,7 @@ def _frame(published: Published) -> EvidenceSection:
         "most process data": ("most_data_bytes", room_bytes(1)),
         "most process data beside the clocks' datagram": (
             "most_data_with_clocks_bytes",
-            room_bytes(1) - plain(datagram_bytes(CLOCK_BYTES)),
+            room_bytes(1) - plain(CLOCK_BYTES["SOEM"]),
         ),
         "shortest frame on the wire": ("shortest_bytes", plain(frame_bytes(datagram_bytes(1)))),
         "longest frame on the wire": ("longest_bytes", plain(frame_bytes(datagram_bytes(room_bytes(1))))),
@@ -108,33 +114,6 @@ def _wire(published: Published) -> EvidenceSection:
             Comparison(
                 title, "time on the wire", "us", given["time_us"], f"{LAST_BYTE} model", computed, given["grade"]
             ),
-        ),
-        _DATA,
-    )
-
-
-def _hops(published: Published) -> EvidenceSection:
-    title, given, lan = "EtherCAT: delay of a device", published["hops"], published["lan9252"]
-
-    def one(words: str, us: float, port: Port, *, ways: int, grade: Any) -> Comparison:
-        return Comparison(title, words, "us", us, _CONSTANT, ways * float(DELAY_US[port]), grade)
-
-    grade = given["grade"]
-    (least, most), (least_both, most_both) = given["tx_one_way_us"], given["tx_there_and_back_us"]
-    least_e, most_e = given["e_bus_one_way_us"]
-    return EvidenceSection(
-        title,
-        f"{given['source']}; {lan['source']}. Ours is the middle of the range, and half of it is in every verdict's "
-        "uncertainty; node.delay_us takes what is measured on the machine.",
-        (
-            one("100BASE-TX, one way, least", least, "100BASE-TX", ways=1, grade=grade),
-            one("100BASE-TX, one way, most", most, "100BASE-TX", ways=1, grade=grade),
-            one("100BASE-TX, one way, LAN9252", lan["one_way_us"], "100BASE-TX", ways=1, grade=lan["grade"]),
-            one("100BASE-TX, there and back, least", least_both, "100BASE-TX", ways=2, grade=grade),
-            one("100BASE-TX, there and back, most", most_both, "100BASE-TX", ways=2, grade=grade),
-            one("E-bus, one way, least", least_e, "E-bus", ways=1, grade=grade),
-            one("E-bus, one way, most", most_e, "E-bus", ways=1, grade=grade),
-            one("E-bus, there and back", given["e_bus_there_and_back_us"], "E-bus", ways=2, grade=grade),
         ),
         _DATA,
     )

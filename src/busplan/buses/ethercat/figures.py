@@ -14,21 +14,30 @@ COMMAND: Final = Figure(
     "command_us",
     "t_cmd",
     "profile",
-    "when the last device has taken its command, from the start of the cycle",
+    "when the last device has taken its command at the latest, from the master's task",
     "last command taken",
     better="less",
 )
 SYNC0: Final = Figure(
-    "sync0_us", "t_sync", "profile", "SYNC0 of the distributed clocks, from the start of the cycle", "SYNC0"
+    "sync0_us", "t_sync", "profile", "the first SYNC0 of the distributed clocks behind the master's task", "SYNC0"
 )
 OWN: Final = (FRAMES, PROCESS, COMMAND, SYNC0)
 TERMS: Final = (
     Figure("cycle_master_us", "T_master", "profile", "the master's own time", "master", ink="contention", letter="M"),
     Figure(
+        "cycle_jitter_us",
+        "J",
+        "profile",
+        "latest start of the frames behind the planned one",
+        "master's jitter",
+        ink="contention",
+        letter="J",
+    ),
+    Figure(
         "cycle_frames_us",
         "frames",
         FRAME,
-        "preambles, headers, checks, gaps and padding of the frames, and the datagram of the clocks",
+        "preambles, headers, checks, gaps and padding of the frames, and the master's own datagrams",
         "frame overhead",
         ink="gap",
         letter="F",
@@ -64,6 +73,7 @@ LATENCY_TABLE: Final = (
     Figure("frame_wait_us", "wait", "profile", "wait of feedback for the next frame", "wait for a frame"),
     Figure("pipeline_us", "n T_s", "profile", "cycles that the master computes in", "master's pipeline"),
     Figure("master_us", "T_master", "profile", "the master's own time for a frame", "master"),
+    Figure("jitter_us", "J", "profile", "latest start of the frame behind the planned one", "jitter"),
     Figure("sending_us", "sending", FRAME, "all frames of process data on the wire", "sending"),
     Figure("path_us", "path", "DC time stamps", "delay of devices and cables on the way", "devices and cables"),
     Figure(

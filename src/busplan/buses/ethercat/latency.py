@@ -1,24 +1,39 @@
 """How long a command takes to a drive, feedback to the master, and a loop over both.
 
-A frame goes at the start of each cycle. SYNC0 of the distributed clocks lies at a share of the cycle: there drives
-sample, and commands that have arrived take effect. Without distributed clocks drives act when their frame has passed.
+The master's task starts each cycle. SYNC0 of the distributed clocks lies at a share of the period behind it: there
+drives sample, and commands that have arrived take effect. Without distributed clocks drives act when their frame has
+passed.
 """
 
 from functools import reduce
 
 from busplan.buses.cycle import BusLatency
+from busplan.buses.ethercat.constants import BYTE_BIAS_UNCERTAINTY_US
 from busplan.buses.ethercat.figures import LATENCY_TABLE
-from busplan.buses.ethercat.traffic import arrivals_us, cables_us, devices_us, mailbox_us, process_us
+from busplan.buses.ethercat.traffic import (
+    arrivals_us,
+    cables_us,
+    devices,
+    devices_doubts,
+    devices_us,
+    mailbox_us,
+    process_us,
+)
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, larger, named, plain, rounded_up, total
+from busplan.elementwise import Number, choose, larger, named, plain, rounded_up, square_root, total
 
 _SUM = LATENCY_TABLE[-1].key
 
 
 def sync0_us(network: Network) -> Number:
-    """Where SYNC0 lies behind the start of a cycle; 0 without distributed clocks [us]."""
-    bus = network.profile.bus
-    return bus.sync_shift * network.period_us if bus.distributed_clocks else 0.0
+    """The first SYNC0 behind the master's task; 0 without distributed clocks [us]."""
+    return sync0_share(network) * network.period_us if network.profile.bus.distributed_clocks else 0.0
+
+
+def sync0_share(network: Network) -> Number:
+    """That as a share of the period: SYNC0 at the task itself is the next one for its frames [1]."""
+    shift = network.profile.bus.sync_shift
+    return choose(shift > 0, shift, 1)
 
 
 def latencies(network: Network) -> tuple[BusLatency, ...]:
@@ -41,9 +56,22 @@ def latencies(network: Network) -> tuple[BusLatency, ...]:
 
 
 def last_command_us(network: Network) -> Number:
-    """When the last device has taken its command, from the start of the cycle [us]."""
+    """When the last device has taken its command at the latest, from the master's task [us]."""
     sent_us, way_us = process_us(network), _way_us(network)
     return reduce(larger, (_taken_us(one, network, sent_us, way_us) for one in network.groups))
+
+
+def command_doubt_us(network: Network) -> Number:
+    """Standard uncertainty of that: of the master, the devices one way, the bytes and the slowest execution [us]."""
+    execution_us = reduce(larger, (one.write_uncertainty_us for one in network.groups))
+    process_bytes = total(one.number * one.data_bytes for one in devices(network))
+    parts = (
+        network.profile.bus.master_doubt_us,
+        *(one.one_way_us for one in devices_doubts(network)),
+        process_bytes * BYTE_BIAS_UNCERTAINTY_US,
+        execution_us,
+    )
+    return square_root(total(one * one for one in parts))
 
 
 def _way_us(network: Network) -> Number:
@@ -53,7 +81,9 @@ def _way_us(network: Network) -> Number:
 
 def _taken_us(group: Group, network: Network, sent_us: Number, way_us: Number) -> Number:
     """When the last device of a group may have taken its command, from the start of the cycle [us]."""
-    taken_us = network.profile.bus.master_us + sent_us + way_us / 2 + group.write_execution_us + group.worst_extra_us
+    bus = network.profile.bus
+    on_wire_us = bus.master_us + bus.master_jitter_us + sent_us + way_us / 2
+    taken_us = on_wire_us + group.write_execution_us + group.worst_extra_us
     return named(taken_us, "command_us", "t_cmd")
 
 
@@ -70,6 +100,7 @@ def _command(group: Group, network: Network, sent_us: Number, way_us: Number) ->
         "frame_wait_us": 0.0,
         "pipeline_us": named(bus.pipeline_cycles * network.period_us, "pipeline_us", "n T_s"),
         "master_us": bus.master_us,
+        "jitter_us": bus.master_jitter_us,
         "sending_us": sent_us,
         "path_us": way_us / 2,
         "sync_wait_us": wait_us,
@@ -86,6 +117,7 @@ def _feedback(group: Group, network: Network, sent_us: Number, way_us: Number) -
         "frame_wait_us": wait_us,
         "pipeline_us": 0.0,
         "master_us": network.profile.bus.master_us,
+        "jitter_us": network.profile.bus.master_jitter_us,
         "sending_us": sent_us + mailbox_us(network),
         "path_us": way_us,
         "sync_wait_us": 0.0,

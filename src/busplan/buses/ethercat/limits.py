@@ -1,14 +1,15 @@
-"""What EtherCAT forbids: too many devices, a device that no frame holds, a cable that is too long."""
+"""What EtherCAT forbids: too many devices, a device that no frame holds, a long cable, a command behind SYNC0."""
 
 from functools import reduce
 from typing import Final
 
-from busplan.buses.ethercat.constants import MOST_CABLE_M, MOST_DEVICES
+from busplan.buses.ethercat.constants import BYTE_BIAS_US, MOST_CABLE_M, MOST_DEVICES
 from busplan.buses.ethercat.equations import room_bytes
+from busplan.buses.ethercat.latency import command_doubt_us, last_command_us, sync0_share
 from busplan.buses.ethercat.traffic import datagrams, devices
 from busplan.buses.network import Network
-from busplan.buses.parts import Limit
-from busplan.elementwise import Number, larger
+from busplan.buses.parts import Limit, share_limit
+from busplan.elementwise import Number, larger, total
 
 
 def _largest_device(network: Network) -> Number:
@@ -20,6 +21,24 @@ def _longest_cable(network: Network) -> Number:
     return reduce(larger, lengths_m)
 
 
+def _late_command_us(network: Network) -> Number:
+    """When the last device has taken its command, with what bytes take beyond the wire; 0 without clocks [us]."""
+    if not network.profile.bus.distributed_clocks:
+        return 0.0
+    process_bytes = total(one.number * one.data_bytes for one in devices(network))
+    return last_command_us(network) + process_bytes * BYTE_BIAS_US
+
+
+SYNC0: Final = share_limit(
+    "sync0",
+    "the last command is taken at {value:.1f} +/- {uncertainty:.1f} us, and SYNC0 is at {most:.1f} us",
+    _late_command_us,
+    share=sync0_share,
+    doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
+    way_out="a larger bus.sync_shift moves SYNC0 back",
+    has_rule=True,
+)
+"""A command must be in every device before SYNC0."""
 LIMITS: Final = (
     Limit(
         "nodes",
@@ -44,4 +63,5 @@ LIMITS: Final = (
         way_out="a device between would do",
         failure="cable_m",
     ),
+    SYNC0,
 )

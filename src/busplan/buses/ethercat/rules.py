@@ -1,9 +1,11 @@
 """Rules of the gate that only an EtherCAT bus has: set-points need a common clock, and must be there in time."""
 
 from collections.abc import Iterator
-from typing import Any, Final
+from math import ceil
+from typing import Final
 
-from busplan.buses.rule import Rule, RuleProblem, RuleSubject, told_apart
+from busplan.buses.ethercat.limits import SYNC0
+from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 
 
 def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -19,16 +21,18 @@ def no_common_clock(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 
 def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The last command is taken behind SYNC0, and takes effect a cycle later."""
-    bus: Any = subject.profile.bus
+    """The last command is not shown to be taken before SYNC0, and may take effect cycles later."""
     one = subject.deciding
-    if bus.distributed_clocks and bus.sync_shift and one.command_us > one.sync0_us:
-        taken, sync0 = told_apart(one.command_us, one.sync0_us)
-        yield RuleProblem(
-            "bus.sync_shift",
-            f"the last command is taken at {taken} us, behind SYNC0 at {sync0} us",
-            "it takes effect a cycle later; a larger share moves SYNC0 back",
-        )
+    if SYNC0.key not in (*one.exceeded, *(one.not_shown or ())):
+        return
+    late = max(ceil((one.command_us - one.sync0_us) / one.period_us), 1)
+    when = "it takes effect" if SYNC0.key in one.exceeded else "not shown to be in time; if late it takes effect"
+    yield RuleProblem(
+        "bus.sync_shift",
+        f"{subject.limit_words(SYNC0.key)}: {when} {late} cycle{'s' * (late > 1)} later",
+        SYNC0.way_out,
+        subject.cure().cure,
+    )
 
 
 RULES: Final = (
@@ -45,12 +49,13 @@ RULES: Final = (
     Rule(
         "BP132",
         "command-behind-sync",
-        "warning",
-        "commands are taken behind SYNC0",
-        "Drives with distributed clocks act at SYNC0, which lies at bus.sync_shift of the period. A command that has "
-        "not arrived by then, with the drive's own time, waits for the next one: a cycle more of dead time, and where "
-        "only some drives are late their axes are a cycle apart. SYNC0 at the very start of the cycle, "
-        "bus.sync_shift = 0, is always before the frames and not reported.",
+        "error",
+        "commands are not shown to be taken before SYNC0",
+        "Drives with distributed clocks act at SYNC0, which lies at bus.sync_shift of the period behind the master's "
+        "task. A command that has not arrived by then, with the master's jitter and the drive's own time, waits for "
+        "the next one: a cycle more of dead time, and where only some drives are late their axes are a cycle apart. It "
+        "is a limit, judged with its doubt as time is. With bus.sync_shift = 0, SYNC0 at the task itself, the SYNC0 "
+        "of the next cycle counts.",
         command_behind_sync,
     ),
 )

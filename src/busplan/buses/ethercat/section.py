@@ -1,10 +1,20 @@
 """The keys that only profiles of an EtherCAT bus have, in [bus], [node] and [[group]]."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from busplan.buses.ethercat.constants import LRW, MAILBOX_BYTES, PIPELINE_CYCLES, SYNC_SHIFT, Command, Port
+from busplan.buses.ethercat.constants import (
+    MAILBOX_BYTES,
+    PIPELINE_CYCLES,
+    SEPARATE,
+    SYNC_SHIFT,
+    UNMEASURED_MASTER_SHARE,
+    Master,
+    Port,
+    ProcessData,
+)
 from busplan.buses.ethercat.cycle import LAST_BYTE, TimingModelName
 from busplan.buses.ethercat.equations import room_bytes
 from busplan.elementwise import Number
@@ -13,6 +23,7 @@ from busplan.sections.cycle import BusSection, GroupAxes, GroupSection, NodeSect
 from busplan.sections.execution import UNKNOWN_SHARE
 from busplan.sections.profile import Profile
 
+HousekeepingBytes = Annotated[int, Field(ge=0, le=int(room_bytes(1)))]
 _LONGEST_CABLE_M = 1e5
 _MOST_CYCLES = 1000
 
@@ -20,24 +31,41 @@ _MOST_CYCLES = 1000
 class EthercatBus(BusSection):
     """Section [bus]: an EtherCAT segment at 100 Mbit/s."""
 
+    removed: ClassVar[Mapping[str, str]] = {
+        "command": 'LRW took it that outputs and inputs share bytes; write process_data = "LRW-shared" where the '
+        'master is TwinCAT or acontis, "LRW-separate" for SOEM, IgH or ethercrab, "LRD-LWR" as before; or name it: '
+        'master = "SOEM"'
+    }
     kind: Literal["ethercat"] = Field(description="Kind of bus", examples=["ethercat"])
     nodes: Count | None = Field(default=None, description="Devices N, the master not counted", examples=[8])
-    command: Command = Field(
-        default=LRW,
-        description="Commands of the process data: LRW, inputs and outputs of a device share their bytes; LRD-LWR, "
-        "they do not",
-        examples=[LRW],
+    master: Master | None = Field(
+        default=None,
+        description="Name of the master, which says how process data travel and what datagrams it adds; without it "
+        "the most bytes of those known",
+        examples=["SOEM"],
+    )
+    process_data: ProcessData | None = Field(
+        default=None,
+        description="How process data travel: LRW-separate, one datagram, outputs and inputs in bytes of their own; "
+        "LRW-shared, in the same bytes; LRD-LWR, two datagrams; without it as the master has it",
+        examples=[SEPARATE],
+    )
+    housekeeping_bytes: Annotated[tuple[HousekeepingBytes, ...], Field(strict=False)] | None = Field(
+        default=None,
+        description="Data of each datagram that the master adds to the first frame of every cycle, those of "
+        "distributed clocks among them; without it as the master has it [bytes]",
+        examples=[[2, 8]],
     )
     distributed_clocks: bool = Field(
         default=False,
-        description="Whether devices have distributed clocks: a datagram of 8 bytes opens the first frame, and drives "
-        "act at SYNC0",
+        description="Whether devices have distributed clocks: the master adds a datagram for them, and drives act at "
+        "SYNC0",
         examples=[True],
     )
     sync_shift: Annotated[float, Field(ge=0, le=0.999, allow_inf_nan=False)] = Field(
         default=float(SYNC_SHIFT),
-        description="Where SYNC0 lies in the cycle, a share of the period from the start of the frames, 0..0.999; read "
-        "with distributed clocks",
+        description="Where SYNC0 lies behind the master's task, a share of the period, 0..0.999; 0 is the SYNC0 at the "
+        "next task; read with distributed clocks",
         examples=[0.5],
     )
     mailbox_polls: Annotated[int, Field(ge=0, le=MAX_COUNT)] = Field(
@@ -52,8 +80,17 @@ class EthercatBus(BusSection):
         "[us]",
         examples=[30],
     )
+    master_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None, description="How master_us is known; the gate warns of assumed", examples=["measured"]
+    )
     master_uncertainty_us: TimeUs | None = Field(
-        default=None, description="Standard uncertainty of master_us; without it 10 % of it [us]", examples=[5]
+        default=None,
+        description="Standard uncertainty of master_us; without it 10 % of it where it is measured, derived or "
+        "calibrated, else half of it [us]",
+        examples=[5],
+    )
+    master_jitter_us: TimeUs = Field(
+        default=0.0, description="Latest start of the frames behind the planned one [us]", examples=[20]
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
@@ -73,7 +110,8 @@ class EthercatBus(BusSection):
         """Standard uncertainty of the master's own time [us]."""
         if self.master_uncertainty_us is not None:
             return self.master_uncertainty_us
-        return UNKNOWN_SHARE * self.master_us
+        is_known = self.master_grade in ("measured", "derived", "calibrated")
+        return (UNKNOWN_SHARE if is_known else UNMEASURED_MASTER_SHARE) * self.master_us
 
 
 class EthercatNode(NodeSection):

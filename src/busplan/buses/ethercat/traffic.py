@@ -1,9 +1,20 @@
 """What a network sends in a cycle, and how long it takes on its way."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from busplan.buses.ethercat.constants import CLOCK_BYTES, DELAY_UNCERTAINTY_US, DELAY_US, LRW
+from busplan.buses.ethercat.constants import (
+    CLOCK_BYTES,
+    DELAY_UNCERTAINTY_US,
+    DELAY_US,
+    HOUSEKEEPING_BYTES,
+    LAYOUTS,
+    MEASURED_DELAY_UNCERTAINTY_US,
+    SHARED,
+    SPLIT,
+    UNNAMED,
+    ProcessData,
+)
 from busplan.buses.ethercat.equations import (
     cable_us,
     datagram_bytes,
@@ -14,7 +25,7 @@ from busplan.buses.ethercat.equations import (
 )
 from busplan.buses.ethercat.packing import Devices, Frame, Packing, frames_of, pack
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, alike, larger, named, plain, total
+from busplan.elementwise import Number, alike, larger, named, plain, square_root, total
 
 
 class Hop(NamedTuple):
@@ -25,21 +36,31 @@ class Hop(NamedTuple):
     cable_us: Number
 
 
-def is_shared(network: Network) -> bool:
-    """Whether inputs and outputs share their bytes, as with LRW."""
-    shared: bool = network.profile.bus.command == LRW
-    return shared
+class DevicesDoubt(NamedTuple):
+    """How well the delays of some devices are known. The number may be of any sort."""
+
+    key: str
+    """Dotted key that would say them better."""
+    label: str
+    one_way_us: Number
+    """Standard uncertainty of all of them together, one way [us]."""
+
+
+def layout(network: Network) -> ProcessData:
+    """How the process data travel: as the profile says, else as its master lays them out."""
+    bus = network.profile.bus
+    return bus.process_data or LAYOUTS[bus.master or UNNAMED]
 
 
 def datagrams(network: Network) -> int:
     """Datagrams of process data in a frame: one of LRW, or one of LRD and one of LWR."""
-    return 1 if is_shared(network) else 2
+    return 2 if layout(network) == SPLIT else 1
 
 
 def data_bytes(group: Group, network: Network) -> Number:
-    """Bytes of one device in a frame: the larger of input and output, or both [bytes]."""
+    """Bytes of one device in a frame: the larger of input and output where they share bytes, else both [bytes]."""
     both = group.read_bytes, group.write_bytes
-    found = larger(*both) if is_shared(network) else total(both)
+    found = larger(*both) if layout(network) == SHARED else total(both)
     return named(found, "device_bytes", f"d{group.name and f',{group.name}'}")
 
 
@@ -48,14 +69,19 @@ def devices(network: Network) -> tuple[Devices, ...]:
     return tuple(Devices(one.nodes, data_bytes(one, network)) for one in network.groups)
 
 
-def clock_bytes(network: Network) -> Number:
-    """The datagram of the distributed clocks, which opens the first frame; 0 without them [bytes]."""
-    return datagram_bytes(alike(CLOCK_BYTES, network.nodes)) if network.profile.bus.distributed_clocks else 0.0
+def housekeeping_bytes(network: Network) -> Number:
+    """The datagrams that the master adds to the first frame, those of distributed clocks among them [bytes]."""
+    bus = network.profile.bus
+    if bus.housekeeping_bytes is not None:
+        return total(datagram_bytes(alike(one, network.nodes)) for one in bus.housekeeping_bytes)
+    tables = (HOUSEKEEPING_BYTES, CLOCK_BYTES) if bus.distributed_clocks else (HOUSEKEEPING_BYTES,)
+    added = [one[bus.master or UNNAMED] for one in tables]
+    return total(alike(one, network.nodes) for one in added if one)
 
 
 def packing(network: Network, each: Sequence[Devices]) -> Packing:
     """All frames of its process data, of all its devices."""
-    found = pack(each, datagrams=datagrams(network), first_bytes=clock_bytes(network))
+    found = pack(each, datagrams=datagrams(network), first_bytes=housekeeping_bytes(network))
     return found._replace(
         frames=named(found.frames, "frames", "F"),
         datagrams_bytes=named(found.datagrams_bytes, "datagrams_bytes", "G"),
@@ -65,7 +91,9 @@ def packing(network: Network, each: Sequence[Devices]) -> Packing:
 
 def frames(network: Network) -> tuple[Frame, ...]:
     """The same frames one by one, of plain numbers."""
-    return tuple(frames_of(devices(network), datagrams=datagrams(network), first_bytes=plain(clock_bytes(network))))
+    return tuple(
+        frames_of(devices(network), datagrams=datagrams(network), first_bytes=plain(housekeeping_bytes(network)))
+    )
 
 
 def hop(group: Group) -> Hop:
@@ -80,13 +108,17 @@ def devices_us(network: Network) -> Number:
     return total(one.nodes * one.device_us for one in map(hop, network.groups))
 
 
-def devices_doubt_us(network: Network) -> Number:
-    """Standard uncertainty of that: of the devices whose delay is taken from their port [us]."""
-    return total(
-        device_us(one.nodes * DELAY_UNCERTAINTY_US[one.node.port])
-        for one in network.groups
-        if one.node.delay_us is None
-    )
+def devices_doubts(network: Network) -> Iterator[DevicesDoubt]:
+    """How well the delays are known: those of a port err together, measured ones each by itself."""
+    for port, uncertainty_us in DELAY_UNCERTAINTY_US.items():
+        own = [one for one in network.groups if one.node.delay_us is None and one.node.port == port]
+        if own:
+            nodes = total(one.nodes for one in own)
+            yield DevicesDoubt(own[0].key("delay_us"), f"delay of {port} devices", nodes * uncertainty_us)
+    own = [one for one in network.groups if one.node.delay_us is not None]
+    if own:
+        us = square_root(total(one.nodes for one in own)) * MEASURED_DELAY_UNCERTAINTY_US
+        yield DevicesDoubt(own[0].key("delay_us"), "step of the clocks that measured delays", us)
 
 
 def cables_us(network: Network) -> Number:
@@ -117,8 +149,9 @@ def arrivals_us(network: Network) -> dict[int, float]:
     """When each device has its command, by its number from 1; of plain numbers [us].
 
     A device acts when the last byte of its frame has come: a check behind the data says whether the frame is whole.
+    The frames start as late as the master's jitter lets them.
     """
-    now_us = plain(network.profile.bus.master_us)
+    now_us = plain(network.profile.bus.master_us + network.profile.bus.master_jitter_us)
     sent_us: dict[int, float] = {}
     for one in frames(network):
         now_us += plain(sending_us(frame_bytes(one.datagrams_bytes)))
