@@ -100,7 +100,7 @@ def test_codes_are_stable() -> None:
         "BP109": "gap-count-unsafe",
         "BP110": "gap-count-wasteful",
         "BP111": "payload-not-quadlets",
-        "BP112": "execution-unmeasured",
+        "BP112": "assumed-key",
         "BP113": "fits-only-until-bus-reset",
         "BP114": "not-shown-to-fit",
         "BP121": "bus-load-over-limit",

@@ -16,6 +16,8 @@ class Term(NamedTuple):
     key: str
     """Of its figure."""
     us: Number
+    rests_on: str = ""
+    """Dotted key of the profile that it comes from, where that is one alone."""
 
     @property
     def name(self) -> str:

@@ -43,6 +43,14 @@ class RuleFigures(Protocol):
         """Keys of the limits that are neither broken nor shown to be kept; of the model that decides."""
 
     @property
+    def terms(self) -> Sequence[Any]:
+        """The parts of what the cycle needs."""
+
+    @property
+    def doubts(self) -> Sequence[Any]:
+        """What its uncertainty is made of."""
+
+    @property
     def required_us(self) -> float:
         """What the cycle needs [us]."""
 

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from busplan.errors import BusplanError, PlacedError, PlacedProblem
 from busplan.profile.document import Document, TomlTable, text_of
+from busplan.profile.graded import inherit, remember
 from busplan.profile.keys import holder
 from busplan.profile.kinds import kind_of, profile_model
 from busplan.sections.profile import Profile
@@ -106,6 +107,7 @@ def validate(document: Document) -> Profile:
     data = document.data()
     found = _checked(data)
     if isinstance(found, Profile):
+        remember(found, document)
         return found
     from busplan.profile.problems import refusal  # loaded only for an invalid profile
 
@@ -169,6 +171,7 @@ def override(profile: Profile, changes: dict[str, object], *, origin: dict[str, 
         table[last] = value
     found = _checked(data)
     if isinstance(found, Profile):
+        inherit(found, profile, frozenset(changes))
         return found
     from busplan.profile.problems import refused_changes  # as above
 

@@ -5,8 +5,12 @@ from typing import Any, Final
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind
 from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.derivation.inputs import given
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
+from busplan.elementwise import plain
+from busplan.sections.base import value_at
+from busplan.sourced import Sourced
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -83,8 +87,33 @@ def _room(subject: RuleSubject, counts: Any) -> Mending:
     return subject.cure() if limit is None or limit.is_safety else Mending(limit.way_out)
 
 
-def execution_unmeasured(subject: RuleSubject) -> Iterator[RuleProblem]:
-    """The execution time is an assumption."""
+_MUCH: Final = Sourced(
+    0.25,
+    unit="1",
+    grade="assumed",
+    source="chosen",
+    meaning="share of U squared, or of the required time, from which on a verdict rests on a key",
+)
+
+
+def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """Much of the required time, or of what is not known of it, is an assumption."""
+    one, profile = subject.deciding, subject.profile
+    variance = sum(float(doubt.us) ** 2 for doubt in one.doubts)
+    shares = [(doubt.key, float(doubt.us) ** 2 / variance, "U squared") for doubt in one.doubts if variance]
+    shares += [(term.rests_on, plain(term.us) / one.required_us, "the required time") for term in one.terms]
+    said: dict[str, list[str]] = {}
+    for key, share, whole in shares:
+        if share > _MUCH:
+            said.setdefault(key, []).append(f"{share:.0%} of {whole}")
+    for key, carried in said.items():
+        # What is no key has no grade, and execution times have a section of their own.
+        if isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed":
+            yield RuleProblem(key, f"an assumption, and it carries {' and '.join(carried)}", "measure it")
+    yield from _assumed_execution(subject)
+
+
+def _assumed_execution(subject: RuleSubject) -> Iterator[RuleProblem]:
     network, bus = network_of(subject.profile), bus_of(subject.profile)
     for group in network.groups:
         if group.node.execution.grade != "assumed" or not bus.has_execution(network._replace(groups=(group,))):
@@ -146,11 +175,12 @@ RULES: Final = (
     ),
     Rule(
         "BP112",
-        "execution-unmeasured",
+        "assumed-key",
         "warning",
-        "the execution time is an assumption",
-        'node.execution has grade = "assumed". The execution time is the largest term of most cycles, and no '
-        "equation gives it: measure it.",
-        execution_unmeasured,
+        "the verdict rests on an assumption",
+        "A key that its comment or its grade calls assumed carries more than a quarter of the required time or of U "
+        'squared, or node.execution has grade = "assumed": the execution time is the largest term of most cycles, and '
+        "no equation gives it. Measure it, and say so in its grade or comment.",
+        assumed_key,
     ),
 )

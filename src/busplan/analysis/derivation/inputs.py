@@ -6,6 +6,7 @@ from typing import Any, Final
 from busplan.analysis.derivation.origin import GivenTable, Input
 from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of
+from busplan.profile.graded import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
 from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.execution import TableExecution
@@ -48,8 +49,9 @@ def given(profile: Profile, key: str) -> Input:
     Returns
     -------
     Input
-        Its grade is that of its section, if the section has one, but a default of [servo] is assumed; that of a sourced
-        figure, if the value is that figure; otherwise "given".
+        Its grade is the one beside it, as bus.master_grade of bus.master_us; that of its section, if the section has
+        one, but a default of [servo] is assumed; that of a sourced figure, if the value is that figure; that of
+        its comment in the file; otherwise "given".
     """
     *sections, name = key.split(".")
     section: Any = profile
@@ -66,6 +68,9 @@ def given(profile: Profile, key: str) -> Input:
                 own_grade, graded_by = getattr(grades, name), f"; graded by {'.'.join(sections[:number])}.grades.{name}"
             elif grades is not None and number == len(sections) and name not in section.model_fields_set:
                 own_grade, graded_by = "assumed", ""  # a default is busplan's, whatever is known of the others
+    beside = f"{name.removesuffix('_us')}_grade"
+    if getattr(section, beside, None):
+        own_grade, graded_by = getattr(section, beside), f"; graded by {'.'.join(sections)}.{beside}"
     is_set = is_set and name in section.model_fields_set
     description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
     value = getattr(section, name)
@@ -78,7 +83,11 @@ def given(profile: Profile, key: str) -> Input:
     default = bus.key_sources.get(alike_key)
     if default is not None and value == default:
         grade, source = default.grade, f"{source}, as {default.source}"
-    grade = bus.key_grades.get(alike_key, grade)
+    by_comment = comment_grade(profile, key) if is_set and grade == "given" else None
+    if by_comment is not None:
+        grade, source = by_comment, f"{source}; graded by its comment"
+    else:
+        grade = bus.key_grades.get(alike_key, grade)
     # A plain number shows no unit.
     unit = "" if unit == "1" else unit
     symbol = _SYMBOLS.get(alike_key) or bus.key_symbols.get(alike_key) or SYMBOLS.get(name) or name

@@ -87,11 +87,11 @@ class EthercatCycle(BusCycle):
     def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
         return (
-            Term("cycle_master_us", self.network.profile.bus.master_us),
-            Term("cycle_jitter_us", self.network.profile.bus.master_jitter_us),
+            Term("cycle_master_us", self.network.profile.bus.master_us, "bus.master_us"),
+            Term("cycle_jitter_us", self.network.profile.bus.master_jitter_us, "bus.master_jitter_us"),
             Term("cycle_frames_us", sending_us(self._overhead_bytes)),
             Term("cycle_data_us", sending_us(self.process_bytes)),
-            Term("cycle_mailbox_us", mailbox_us(self.network)),
+            Term("cycle_mailbox_us", mailbox_us(self.network), "bus.mailbox_polls"),
             Term("cycle_devices_us", devices_us(self.network)),
             Term("cycle_cable_us", cables_us(self.network)),
             Term("cycle_receive_us", self._receive_us),

@@ -31,7 +31,7 @@ def _late_command_us(network: Network) -> Number:
 
 SYNC0: Final = share_limit(
     "sync0",
-    "the last command is taken at {value:.1f} +/- {uncertainty:.1f} us, and SYNC0 is at {most:.1f} us",
+    "the last command comes at {value:.1f} +/- {uncertainty:.1f} us, SYNC0 at {most:.1f} us",
     _late_command_us,
     share=sync0_share,
     doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,

@@ -26,10 +26,10 @@ def command_behind_sync(subject: RuleSubject) -> Iterator[RuleProblem]:
     if SYNC0.key not in (*one.exceeded, *(one.not_shown or ())):
         return
     late = max(ceil((one.command_us - one.sync0_us) / one.period_us), 1)
-    when = "it takes effect" if SYNC0.key in one.exceeded else "not shown to be in time; if late it takes effect"
+    maybe = "" if SYNC0.key in one.exceeded else "maybe "
     yield RuleProblem(
         "bus.sync_shift",
-        f"{subject.limit_words(SYNC0.key)}: {when} {late} cycle{'s' * (late > 1)} later",
+        f"{subject.limit_words(SYNC0.key)}: {maybe}{late} cycle{'s' * (late > 1)} late",
         SYNC0.way_out,
         subject.cure().cure,
     )
