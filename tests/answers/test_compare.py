@@ -58,11 +58,12 @@ def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None
     assert "No period is shown to fit: a PDO of 40 bytes" in note
     assert "Left out on CAN: bus.speed, bus.gap_count, bus.charge_hops, group.io.write_response." in said(GANTRY)
     assert "Execution times are assumed to be as long as on IEEE 1394; here they are: from SYNC to a queued" in note
-    assert "No figure that others have published or measured tests the cycle of CAN (kind can)." in note
+    assert "Tested of CAN (kind can) by figures of others: lengths of frames (2 sizes), response times" in note
+    assert note.endswith("; not tested: the cycle.")
     reset = "After a bus reset, with bus.gap_count = 63 until it is set again, the verdict is: not shown to fit."
-    assert f"IEEE 1394: {reset}" in said(GANTRY)
+    assert any(line.startswith(f"IEEE 1394: {reset}") for line in said(GANTRY))
     assert [one["verdict_after_reset"] for one in plain(GANTRY)["buses"]] == ["not shown to fit", None]
-    assert not [line for line in said(PAPER) if line.startswith("IEEE 1394: ")]
+    assert not [line for line in said(PAPER) if line.startswith("IEEE 1394: After")]
     broadcasts = compare(load("dvrk").profile, kinds=BOTH)
     assert any("; no execution time is in the cycle of IEEE 1394 as this" in line for line in said(broadcasts))
 

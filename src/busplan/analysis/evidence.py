@@ -1,17 +1,23 @@
 """Figures that others have published or measured, beside computed ones, for each kind of bus."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from math import hypot
+from typing import Any, NamedTuple
 
+from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.paper import BENCH_PROFILE, CIRCLE_PROFILES, PAPER, circle_sections
 from busplan.buses import kind_named, kind_names
 from busplan.buses.bus import Bus
-from busplan.buses.published import EvidenceSection, published
+from busplan.buses.parts import COVERAGE
+from busplan.buses.published import Comparison, EvidenceSection, Tested, parts_tested, published
+from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
+from busplan.profile.toml import override
 from busplan.progress import Progress
+from busplan.sections.profile import Profile
 
 
 class KindEvidence(NamedTuple):
@@ -20,8 +26,8 @@ class KindEvidence(NamedTuple):
     kind: str
     title: str
     """What the kind is called."""
-    untested: str
-    """What of it nobody else's figure tests; empty where all of it is tested."""
+    tested: Tested
+    """Which parts of it figures of others test."""
     sections: tuple[EvidenceSection, ...]
 
 
@@ -34,7 +40,33 @@ def bus_evidence(bus: Bus) -> tuple[EvidenceSection, ...]:
         The kind.
     """
     networks = {name: network_of(load(name).profile) for name in bus.evidence_profiles}
-    return bus.evidence(networks, {name: published(name) for name in bus.evidence_data})
+    own = bus.evidence(networks, {name: published(name) for name in bus.evidence_data})
+    rows = (_section(table, name, bus) for name in bus.evidence_data for table in published(name).get("evidence", ()))
+    return (*own, *rows)
+
+
+def _section(table: Mapping[str, Any], data: str, bus: Bus) -> EvidenceSection:
+    """The rows of one table [[evidence]] of a data file: each a profile with some keys set, and a published figure."""
+    base = override(load(table.get("profile", bus.evidence_profiles[0])).profile, table.get("set", {}))
+    note = f"{table['source']}. {table.get('note', '')}".strip()
+    return EvidenceSection(table["title"], note, tuple(_row(row, table, base, bus) for row in table["rows"]), data)
+
+
+def _row(row: Mapping[str, Any], table: Mapping[str, Any], base: Profile, bus: Bus) -> Comparison:
+    """Compute what a row compares: the sum of some figures of a profile, or of constants of the kind."""
+    found = figures(override(base, row.get("set", {})), model=bus.deciding_model, with_counts=False)
+    parts = [bus.constants[key] if key in bus.constants else getattr(found, key) for key in table["figures"]]
+    doubts = [float(one.us) for one in found.doubts if one.key == table.get("doubt")]
+    return Comparison(
+        table["title"],
+        row["quantity"],
+        table["unit"],
+        row["published"],
+        table.get("method", f"{bus.deciding_model} model"),
+        row.get("share", 1.0) * sum(plain(one) for one in parts),
+        table["grade"],
+        COVERAGE * row.get("share", 1.0) * hypot(*doubts) if doubts else None,
+    )
 
 
 def known_kinds(kind: str | None) -> tuple[str, ...]:
@@ -78,7 +110,7 @@ def kind_evidence(kind: str, *, circles: Callable[[], Sequence[CircleFigures]]) 
     if bus_of(load(BENCH_PROFILE).profile) is bus:
         seed = [one for one in found if one.data == PAPER]
         found = (*seed, *circle_sections(published(PAPER), circles()), *(one for one in found if one.data != PAPER))
-    return KindEvidence(bus.kind, bus.title, bus.untested, found)
+    return KindEvidence(bus.kind, bus.title, parts_tested(bus.evidence_data), found)
 
 
 def paper_evidence(*, circles: Callable[[], Sequence[CircleFigures]]) -> tuple[EvidenceSection, ...]:

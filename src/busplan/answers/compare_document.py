@@ -6,6 +6,8 @@ from busplan.analysis.comparison.kinds import CircleAtSmallest, KindComparison, 
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.buses import kind_named
+from busplan.buses.bus import Bus
+from busplan.buses.published import parts_tested
 from busplan.elementwise import plain
 from busplan.forms.blocks import JsonDocument, Record
 
@@ -43,6 +45,7 @@ def _row(record: Record) -> Record:
     flat = {key: value for key, value in record.items() if key not in {"circle", "curve", "assumed"}}
     return {
         **flat,
+        "tested": list(record["tested"]),
         "assumed": [one["key"] for one in record["assumed"]],
         "circle_passed": circle["passed"],
         "circle_step_us": circle["step_us"],
@@ -72,9 +75,15 @@ def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
     }
 
 
+def tested_record(bus: Bus) -> Record:
+    """Which parts of a kind figures of others test, and which they do not."""
+    found = parts_tested(bus.evidence_data)
+    return {"tested": dict(found.parts), "not_tested": list(found.untested)}
+
+
 def _head(kind: str, *, is_own: bool, why_not: list[str]) -> Record:
     bus = kind_named(kind)
-    return {"kind": kind, "title": bus.title, "is_own": is_own, "why_not": why_not, "untested": bus.untested or None}
+    return {"kind": kind, "title": bus.title, "is_own": is_own, "why_not": why_not, **tested_record(bus)}
 
 
 def _safe_record(safe: SafeAxes) -> Record:

@@ -7,6 +7,7 @@ from typing import Final
 from busplan.analysis.evidence import KindEvidence
 from busplan.answers.documents import document
 from busplan.answers.verdict import evidence_sentence
+from busplan.buses import kind_named
 from busplan.buses.published import Comparison, EvidenceSection
 from busplan.forms.blocks import (
     Block,
@@ -104,7 +105,8 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
         "evidence",
         kinds=[one.kind for one in kinds],
         without=[one.kind for one in kinds if not one.sections],
-        untested={one.kind: one.untested for one in kinds if one.untested},
+        tested={one.kind: dict(one.tested.parts) for one in kinds},
+        not_tested={one.kind: list(one.tested.untested) for one in kinds},
         notes={section.title: section.note for one in kinds for section in one.sections},
         figures=evidence_records(kinds),
     )
@@ -113,7 +115,7 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
 def _kinds(kinds: Sequence[KindEvidence]) -> Iterator[Block]:
     start = 0
     for one in kinds:
-        yield from evidence_sentence(one)
+        yield from evidence_sentence(kind_named(one.kind))
         yield from _sections(one.sections, start=start)
         start += sum(len(section.comparisons) for section in one.sections)
 
@@ -127,6 +129,7 @@ def _sections(sections: Sequence[EvidenceSection], *, start: int = 0) -> Iterato
 
 def _table(comparisons: Sequence[_Numbered]) -> Table:
     methods = list(dict.fromkeys(one.method for _, one in comparisons))
+    is_weighed = any(one.uncertainty is not None for _, one in comparisons)
     rows: dict[str, dict[str, _Numbered]] = {}
     for at, one in comparisons:
         rows.setdefault(one.quantity, {})[one.method] = at, one
@@ -140,28 +143,36 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
         *(
             column
             for method in methods
-            for column in (TableColumn(method), TableColumn("residual"), TableColumn("", "%", rank=1))
+            for column in (
+                TableColumn(method),
+                *((TableColumn("U"),) if is_weighed else ()),
+                TableColumn("residual"),
+                TableColumn("", "%", rank=1),
+            )
         ),
     )
-    return Table(columns, tuple(_row(by_method, methods) for by_method in rows.values()), heads=3)
+    each = (_row(by_method, methods, is_weighed=is_weighed) for by_method in rows.values())
+    return Table(columns, tuple(each), heads=3)
 
 
-def _row(by_method: dict[str, _Numbered], methods: Sequence[str]) -> TableRow:
+def _row(by_method: dict[str, _Numbered], methods: Sequence[str], *, is_weighed: bool) -> TableRow:
     at, first = next(iter(by_method.values()))
     published = ShownValue(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
-    compared = (cell for method in methods for cell in _compared(by_method.get(method)))
+    compared = (cell for method in methods for cell in _compared(by_method.get(method), is_weighed=is_weighed))
     return TableRow((first.quantity, first.unit, published, "" if first.published is None else first.grade, *compared))
 
 
-def _compared(numbered: _Numbered | None) -> tuple[Cell, Cell, Cell]:
+def _compared(numbered: _Numbered | None, *, is_weighed: bool) -> tuple[Cell, ...]:
     if numbered is None:
-        return "", "", ""
+        return ("",) * (3 + is_weighed)
     at, one = numbered
     decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
     place = f"/figures/{at}"
+    doubt = ShownValue(one.uncertainty, "uncertainty", one.unit, decimals, at=f"{place}/uncertainty", fixed=True)
     # Smaller values are rounding of the printed figure.
     return (
         ShownValue(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
+        *((doubt,) if is_weighed else ()),
         ShownValue(
             one.residual,
             "residual",

@@ -25,6 +25,7 @@ from busplan.buses.figure import (
     Figure,
     by_key,
 )
+from busplan.buses.published import parts_tested
 from busplan.buses.rule import contradicts
 from busplan.elementwise import plain
 from busplan.forms.blocks import (
@@ -44,7 +45,6 @@ from busplan.forms.numbers import listed, nouns, period_value
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
-    from busplan.analysis.evidence import KindEvidence  # it loads NumPy
     from busplan.buses.bus import Bus
 
 Places = Mapping[str, str]
@@ -221,12 +221,15 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
         yield Sentence((f"Not in it: {', '.join(f'{one.label} ({one.key})' for one in left)}.",))
 
 
-def evidence_sentence(bus: "Bus | KindEvidence") -> Iterator[Sentence]:
-    """Say what of a kind nobody else's figure tests; nothing where all of it is tested."""
-    if bus.untested:
-        words = (
-            f"No figure that others have published or measured tests {bus.untested} of {bus.title} (kind {bus.kind})."
-        )
+def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
+    """Say by part what of a kind figures of others test; nothing where they test all of it."""
+    found = parts_tested(bus.evidence_data)
+    kind = f"{bus.title} (kind {bus.kind})"
+    if not found.parts:
+        yield Sentence((f"No figure that others have published or measured tests the model of {kind}.",))
+    elif found.untested:
+        parts = ", ".join(f"{part} ({words})" for part, words in found.parts.items())
+        words = f"Tested of {kind} by figures of others: {parts}; not tested: {', '.join(found.untested)}."
         yield Sentence((words,))
 
 

@@ -95,6 +95,10 @@ class Bus(ABC):
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()
     """Constants that its warnings look at."""
+    clock_key: ClassVar[str] = ""
+    """Key of a common clock that its nodes may lack."""
+    loop_key: ClassVar[str] = ""
+    """Key that puts whole periods into a loop on the host."""
     change_meanings: ClassVar[Mapping[str, str]] = {}
     """What a change of a key means on the machine, where the key does not say so."""
     reset_changes: ClassVar[Mapping[str, Value]] = {}
@@ -108,8 +112,6 @@ class Bus(ABC):
     """Data files, in busplan/data, with figures of it that others have published or measured."""
     evidence_profiles: ClassVar[tuple[str, ...]] = ()
     """Shipped profiles that these figures are compared on."""
-    untested: ClassVar[str] = "the model"
-    """What of it none of these figures tests, as its verdicts say; empty where they test all of it."""
 
     @abstractmethod
     def profile_model(self) -> "type[Profile]":

@@ -1,7 +1,7 @@
 """Published figures beside computed ones."""
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from math import fsum, sqrt
 from pathlib import Path
@@ -49,6 +49,38 @@ class Spread(NamedTuple):
 Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
 
 
+class Tested(NamedTuple):
+    """Which parts of a kind of bus figures of others test."""
+
+    parts: Mapping[str, str]
+    """What tests each part, in a few words."""
+    untested: tuple[str, ...]
+    """Parts that no figure tests."""
+
+
+def parts_tested(names: Sequence[str]) -> Tested:
+    """The parts that some data files test, by their tables [tested], and those that they do not.
+
+    Parameters
+    ----------
+    names
+        The files.
+    """
+    files = [published(name) for name in names]
+    parts = {part: _words(part, one, file) for file in files for part, one in file.get("tested", {}).items()}
+    return Tested(parts, tuple(part for file in files for part in file.get("untested", ())))
+
+
+def _words(part: str, one: Mapping[str, Any], file: Mapping[str, Any]) -> str:
+    """Words of one part; {count} is the length of the list that it names, or the rows of evidence of the part."""
+    found: Any = file
+    for key in one.get("of", "").split(".") if "of" in one else ():
+        found = found[key]
+    rows = [row for table in file.get("evidence", ()) if table["part"] == part for row in table["rows"]]
+    words: str = one["words"].format(count=len(found if "of" in one else rows))
+    return words
+
+
 class Comparison(NamedTuple):
     """One published figure and one way to compute it."""
 
@@ -62,6 +94,8 @@ class Comparison(NamedTuple):
     computed: float
     grade: Grade = "published"
     """How well the published figure is known."""
+    uncertainty: float | None = None
+    """Expanded uncertainty of the computed figure, in `unit`; None where it is not weighed."""
 
     @property
     def residual(self) -> float | None:

@@ -309,10 +309,18 @@ def test_a_circle_with_more_than_a_period_in_its_loop_is_not_simulated(run: Run,
     done = run("circle-test", "ethercat-servo-8", "--set", "servo.loop=host", cwd=tmp_path)
     assert done.returncode == 2
     assert 'servo.loop = "host": the bus puts 2000 us into a loop over it' in done.stderr
+    assert "less bus.pipeline_cycles, now 1, or close the loop on the node" in done.stderr
     checked = run("check", "ethercat-servo-8", "--set", "servo.loop=host", cwd=tmp_path)
     assert checked.returncode in (1, 2)
     assert "the bus puts 2000 us into a loop" in checked.stdout + checked.stderr
     assert "Traceback" not in checked.stderr
+
+
+def test_axes_that_the_bus_takes_too_far_apart_are_refused_at_their_clock(run: Run, tmp_path: Path) -> None:
+    options = ("--set", "bus.distributed_clocks=false", "--set", "payload.read_bytes=1200")
+    done = run("circle-test", "ethercat-servo-8", *options, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "bus.distributed_clocks = false: without a common clock the bus takes set-points to the axes" in done.stderr
 
 
 def test_a_missing_clock_moves_the_axes_of_a_circle_apart() -> None:
@@ -466,6 +474,24 @@ def test_init_writes_a_profile_of_it_that_fits(run: Run, tmp_path: Path) -> None
     found = busplan.load_profile(tmp_path / "press.toml")
     assert (found.bus.kind, len(found.group), found.bus.distributed_clocks) == ("ethercat", 2, True)
     assert run("check", "press.toml", "--no-circle", cwd=tmp_path).returncode == 0
+
+
+def test_frames_are_those_of_eni_files_and_loops_lie_within_u_but_for_one_machine() -> None:
+    each = {one.quantity: one for section in bus_evidence(kind_named("ethercat")) for one in section.comparisons}
+    frames = [one for name, one in each.items() if name.startswith(("acontis", "KPA"))]
+    assert len(frames) == 6
+    assert all(abs(one.residual or 0) < 1e-9 for one in frames)
+    # Its file has one device's inputs in a datagram of their own: 12 bytes of header.
+    assert each["TwinCAT, 5 devices"].residual == pytest.approx(-12 * BYTE_US)
+    weighed = {name: abs(one.residual or 0) / one.uncertainty for name, one in each.items() if one.uncertainty}
+    assert {name for name, share in weighed.items() if share > 1} == {"7 drives"}
+    assert all(share < 0.55 for name, share in weighed.items() if name != "7 drives")
+
+
+def test_its_verdict_says_by_part_what_is_tested() -> None:
+    said = " ".join(busplan.capacity(profile()).to_dict()["verdicts"][0]["text"].split())
+    parts = "bytes (3 captures), devices (14 machines or pairs), frames (7 ENI files)"
+    assert f"by figures of others: {parts}; not tested: the whole cycle of a machine." in said
 
 
 def test_its_evidence_says_where_figures_come_from(run: Run) -> None:

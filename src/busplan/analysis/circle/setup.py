@@ -7,11 +7,13 @@ from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
 from busplan.analysis.circle.delays import loop_delays_us, skew_us
 from busplan.analysis.network import bus_of
-from busplan.sections.base import Section
+from busplan.profile.write import value_text
+from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError, Refused, parameters
 from busplan.servo.circle import check_circle
+from busplan.servo.delivery import check_delivery
 from busplan.servo.measured_part import REST_MM, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path, circle_setpoints
@@ -52,8 +54,23 @@ def setup(profile: Profile) -> Setup:
         mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
         settled=settling_us != inf,
     )
+    _require_order(profile, one.delivery)
     check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
     return one
+
+
+def _require_order(profile: Profile, delivery: Delivery) -> None:
+    """Refuse axes that the bus itself takes too far apart, at the key of the clock that they lack."""
+    own_us, period_us = skew_us(profile), profile.cycle.period_us
+    try:
+        check_delivery(delivery, period_us=period_us)
+    except ParameterError:
+        if not own_us:
+            raise
+        key = bus_of(profile).clock_key
+        why = f"without a common clock the bus takes set-points to the axes {own_us:g} us apart, and with delivery it"
+        right = f"{why} must be no more than half the period, {period_us / 2:g} us"
+        raise ParameterError(Refused(key, value_text(value_at(profile, key)), right)) from None
 
 
 def loop_timing(profile: Profile) -> LoopTiming:
@@ -88,7 +105,9 @@ def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
     period_us = profile.cycle.period_us
     if max(x_us, y_us) > period_us:
         why = f"the bus puts {max(x_us, y_us):g} us into a loop over it, and the circle test knows one period"
-        right = f'{why}, {period_us:g} us, at most; close the loop on the node, servo.loop = "node"'
+        key = bus_of(profile).loop_key
+        less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
+        right = f'{why}, {period_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
         raise ParameterError(Refused("servo.loop", '"host"', right))
     servo = profile.servo
     return Axis(**servo.axis_keys("x"), delay_us=x_us), Axis(**servo.axis_keys("y"), delay_us=y_us)

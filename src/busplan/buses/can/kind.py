@@ -90,7 +90,6 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
     }
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second bus"}
     evidence_data = ("can", "paper")
-    untested = "the cycle"
 
     def profile_model(self) -> "type[CanProfile]":
         """The model of its profiles."""

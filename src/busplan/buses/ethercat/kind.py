@@ -103,6 +103,8 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         "node.delay_us": "t_d",
         "node.execution.worst_extra_us": "T_extra",
     }
+    clock_key = "bus.distributed_clocks"
+    loop_key = "bus.pipeline_cycles"
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second segment"}
     term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
         {"bus.master_us": 0.0},
@@ -111,7 +113,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     )
     evidence_data = ("ethercat",)
     evidence_profiles = ("ethercat-servo-8",)
-    untested = "the cycle"
 
     def profile_model(self) -> "type[EthercatProfile]":
         """The model of its profiles."""

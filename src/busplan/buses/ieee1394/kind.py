@@ -145,7 +145,6 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
     )
     evidence_data = ("paper", "dvrk", "ieee1394")
     evidence_profiles = ("paper-two-node", "dvrk")
-    untested = ""
     change_words: ClassVar[Mapping[str, str]] = {
         "bus.gap_count": "gap count {}",
         "bus.max_hops": "tree of {} hops",

@@ -100,7 +100,6 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     change_words: ClassVar[Mapping[str, str]] = {_METHOD: "method {}"}
     evidence_data = ("sercos3",)
     evidence_profiles = ("sercos3-servo-8",)
-    untested = "the window"
 
     def profile_model(self) -> "type[Sercos3Profile]":
         """The model of its profiles."""
