@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, partial, reduce
+from itertools import chain
 from math import inf
 from typing import Final, Literal
 
@@ -152,11 +153,11 @@ class CanCycle(BusCycle):
         name, node = NAMES[kind], 0
         own = (one for one, _ in self._pdos if one.kind == kind)
         for group, one in zip(self.network.groups, own, strict=True):
-            nodes, frames = int(plain(group.nodes)), frame_sizes(one)
+            nodes = int(plain(group.nodes))
             pdos = int(plain(one.pdos)) // nodes
             for _ in range(nodes):
                 node += 1
-                for size in pdos * frames:
+                for size in chain.from_iterable(frame_sizes(one) for _ in range(pdos)):
                     us = plain(self._frame_us(size))
                     yield BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", node, name)
 
