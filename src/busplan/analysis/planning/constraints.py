@@ -5,7 +5,7 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
@@ -75,8 +75,7 @@ def utilisation(profile: Profile) -> Iterator[Need]:
     if most is not None:
         bus = bus_of(profile)
         required_us = float(bus.cycle(network_of(profile), model=bus.deciding_model).required_us)
-        # A slice that gives just this must not be over the limit by rounding.
-        us = required_us * (1 + 2 * FIT_ROUNDING) / most if most * _MOST_SLICE_US > required_us else inf
+        us = required_us / most if most * _MOST_SLICE_US > required_us else inf
         yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
 
 
