@@ -93,6 +93,8 @@ class Starter(NamedTuple):
 class Cost(IntEnum):
     """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
 
+    SIMULATION = 0
+    """A number that the circle test alone knows."""
     REGISTER = 1
     """A number in the nodes, such as a gap count."""
     HOST_TIME = 2

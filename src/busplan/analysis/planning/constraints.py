@@ -95,21 +95,19 @@ def needs(profile: Profile) -> list[Need]:
     return [need for constraint in CONSTRAINTS for need in constraint(profile)]
 
 
-def refused_period(profile: Profile, period_us: float) -> Need | None:
-    """Why a period is none of the bus, or does not go with the step of the circle that a profile asks for, if so.
+def refused_period(profile: Profile) -> Need | None:
+    """Why a period is none of the bus, or does not go with the step of the circle that the profile asks for, if so.
 
     Parameters
     ----------
     profile
         The network.
-    period_us
-        Communication period [us].
     """
-    network, bus = network_of(profile)._replace(period_us=period_us), bus_of(profile)
+    network, bus = network_of(profile), bus_of(profile)
     broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
     if broken is not None:
         return Need(inf, broken.key, broken.words(network))
-    why = refused_step(profile, period_us)
+    why = refused_step(profile, profile.cycle.period_us)
     return Need(inf, STEP, why) if why else None
 
 
@@ -125,4 +123,5 @@ def refused_step(profile: Profile, period_us: float) -> str:
     """
     if not profile.asks_for_circle:
         return ""
-    return "; ".join(one.message for one in no_multiple(period_us=period_us, step_us=profile.servo.step_us))
+    found = no_multiple(period_us=period_us, step_us=profile.servo.step_us)
+    return "; ".join(f"servo.{one.message}" for one in found)
