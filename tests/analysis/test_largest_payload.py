@@ -40,7 +40,7 @@ def test_it_is_good_and_no_larger_one_is(
     def is_good(size: int) -> bool:
         profile = override(goal, {"payload.read_bytes": size, "payload.write_bytes": size})
         found = figures(profile, model=bus_of(profile).deciding_model)
-        at_period = keeps_limits(network_of(profile)) and not refused_period(profile, profile.cycle.period_us)
+        at_period = keeps_limits(network_of(profile)) and not refused_period(profile)
         return bool(found.verdict == FITS and found.safe and at_period)
 
     said = [one.changes for one in plan(goal, free=[]).options if one.title == "largest payload"]

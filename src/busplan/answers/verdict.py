@@ -8,7 +8,8 @@ from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.advice import changeable
+from busplan.analysis.planning.advice import UNTESTED_CIRCLE, changeable
+from busplan.analysis.planning.constraints import refused_step
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import (
@@ -67,6 +68,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     figures = verdict.deciding
     at = places.get("verdict", "")
     yield _headline(verdict, profile, at=at)
+    yield from _no_circle(verdict, profile)
     yield from not_in_it(profile)
     yield from evidence_sentence(bus_of(profile))
     yield from _other_models(verdict, profile, places)
@@ -141,6 +143,13 @@ def _headline(verdict: Verdict, profile: Profile, *, at: str) -> Sentence:
     subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), ": ")
     parts = (*subject, *verdict_story(verdict.deciding, profile, at=at).parts)
     return Sentence(parts, state_of(verdict.all_well))
+
+
+def _no_circle(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
+    """Say why no circle can be simulated at the period, where the step alone is the cause."""
+    why = refused_step(profile, verdict.period_us)
+    if why:
+        yield Sentence((f"Its circle cannot be simulated: {why}.",), "fails")
 
 
 def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> Sentence:
@@ -323,6 +332,7 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
         change.changes, meanings=bus_of(profile).change_meanings, at=_place(at, "changes"), quotes=False
     ).parts
     first = f"{period_must_change(profile)} " if PERIOD in change.changes else ""
+    untested = f"; {UNTESTED_CIRCLE}" if change.circle_is_untested else ""
     if change.nodes > figures.nodes:
         more = change.nodes - (figures.safe_nodes or 0)
         way = (
@@ -333,12 +343,12 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
             ", which carries ",
         )
         carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
-        return Sentence((*way, *carried, "."))
+        return Sentence((*way, *carried, untested, "."))
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
     either_way = (" +/- ", doubt) if change.figures.uncertainty_us else ()
-    return Sentence((*way, margin, *either_way, "."))
+    return Sentence((*way, margin, *either_way, untested, "."))
 
 
 def period_must_change(profile: Profile) -> str:

@@ -6,7 +6,7 @@ from typing import Any, Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, Ink
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, larger, plain
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, plain
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -88,7 +88,11 @@ class Limit(NamedTuple):
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
-        return self.least_value(network) > self.most(network)
+        return self.least_value(network) > self.bound(network)
+
+    def bound(self, network: Network) -> Number:
+        """The largest value that keeps it: `most`, but for the rounding of floats."""
+        return self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:
         """The shortest period that keeps a limit that has a share [us]; 0 for any other."""
@@ -107,11 +111,6 @@ class Limit(NamedTuple):
             return self.says(network)
         value, most = self.value(network), self.most(network)
         return self.over.format(value=value, uncertainty=self.uncertainty(network), most=most, bus=network.profile.bus)
-
-
-FIT_ROUNDING: Final = 1e-12
-"""Relative allowance for the rounding of floats, so that what fills its time exactly fits it. It is a billionth of a
-crystal's tolerance and buys no time."""
 
 
 def share_limit(
@@ -138,7 +137,7 @@ def share_limit(
         key,
         over,
         value,
-        lambda network: share(network) * network.period_us * (1 + FIT_ROUNDING),
+        lambda network: share(network) * network.period_us,
         doubt=doubt,
         share=share,
         **more,
@@ -172,6 +171,8 @@ class Starter(NamedTuple):
 class Cost(IntEnum):
     """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
 
+    SIMULATION = 0
+    """A number that the circle test alone knows."""
     REGISTER = 1
     """A number in the nodes, such as a gap count."""
     HOST_TIME = 2

@@ -14,8 +14,8 @@ from busplan.analysis.network import bus_of
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
-from busplan.buses.parts import BROKEN, COVERAGE, FIT_ROUNDING, KEPT, NOT_SHOWN_KEPT, Limit
-from busplan.elementwise import Number, choose, larger, named, square_root, total
+from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, square_root, total
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"

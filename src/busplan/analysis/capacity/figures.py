@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from math import isinf
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import (
@@ -24,7 +23,7 @@ from busplan.buses.figure import CERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, larger, plain
+from busplan.elementwise import Number, choose, existing, larger, plain
 from busplan.profile.toml import at_periods
 from busplan.sections.profile import Profile
 
@@ -183,7 +182,7 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Any] = {key: _existing(number) for key, number in numeric_figures(cycle).items()}
+    numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     codes = limit_codes(network)
@@ -241,7 +240,7 @@ def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[st
     found = certainty(cycle)
     codes = {**limits, TIME: time_code(found, cycle.network)}
     return {
-        **{key: None if one is None else _existing(one) for key, one in certainty_numbers(found, cycle).items()},
+        **{key: None if one is None else existing(one) for key, one in certainty_numbers(found, cycle).items()},
         "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
         "verdict": VERDICTS[int(verdict_code(codes))],
         "doubts": found.doubts,
@@ -298,11 +297,6 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "min_period_us": shortest_us(network, required_us),
         "min_slice_ratio": required_us / period_us,
     }
-
-
-def _existing(number: Number) -> float | None:
-    """A plain number; None for an infinite one, which does not exist."""
-    return None if isinf(found := plain(number)) else found
 
 
 def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) -> Number:

@@ -9,6 +9,7 @@ from busplan.analysis.capacity.certainty import FITS, limits_behind
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.network import bus_of, network_of
+from busplan.elementwise import existing
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
@@ -125,8 +126,9 @@ class Failure(NamedTuple):
     """What the message goes on to say."""
 
     def document(self) -> dict[str, Any]:
-        """Return it as in the JSON document."""
-        return {"name": self.name, "value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
+        """Return it as in the JSON document; a value that does not exist is null, and the text says why."""
+        numbers = {"value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
+        return {"name": self.name, **numbers, "text": self.text}
 
     @property
     def text(self) -> str:
@@ -188,7 +190,9 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
         late = (Failure("safe_required_us", capacity.safe_required_us, capacity.available_us),)
     return (
         *(
-            Failure(one.failure or one.key, float(one.value(network)), float(one.most(network)), one.words(network))
+            Failure(
+                one.failure or one.key, existing(one.value(network)), existing(one.most(network)), one.words(network)
+            )
             for one in broken
         ),
         *late,

@@ -9,7 +9,6 @@ from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
-from busplan.buses.parts import FIT_ROUNDING
 from busplan.elementwise import plain
 from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
@@ -76,8 +75,7 @@ def utilisation(profile: Profile) -> Iterator[Need]:
     if most is not None:
         bus = bus_of(profile)
         required_us = float(bus.cycle(network_of(profile), model=bus.deciding_model).required_us)
-        # A slice that gives just this must not be over the limit by rounding.
-        us = required_us * (1 + 2 * FIT_ROUNDING) / most if most * _MOST_SLICE_US > required_us else inf
+        us = required_us / most if most * _MOST_SLICE_US > required_us else inf
         yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
 
 
@@ -97,21 +95,19 @@ def needs(profile: Profile) -> list[Need]:
     return [need for constraint in CONSTRAINTS for need in constraint(profile)]
 
 
-def refused_period(profile: Profile, period_us: float) -> Need | None:
-    """Why a period is none of the bus, or does not go with the step of the circle that a profile asks for, if so.
+def refused_period(profile: Profile) -> Need | None:
+    """Why a period is none of the bus, or does not go with the step of the circle that the profile asks for, if so.
 
     Parameters
     ----------
     profile
         The network.
-    period_us
-        Communication period [us].
     """
-    network, bus = network_of(profile)._replace(period_us=period_us), bus_of(profile)
+    network, bus = network_of(profile), bus_of(profile)
     broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
     if broken is not None:
         return Need(inf, broken.key, broken.words(network))
-    why = refused_step(profile, period_us)
+    why = refused_step(profile, profile.cycle.period_us)
     return Need(inf, STEP, why) if why else None
 
 
@@ -127,4 +123,5 @@ def refused_step(profile: Profile, period_us: float) -> str:
     """
     if not profile.asks_for_circle:
         return ""
-    return "; ".join(one.message for one in no_multiple(period_us=period_us, step_us=profile.servo.step_us))
+    found = no_multiple(period_us=period_us, step_us=profile.servo.step_us)
+    return "; ".join(f"servo.{one.message}" for one in found)

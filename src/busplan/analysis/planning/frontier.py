@@ -70,16 +70,20 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
 
     first = bisect_left(sizes, execution.ascends_from_bytes)
     del sizes[bisect_left(sizes, True, lo=first, key=is_out) + 1 :]
-    for size in reversed(sizes):
+    place, failed = len(sizes) - 1, 0
+    while place >= 0:
+        size = sizes[place]
         one = with_payload(goal, size) or {}
-        if not search.allows(one):
-            continue
-        found = search.least(cheap, one) if search.reaches(one, cheap) else None
-        if found is not None:
-            bound = payloads.bound if size == largest else "execution"
-            held_by = bound if tried is None else search.binding(cheap, tried).key
-            return option(search, title, found, held_by=held_by)
-        tried = one
+        if search.allows(one):
+            is_near = search.reaches(one, cheap)
+            found = search.least(cheap, one) if is_near else None
+            if found is not None:
+                bound = payloads.bound if size == largest else "execution"
+                held_by = bound if tried is None else search.binding(cheap, tried).key
+                return option(search, title, found, held_by=held_by)._replace(proven=failed < search.max_circles)
+            tried = one
+            failed += is_near  # in time, and refused for something else
+        place -= 1 if failed < search.max_circles else 2 ** (failed - search.max_circles + 1)
     if tried is None:
         return Impossible(title, "the execution table holds no whole step of the payload")
     return Impossible(title, f"not even the smallest fits: {search.binding(cheap, tried).why}")
