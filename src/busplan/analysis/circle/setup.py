@@ -1,5 +1,6 @@
 """Make the input of a circle simulation from a profile: path, axes, timing, delivery and mechanics."""
 
+from dataclasses import replace
 from math import inf
 from typing import Any, Final
 
@@ -12,6 +13,7 @@ from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError, Refused, parameters
 from busplan.servo.circle import check_circle
+from busplan.servo.delivery import check_delivery
 from busplan.servo.measured_part import REST_MM, settling_time_us
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import circle_path, circle_setpoints
@@ -36,6 +38,7 @@ def setup(profile: Profile) -> Setup:
     circle, delivery, mechanics = profile.circle, profile.delivery, profile.mechanics
     (x, y), timing = loop_axes(profile), loop_timing(profile)
     settling_us = path_settling_us(profile)
+    delivered = Delivery(**_parameters_in(delivery, Delivery))
     one = Setup(
         path=circle_path(
             circle.radius_mm,
@@ -48,12 +51,36 @@ def setup(profile: Profile) -> Setup:
         x=x,
         y=y,
         timing=timing,
-        delivery=Delivery(**_parameters_in(delivery, Delivery) | {"skew_us": delivery.skew_us + skew_us(profile)}),
+        delivery=_without_clock(delivered, profile),
         mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
         settled=settling_us != inf,
     )
     check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
     return one
+
+
+def _without_clock(delivery: Delivery, profile: Profile) -> Delivery:
+    """The delivery with what axes without a common clock take their set-points apart.
+
+    Raises
+    ------
+    BusplanError
+        That is too long for the period, and what the profile delivers is not.
+    """
+    apart_us, period_us = skew_us(profile), profile.cycle.period_us
+    if not apart_us:
+        return delivery
+    check_delivery(delivery, period_us=period_us)
+    found = replace(delivery, skew_us=delivery.skew_us + apart_us)
+    try:
+        check_delivery(found, period_us=period_us)
+    except ParameterError:
+        right = (
+            f"the last axis then takes its set-points {apart_us:g} us behind the first, which the circle test knows up "
+            f"to half the period, {period_us / 2:g} us, with jitter and skew; set it true if the drives have a clock"
+        )
+        raise ParameterError(Refused(bus_of(profile).clock_key, "false", right)) from None
+    return found
 
 
 def loop_timing(profile: Profile) -> LoopTiming:
