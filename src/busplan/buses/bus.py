@@ -71,6 +71,8 @@ class Bus(ABC):
     """In the order in which they are reported; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
+    clock_key: ClassVar[str] = ""
+    """Key that says whether a clock is common to the nodes, where a profile may do without."""
     starter: "ClassVar[Starter]"
     """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()
@@ -95,8 +97,6 @@ class Bus(ABC):
     """Keys that its warnings look at."""
     warning_constants: "ClassVar[tuple[Sourced, ...]]" = ()
     """Constants that its warnings look at."""
-    clock_key: ClassVar[str] = ""
-    """Key of a common clock that its nodes may lack."""
     loop_key: ClassVar[str] = ""
     """Key that puts whole periods into a loop on the host."""
     change_meanings: ClassVar[Mapping[str, str]] = {}

@@ -4,6 +4,7 @@ They share one run of the test, only for profiles with a section for it.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Final
 
 from busplan.analysis.circle.check import MOST_STEPS
@@ -14,7 +15,7 @@ from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError
 
-_NAMED: Final = ("circle", "servo", "delivery", "cycle")
+_NAMED: Final = ("circle", "servo", "delivery", "cycle", "bus")
 _NOT_RUN: Final = ("BP203", "BP204")
 
 
@@ -39,25 +40,27 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
     try:
         steps = path_steps(subject.profile)
         if steps > most_steps:
-            key = _key_of("radius_mm", subject.profile)
+            key = _key_of("radius_mm", profile=subject.profile)
             yield "BP204", RuleProblem(key, f"the circle takes {steps:,} steps, more than {most_steps:,}: not run")
             return
         result = circle_test(subject.profile).results[0]
     except ParameterError as error:
         for refused in error.refused:
-            name = refused.name.rpartition(".")[2]
-            key = _key_of(name, subject.profile)
+            key = _key_of(refused.name, *refused.beside, profile=subject.profile)
             # A key that is the parameter says its name already.
-            message = f"{refused.value}: {refused.right}" if key.endswith(f".{name}") else refused.message
+            is_said = key.rpartition(".")[2] == refused.name.rpartition(".")[2]
+            message = f"{refused.value}: {refused.right}" if is_said else refused.message
             words, _, way_out = message.partition("; ")
             yield "BP203", RuleProblem(key, words, way_out)
         return
     except BusplanError as error:
-        yield from (("BP203", RuleProblem(_key_of("", subject.profile), words)) for words in error.problems)
+        yield from (("BP203", RuleProblem(_key_of(profile=subject.profile), words)) for words in error.problems)
         return
+    # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
+    failures = [one for one in result.failures if not one.is_of_bus]
     first = to_attack(result)
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
-    for failure in result.failures:
+    for failure in failures:
         stability = failure.name in STABILITY
         # A finding needs a key in the file: a default limit has none.
         said = failure.name in subject.profile.tolerance.model_fields_set
@@ -69,11 +72,12 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
         yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
 
 
-def _key_of(name: str, profile: Profile) -> str:
-    """Key of a servo parameter in the file, or the nearest section."""
-    for section in _NAMED:
-        if name in getattr(profile, section).model_fields_set:
-            return f"{section}.{name}"
+def _key_of(*names: str, profile: Profile) -> str:
+    """Key of the first of some parameters that the profile says, or the nearest section."""
+    for name, section in product(names, _NAMED):
+        last = name.removeprefix(f"{section}.")
+        if last in getattr(profile, section).model_fields_set:
+            return f"{section}.{last}"
     return "servo" if "servo" in profile.model_fields_set else "circle"
 
 

@@ -214,7 +214,7 @@ def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> in
     steps = cycles * timing.steps_per_period
     if steps > MAX_STEPS:
         right = f"the move takes {steps} steps, more than {MAX_STEPS}; choose a longer step or a shorter move"
-        refuse(Refused("step_us", timing.step_us, right))
+        refuse(Refused("step_us", timing.step_us, right, ("feed_mm_per_min", "radius_mm")))
     travel_mm = float(np.abs(setpoints_mm).max()) + axis.max_velocity_mm_s * cycles * timing.period_us / _US_PER_S
     if travel_mm > _LARGEST_COUNT * axis.encoder_resolution_mm > 0:
         right = (

@@ -31,6 +31,8 @@ class Refused(NamedTuple):
     """Value as the message shows it."""
     right: str
     """What would be right."""
+    beside: tuple[str, ...] = ()
+    """Other parameters that it is refused for, which may be the ones that a user gave."""
 
     @property
     def message(self) -> str:
@@ -229,11 +231,11 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
     steps = period_us / step_us
     if round(steps) == 0 or steps < 1 - _MULTIPLE_TOLERANCE:
         right = f"longer than the period of {period_us:g} us; the period is the longest step that fits"
-        yield Refused("step_us", step_us, right)
+        yield Refused("step_us", step_us, right, ("period_us",))
     elif abs(steps - round(steps)) > _MULTIPLE_TOLERANCE * steps:
         fits_us = dividing_step_us(period_us, most_us=step_us)
         right = f"the period of {period_us:g} us is no multiple of it; {fits_us:.15g} us would fit"
-        yield Refused("step_us", step_us, right)
+        yield Refused("step_us", step_us, right, ("period_us",))
 
 
 def dividing_step_us(period_us: float, *, most_us: float) -> float:

@@ -276,6 +276,7 @@ def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refuse
             axis.drive_offset_mm_s,
             f"axis {name} commands at most {highest_mm_s:g} mm/s with "
             f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the offset must stay below it",
+            ("max_velocity_mm_s",),
         )
     elif path.feed_mm_s >= highest_mm_s - offset_mm_s:
         yield Refused(
@@ -283,4 +284,5 @@ def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refuse
             path.feed_mm_per_min,
             f"axis {name} reaches {(highest_mm_s - offset_mm_s) * 60:g} mm/min with "
             f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the feed must stay below it",
+            ("max_velocity_mm_s", "drive_offset_mm_s"),
         )

@@ -110,7 +110,7 @@ def check_delivery(delivery: Delivery, *, period_us: float) -> None:
     if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
         both = f"{delivery.jitter_us} and skew_us = {delivery.skew_us}"
         right = f"together they must not exceed half the period, {period_us / 2:g} us"
-        refuse(Refused("jitter_us", both, right))
+        refuse(Refused("jitter_us", both, right, ("skew_us", "period_us")))
 
 
 def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:

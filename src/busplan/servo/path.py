@@ -177,7 +177,7 @@ def circle_path(
             f"the circle takes {setpoints:.3g} periods of {period_us:g} us, more than {MAX_SETPOINTS}; "
             f"choose a faster feed, a smaller radius or a longer period"
         )
-        refuse(Refused("feed_mm_per_min", feed_mm_per_min, right))
+        refuse(Refused("feed_mm_per_min", feed_mm_per_min, right, ("radius_mm", "period_us")))
     time_s = np.arange(setpoints + 1, dtype=np.float64) * period_s
     way_mm = _trapezoid(time_s, feed_mm_s=feed_mm_s, ramp_s=move.ramp_s, length_mm=move.length_mm)
     angle = (move.start_mm + way_mm) / radius_mm
@@ -261,4 +261,5 @@ def _too_short(radius_mm: float, *, feed_mm_per_min: float, ramp_s: float) -> Re
         feed_mm_per_min,
         f"never reached on a circle of radius_mm = {radius_mm} with ramps of {ramp_s:g} s; "
         f"choose at most {reachable:.6g} mm/min, at least {smallest_mm:.6g} mm, or shorter ramps",
+        ("radius_mm", "ramp_periods", "period_us"),
     )

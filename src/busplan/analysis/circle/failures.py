@@ -112,6 +112,9 @@ _FAILURES: Final[dict[str, _Saying]] = {
 }
 
 
+_OF_TIME: Final = ("required_us", "safe_required_us")
+
+
 class Failure(NamedTuple):
     """One failure of the test: a tolerance by its key, a limit of the bus, or stability."""
 
@@ -124,6 +127,11 @@ class Failure(NamedTuple):
     """Whether the limit is the default of its key: the profile does not say it."""
     more: str = ""
     """What the message goes on to say."""
+
+    @property
+    def is_of_bus(self) -> bool:
+        """Whether the bus is what fails, and not the circle."""
+        return bool(self.said) or self.name in _OF_TIME
 
     def document(self) -> dict[str, Any]:
         """Return it as in the JSON document; a value that does not exist is null, and the text says why."""

@@ -1,5 +1,6 @@
 """Make the input of a circle simulation from a profile: path, axes, timing, delivery and mechanics."""
 
+from dataclasses import replace
 from math import inf
 from typing import Any, Final
 
@@ -7,7 +8,6 @@ from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
 from busplan.analysis.circle.delays import loop_delays_us, skew_us
 from busplan.analysis.network import bus_of
-from busplan.profile.write import value_text
 from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
@@ -38,6 +38,7 @@ def setup(profile: Profile) -> Setup:
     circle, delivery, mechanics = profile.circle, profile.delivery, profile.mechanics
     (x, y), timing = loop_axes(profile), loop_timing(profile)
     settling_us = path_settling_us(profile)
+    delivered = Delivery(**_parameters_in(delivery, Delivery))
     one = Setup(
         path=circle_path(
             circle.radius_mm,
@@ -50,27 +51,36 @@ def setup(profile: Profile) -> Setup:
         x=x,
         y=y,
         timing=timing,
-        delivery=Delivery(**_parameters_in(delivery, Delivery) | {"skew_us": delivery.skew_us + skew_us(profile)}),
+        delivery=_without_clock(delivered, profile),
         mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
         settled=settling_us != inf,
     )
-    _require_order(profile, one.delivery)
     check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
     return one
 
 
-def _require_order(profile: Profile, delivery: Delivery) -> None:
-    """Refuse axes that the bus itself takes too far apart, at the key of the clock that they lack."""
-    own_us, period_us = skew_us(profile), profile.cycle.period_us
+def _without_clock(delivery: Delivery, profile: Profile) -> Delivery:
+    """The delivery with what axes without a common clock take their set-points apart.
+
+    Raises
+    ------
+    BusplanError
+        That is too long for the period, and what the profile delivers is not.
+    """
+    apart_us, period_us = skew_us(profile), profile.cycle.period_us
+    if not apart_us:
+        return delivery
+    check_delivery(delivery, period_us=period_us)
+    found = replace(delivery, skew_us=delivery.skew_us + apart_us)
     try:
-        check_delivery(delivery, period_us=period_us)
+        check_delivery(found, period_us=period_us)
     except ParameterError:
-        if not own_us:
-            raise
-        key = bus_of(profile).clock_key
-        why = f"without a common clock the bus takes set-points to the axes {own_us:g} us apart, and with delivery it"
-        right = f"{why} must be no more than half the period, {period_us / 2:g} us"
-        raise ParameterError(Refused(key, value_text(value_at(profile, key)), right)) from None
+        right = (
+            f"the last axis then takes its set-points {apart_us:g} us behind the first, which the circle test knows up "
+            f"to half the period, {period_us / 2:g} us, with jitter and skew; set it true if the drives have a clock"
+        )
+        raise ParameterError(Refused(bus_of(profile).clock_key, "false", right)) from None
+    return found
 
 
 def loop_timing(profile: Profile) -> LoopTiming:

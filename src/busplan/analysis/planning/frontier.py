@@ -1,6 +1,6 @@
 """What a network could reach with all that is cheap free: the shortest period, the largest payload, the most nodes."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from math import inf
 
@@ -62,14 +62,16 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
     if with_payload(goal, largest) is None:
         return Impossible(title, "each group has its own" if goal.group else "the payload follows the axes of a node")
     execution = goal.alike_nodes[0].node.execution
-    sizes = [size for size in range(step, largest + 1, step) if execution.covers(size)]
+    sizes = range(step, largest + 1, step)
+    least, most = execution.covered_bytes
+    sizes = sizes[bisect_left(sizes, least) : bisect_right(sizes, most)]
 
     def is_out(size: int) -> bool:
         one = with_payload(goal, size) or {}
         return not (search.allows(one) and search.reaches(one, cheap))
 
     first = bisect_left(sizes, execution.ascends_from_bytes)
-    del sizes[bisect_left(sizes, True, lo=first, key=is_out) + 1 :]
+    sizes = sizes[: bisect_left(sizes, True, lo=first, key=is_out) + 1]
     place, failed = len(sizes) - 1, 0
     while place >= 0:
         size = sizes[place]

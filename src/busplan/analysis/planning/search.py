@@ -1,6 +1,7 @@
 """The search: the least change of the dearest freedom with all cheaper ones free, then of the next dearest."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import lru_cache
 from itertools import count
 from math import inf
 from typing import Final
@@ -20,6 +21,10 @@ FindCircleFailures = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 MAX_CIRCLES: Final = 50
 """Periods tested in a row for the nearest one that passes the circle. Chosen: takes some seconds."""
+
+
+_MOST_PROFILES: Final = 256
+"""Profiles that a search keeps: each has a hundred kilobytes."""
 
 
 class Search:
@@ -53,7 +58,7 @@ class Search:
         self.max_circles = max_circles
         self.proven = True
         """Whether no smaller change than the last one exists; False if the search for a period was cut short."""
-        self._profiles: dict[frozenset[tuple[str, Value]], Profile] = {}
+        self._profile = lru_cache(maxsize=_MOST_PROFILES)(lambda key: override(profile, dict(key)))
         self._needs: dict[frozenset[tuple[str, Value]], list[Need]] = {}
 
     def least(self, levels: Sequence[Freedom], changes: Changes | None = None) -> Changes | None:
@@ -113,10 +118,7 @@ class Search:
         BusplanError
             The profile's schema refuses them.
         """
-        key = frozenset(changes.items())
-        if key not in self._profiles:
-            self._profiles[key] = override(self._own, dict(changes))
-        return self._profiles[key]
+        return self._profile(frozenset(changes.items()))
 
     def allows(self, changes: Changes) -> bool:
         """Whether the profile's schema takes some changes."""

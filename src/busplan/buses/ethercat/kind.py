@@ -54,6 +54,7 @@ class Ethercat(Bus):
     planned_figures = ("frames",)
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    clock_key = "bus.distributed_clocks"
     starter = Starter(
         """\
 [bus]
@@ -103,7 +104,6 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         "node.delay_us": "t_d",
         "node.execution.worst_extra_us": "T_extra",
     }
-    clock_key = "bus.distributed_clocks"
     loop_key = "bus.pipeline_cycles"
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second segment"}
     term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
