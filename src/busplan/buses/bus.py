@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure
-from busplan.buses.network import Network
+from busplan.buses.network import Group, Network
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
 from busplan.elementwise import Number, plain
@@ -77,7 +77,7 @@ class Bus(ABC):
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
     command_events: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Transaction and kind of the events after which a node has its command, the last of them; without them the whole
+    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
     cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """What several events make together."""
@@ -189,8 +189,22 @@ class Bus(ABC):
                 found |= dict.fromkeys(owners, now_us)
         return found or dict.fromkeys(range(1, nodes + 1), now_us)
 
+    def taking_us(self, group: Group, network: Network) -> float:  # noqa: ARG002 - most take commands alike
+        """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""
+        return plain(group.write_execution_us + group.worst_extra_us)
+
+    def sampled_us(self, cycle: BusCycle) -> float:  # noqa: ARG002 - most sample when the cycle starts
+        """When nodes sample what a loop on the host rests on, from the start of the cycle that carries it [us].
+
+        Parameters
+        ----------
+        cycle
+            A cycle of plain numbers.
+        """
+        return 0.0
+
     def loop_periods(self, network: Network, *, at_sync: bool) -> int:  # noqa: ARG002 - most read and write in a cycle
-        """Whole periods inside a loop on the host, from a sample to its command [1].
+        """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
 
         Parameters
         ----------

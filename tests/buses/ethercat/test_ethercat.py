@@ -182,8 +182,9 @@ def test_set_points_reach_the_drives_at_one_time_with_clocks_and_one_after_the_o
     arrival = override(profile(**many), {"servo.loop": "host", "servo.update": "on_arrival"})
     first, last = loop_delays_us(arrival)
     assert last - first == pytest.approx((52 + 600) * BYTE_US + 2 * 0.15)
-    # Feedback waits for the next frame, the master has one cycle, and the command comes with the first frame.
-    assert first == pytest.approx(1000 + 20 + (52 + 1200) * BYTE_US + 0.15)
+    # Feedback waits for the next frame, the master has one cycle, and the command comes with the first frame and is
+    # executed.
+    assert first == pytest.approx(1000 + 20 + (52 + 1200) * BYTE_US + 0.15 + 40)
 
 
 def test_a_circle_with_more_than_a_period_in_its_loop_is_not_simulated(run: Run, tmp_path: Path) -> None:
