@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
-from busplan.analysis.capacity.cycle import broken_limits
 from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.check import CircleCheck
@@ -78,7 +77,7 @@ def test_there_is_always_a_way_where_no_limit_of_the_standard_is_broken(
 ) -> None:
     # The period may grow; only a broken limit is beyond time.
     profile = within_limits(data.draw(any_profile))
-    assert broken_limits(profile) == ()
+    assert bus_of(profile).broken(network_of(profile)) == ()
     wrong = data.draw(st.sampled_from(["optimal", 0, 63]))
     verdict = verdicts(capacity(override(profile, {"bus.gap_count": wrong})))[0]
     assert verdict.all_well or verdict.change is not None

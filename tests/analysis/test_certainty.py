@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VERDICTS
 from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.capacity.node_limit import most_nodes
 from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.table_1 import TABLE_1, residual
+from busplan.buses.parts import Limit
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -260,3 +262,21 @@ def test_a_reserve_is_a_share_of_the_slice(make: Maker) -> None:
 def test_a_broken_limit_does_not_fit_whatever_the_time(make: Maker) -> None:
     one = of(make(bus__nodes=17, cycle__period_us=1e6))
     assert (one.verdict, one.exceeded) == (DOES_NOT_FIT, ("hops",))
+
+
+@pytest.mark.parametrize(("most", "code", "shown"), [(9.0, 2, 3), (11.0, 1, 3), (14.0, 1, 4), (16.0, 0, 5)])
+def test_a_limit_with_a_doubt_has_three_verdicts(make: Maker, most: float, code: int, shown: int) -> None:
+    # Each node adds 2.5 +/- 0.5: five are 10 at least, and 15 at most.
+    limit = Limit(
+        "load",
+        "{value:g} +/- {uncertainty:g} of {most:g}",
+        lambda network: 2.5 * network.nodes,
+        lambda _network: most,
+        doubt=lambda network: 0.25 * network.nodes,
+    )
+    network = network_of(make(bus__nodes=5)).asking("")
+    assert limit.verdict_code(network) == code
+    assert limit.is_broken(network) == (code == 2)
+    assert limit.words(network) == f"12.5 +/- 2.5 of {most:g}"
+    assert most_nodes(network, [limit]).nodes == most // 2
+    assert most_nodes(network, [limit.shown]).nodes == shown

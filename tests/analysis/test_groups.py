@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import broken_limits, cycle_of, fits_in
+from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import COUNTS, figures
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.derivation.capacity import capacity_figures
@@ -193,7 +193,7 @@ def axes_of(profile: Profile, name: str) -> int:
 def _fits(profile: Profile) -> bool:
     cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
     given_us = plain(cycle.network.period_us) * plain(cycle.network.slice_ratio)
-    return not broken_limits(profile) and bool(fits_in(cycle.required_us, available_us=given_us))
+    return not bus_of(profile).broken(network_of(profile)) and bool(fits_in(cycle.required_us, available_us=given_us))
 
 
 def _is_shown(profile: Profile) -> bool:
@@ -201,7 +201,7 @@ def _is_shown(profile: Profile) -> bool:
     given_us = plain(cycle.network.period_us) * plain(cycle.network.slice_ratio)
     needed_us = certainty(cycle).safe_required_us
     safe = bus_of(profile).is_safe(cycle.network)
-    return safe and not broken_limits(profile) and bool(fits_in(needed_us, available_us=given_us))
+    return safe and not bus_of(profile).broken(network_of(profile)) and bool(fits_in(needed_us, available_us=given_us))
 
 
 @SOME

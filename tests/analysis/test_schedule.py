@@ -10,9 +10,8 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity.cycle import broken_limits
 from busplan.analysis.capacity.figures import figures
-from busplan.analysis.network import model_names, network_of
+from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.timeline.schedule import MOST_NODES, schedule, totals, zoom
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.timing import TIMING_MODELS
@@ -32,7 +31,8 @@ def test_the_last_event_ends_at_the_closed_forms_required_time(
     data: st.DataObject, any_profile: st.SearchStrategy[Profile], exact: Exact
 ) -> None:
     profile = data.draw(any_profile)
-    assume("cycle starts" not in broken_limits(profile))  # then their number has no end but a round one
+    # A broken limit of cycle starts: their number has no end but a round one.
+    assume("cycle starts" not in [one.key for one in bus_of(profile).broken(network_of(profile))])
     for model in model_names(profile):
         plan = schedule(profile, model=model)
         assert plan.figures == figures(profile, model=model)

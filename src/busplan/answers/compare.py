@@ -4,8 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
-from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
-from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind, fitting
 from busplan.analysis.network import bus_of
 from busplan.answers.compare_document import compare_document, compare_records
@@ -177,9 +176,9 @@ def _verdict(one: MachineOnKind) -> Words:
 
 def _binds(one: MachineOnKind) -> str:
     """The limits that are broken; without one the largest term."""
-    broken = [key for key in one.figures.exceeded if key != TIME]
-    if broken:
-        return ", ".join(broken)
+    behind = limits_behind(one.figures)
+    if behind:
+        return ", ".join(behind)
     largest = max(one.figures.terms, key=lambda term: plain(term.us))
     return by_key(bus_of(one.profile).term_figures)[largest.key].label
 

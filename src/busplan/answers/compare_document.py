@@ -10,7 +10,7 @@ from busplan.elementwise import plain
 from busplan.forms.blocks import JsonDocument, Record
 
 _FIGURES = (
-    *("timing_model", "verdict", "safe", "exceeded", "available_us", "required_us", "bias_us"),
+    *("timing_model", "verdict", "safe", "exceeded", "not_shown", "available_us", "required_us", "bias_us"),
     *("margin_corrected_us", "uncertainty_us", "binding_term"),
 )
 _SAFE = ("safe_nodes", "safe_axes", "safe_limited_by")

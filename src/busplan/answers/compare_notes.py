@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.capacity.certainty import limits_behind
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.verdict import evidence_sentence, reset_sentence
@@ -47,7 +47,7 @@ def _left_out(found: KindComparison) -> Iterator[Sentence]:
 def _obstacles(one: MachineOnKind) -> Iterator[Sentence]:
     """The limits that are broken, and why no period is shown to fit."""
     bus, network = bus_of(one.profile), network_of(one.profile)
-    broken = [limit.words(network) for key in one.figures.exceeded if key != TIME and (limit := bus.limit(key))]
+    broken = [limit.words(network) for limit in map(bus.limit, limits_behind(one.figures)) if limit]
     if broken:
         yield Sentence((f"At {period(one.figures.period_us)} {'; '.join(broken)}.",))
     if one.smallest.us is None:

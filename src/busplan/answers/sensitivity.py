@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from busplan.analysis.capacity.certainty import FITS
-from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.capacity.certainty import FITS, limits_behind
 from busplan.analysis.capacity.figures import Capacity
 from busplan.analysis.capacity.sensitivity import Effect, Sensitivity, Standing
 from busplan.analysis.capacity.verdict import Verdict
@@ -137,7 +136,7 @@ def _verdict(then: Standing | None, profile: Profile, *, at: str) -> Cell:
     shown = figure_value(VERDICT, None if then is None else then.verdict, at=at)
     if then is None:
         return shown
-    why = [key for key in then.exceeded if key != TIME]
+    why = list(limits_behind(then))
     if not why and then.verdict == FITS and not then.safe:
         why = [f"unsafe {bus_of(profile).safety}"]
     return Sentence((shown, *(f", {one}" for one in why)), "neutral" if _is_well(then) else "fails")
@@ -215,6 +214,7 @@ def _record(one: Effect, profile: Profile) -> Record:
         "uncertainty_us": None if then is None else then.uncertainty_us,
         "verdict": None if then is None else then.verdict,
         "exceeded": None if then is None else list(then.exceeded),
+        "not_shown": None if then is None else list(then.not_shown),
         **own,
         "note": one.note or None,
     }

@@ -169,6 +169,7 @@ def _facts(plan: Schedule) -> JsonDocument:
         available_us=figures.available_us,
         margin_us=figures.margin_us,
         exceeded=list(figures.exceeded),
+        not_shown=None if figures.not_shown is None else list(figures.not_shown),
         fits=figures.fits,
         verdict=figures.verdict,
         **safety_record(figures, plan.profile),

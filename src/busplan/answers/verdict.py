@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
@@ -160,7 +160,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     why = f", {'; '.join(limits)}" if limits else ""
     state = state_of(figures.verdict == FITS and figures.safe)
     said = sentence(f"{{}}{{}}{why}.", _figure(VERDICT, figures, at=at)._replace(state=state), Words(safe, state))
-    if limits:
+    if limits and figures.verdict == DOES_NOT_FIT:
         return said  # whatever the time is
     found = [said, _margin(figures, at=at)]
     largest = next(iter(uncertainty_parts(figures)), None)
@@ -207,8 +207,8 @@ def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:
 
 
 def _broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
-    """Say by how much each limit of the bus is broken."""
-    broken = (bus_of(profile).limit(key) for key in figures.exceeded if key != TIME)
+    """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
+    broken = map(bus_of(profile).limit, limits_behind(figures))
     network = network_of(profile)._replace(period_us=figures.period_us)
     return [limit.words(network) for limit in broken if limit is not None]
 

@@ -275,9 +275,16 @@ VERDICT: Final = Figure(
     sort="word",
     better="more",
 )
+NOT_SHOWN: Final = Figure(
+    "not_shown",
+    "not shown",
+    _CERTAINTY,
+    "limits that are neither broken nor shown to be kept, time among them",
+    sort="words",
+)
 CERTAINTY: Final = (
     *(BIAS, MARGIN_CORRECTED, UNCERTAINTY, SAFE_REQUIRED, SAFE_NODES, SAFE_AXES),
-    *(SAFE_LIMITED_BY, SAFE_MIN_PERIOD, VERDICT),
+    *(SAFE_LIMITED_BY, SAFE_MIN_PERIOD, NOT_SHOWN, VERDICT),
 )
 """Figures of the timing model that decides; under another they do not exist."""
 VERDICT_FIGURES: Final = (

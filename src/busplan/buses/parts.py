@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, Ink
 from busplan.buses.network import Network
-from busplan.elementwise import Number
+from busplan.elementwise import Number, choose, larger
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -35,14 +35,23 @@ IDLE: Final = EventKind("idle", "idle", MARGIN.reference, "~", "idle")
 """What is left of the slice."""
 
 
+COVERAGE: Final = 2
+"""Expanded by it, a standard uncertainty covers at least 95 %, on one side (JCGM 100, 6.2)."""
+KEPT, NOT_SHOWN_KEPT, BROKEN = range(3)
+"""Verdicts on a limit, the better first."""
+
+
 class Limit(NamedTuple):
-    """What must not be exceeded. Its value never falls with the number of nodes."""
+    """What must not be exceeded. Neither its value nor the ends of its doubt fall with the number of nodes."""
 
     key: str
     over: str
-    """What is said of a broken one, a format of `value`, `most` and the profile's `bus`."""
+    """What is said of one that is broken or not shown to be kept: a format of `value`, its `uncertainty`, `most` and
+    the profile's `bus`."""
     value: Callable[[Network], Number]
     most: Callable[[Network], Number]
+    doubt: Callable[[Network], Number] | None = None
+    """Standard uncertainty of the value, less that of the most; without it both are exact."""
     way_out: str = ""
     """What makes room where this limit keeps nodes out."""
     failure: str = ""
@@ -57,18 +66,41 @@ class Limit(NamedTuple):
     is_of_period: bool = False
     """The period alone breaks it: a plan takes no period that does."""
     slice_us: Callable[[Network], float] | None = None
-    """The slice from which on plain numbers keep it, the slice ratio as it is, where a longer period is a cure [us];
-    without it no period is."""
+    """The slice from which on plain numbers are shown to keep it, the slice ratio as it is, where a longer period is a
+    cure [us]; without it no period is."""
+
+    def uncertainty(self, network: Network) -> Number:
+        """Expanded uncertainty U of its value, two standard uncertainties; 0 where it is exact."""
+        return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
+
+    def least_value(self, network: Network) -> Number:
+        """What its value is at least, value - U."""
+        return self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
+
+    @property
+    def shown(self) -> "Limit":
+        """The limit that what is shown to keep this one keeps: of value + U."""
+        if self.doubt is None:
+            return self
+        return self._replace(value=lambda network: self.value(network) + self.uncertainty(network), doubt=None)
 
     def is_broken(self, network: Network) -> Number:
-        """Whether a network breaks it: a truth, or an array of them."""
-        return self.value(network) > self.most(network)
+        """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
+        return self.least_value(network) > self.most(network)
+
+    def verdict_code(self, network: Network) -> Number:
+        """Tell whether it is `KEPT`, `NOT_SHOWN_KEPT` or `BROKEN`."""
+        surely = choose(self.is_broken(network), BROKEN, KEPT)
+        if self.doubt is None:
+            return surely
+        return larger(surely, choose(self.shown.is_broken(network), NOT_SHOWN_KEPT, KEPT))
 
     def words(self, network: Network) -> str:
         """Say by how much a network breaks it."""
         if self.says is not None:
             return self.says(network)
-        return self.over.format(value=self.value(network), most=self.most(network), bus=network.profile.bus)
+        value, most = self.value(network), self.most(network)
+        return self.over.format(value=value, uncertainty=self.uncertainty(network), most=most, bus=network.profile.bus)
 
 
 class Starter(NamedTuple):

@@ -39,6 +39,10 @@ class RuleFigures(Protocol):
         """Keys of the limits that are broken."""
 
     @property
+    def not_shown(self) -> tuple[str, ...] | None:
+        """Keys of the limits that are neither broken nor shown to be kept; of the model that decides."""
+
+    @property
     def required_us(self) -> float:
         """What the cycle needs [us]."""
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
@@ -24,8 +24,14 @@ def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The cycle may fit, but what is known of it does not show so."""
-    one, reserve = subject.deciding, subject.profile.limits.reserve
-    if one.verdict == NOT_SHOWN:
+    one, reserve, bus = subject.deciding, subject.profile.limits.reserve, bus_of(subject.profile)
+    if one.verdict != NOT_SHOWN:
+        return
+    for limit in map(bus.limit, limits_behind(one)):
+        if limit is not None and not limit.has_rule:
+            words = limit.words(network_of(subject.profile))
+            yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", limit.way_out)
+    if TIME in (one.not_shown or ()):
         asked = f"{margin(one)}, limits.reserve asks for {reserve * one.available_us:.1f} us"
         words = asked if reserve else overrun(one)
         yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", *subject.cure())

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity.cycle import broken_limits, cycle_of
+from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.latency import latency
@@ -207,7 +207,8 @@ def test_no_simulated_cycle_takes_longer_than_the_closed_form(drawn: tuple[Profi
     ],
 )
 def test_its_limits_are_its_own(changes: dict[str, object], limits: tuple[str, ...]) -> None:
-    assert broken_limits(override(DVRK, changes)) == limits
+    changed = override(DVRK, changes)
+    assert tuple(one.key for one in bus_of(changed).broken(network_of(changed))) == limits
 
 
 def test_a_broken_limit_is_said_by_verdict_and_gate(tmp_path: Path, run: Callable[..., Any]) -> None:

@@ -5,23 +5,23 @@ References
 JCGM 100 (GUM): the combined standard uncertainty of independent inputs (5.1), and its expansion (6.2).
 """
 
-from typing import Final, Literal, NamedTuple
+from collections.abc import Mapping
+from functools import reduce
+from typing import Final, Literal, NamedTuple, Protocol
 
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, available_us, fits_in, time_limit
+from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME, available_us, fits_in, time_limit
 from busplan.analysis.network import bus_of
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
-from busplan.buses.parts import Limit
-from busplan.elementwise import Number, choose, named, square_root, total
+from busplan.buses.parts import BROKEN, COVERAGE, KEPT, NOT_SHOWN_KEPT, Limit
+from busplan.elementwise import Number, choose, larger, named, square_root, total
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"
 NOT_SHOWN: Final[VerdictWord] = "not shown to fit"
 DOES_NOT_FIT: Final[VerdictWord] = "does not fit"
 VERDICTS: Final = (FITS, NOT_SHOWN, DOES_NOT_FIT)
-COVERAGE: Final = 2
-"""Expanded by it, a standard uncertainty covers at least 95 %, on one side."""
 
 
 class Certainty(NamedTuple):
@@ -67,8 +67,13 @@ def certainty(cycle: BusCycle) -> Certainty:
     )
 
 
-def verdict_code(found: Certainty, network: Network, *, is_broken: Number) -> Number:
-    """The place of the verdict among `VERDICTS`.
+def limit_codes(network: Network) -> dict[str, Number]:
+    """The place among `VERDICTS` of each limit of the bus by key, those of safety left out."""
+    return {one.key: one.verdict_code(network) for one in bus_of(network.profile).limits if not one.is_safety}
+
+
+def time_code(found: Certainty, network: Network) -> Number:
+    """The place among `VERDICTS` of the limit of time.
 
     Parameters
     ----------
@@ -76,19 +81,43 @@ def verdict_code(found: Certainty, network: Network, *, is_broken: Number) -> Nu
         The certainty of the network's cycle.
     network
         The network.
-    is_broken
-        Whether it breaks a limit of its bus.
     """
     given_us = available_us(network)
     is_shown = fits_in(found.safe_required_us, available_us=given_us)
     best_us: Number = found.margin_corrected_us + found.uncertainty_us
     least_us: Number = -FIT_ROUNDING * given_us
-    is_out = best_us < least_us
-    return choose(is_broken, 2, choose(is_shown, 0, choose(is_out, 2, 1)))
+    return choose(is_shown, KEPT, choose(best_us < least_us, BROKEN, NOT_SHOWN_KEPT))
+
+
+def verdict_code(codes: Mapping[str, Number]) -> Number:
+    """The place of the verdict among `VERDICTS`: that of the worst limit, time among them."""
+    return reduce(larger, codes.values())
+
+
+class Judged(Protocol):
+    """A verdict with the limits behind it."""
+
+    @property
+    def verdict(self) -> str | None:
+        """The verdict; None under a timing model that does not decide."""
+
+    @property
+    def exceeded(self) -> tuple[str, ...]:
+        """Keys of the limits that are broken."""
+
+    @property
+    def not_shown(self) -> tuple[str, ...] | None:
+        """Keys of the limits that may be kept; None as the verdict."""
+
+
+def limits_behind(one: Judged) -> tuple[str, ...]:
+    """Keys of the limits of the bus that a verdict rests on, without time: the broken ones, or those not shown."""
+    keys = (one.not_shown or ()) if one.verdict == NOT_SHOWN else one.exceeded
+    return tuple(key for key in keys if key != TIME)
 
 
 def limits_to_be_safe(network: Network) -> tuple[Limit, ...]:
     """Every limit that a network must keep to be shown to fit on a bus that is set safely; time is the last."""
     bus = bus_of(network.profile)
     time = time_limit(lambda one: certainty(bus.cycle(one, model=bus.deciding_model)).safe_required_us)
-    return (*bus.limits, time)
+    return (*(limit.shown for limit in bus.limits), time)

@@ -67,8 +67,3 @@ def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
         lambda one: available_us(one) * (1 + FIT_ROUNDING),
         failure="required_us",
     )
-
-
-def broken_limits(profile: Profile) -> tuple[str, ...]:
-    """Tell which of the bus's own limits a profile breaks, whatever the time."""
-    return tuple(limit.key for limit in bus_of(profile).broken(network_of(profile)))

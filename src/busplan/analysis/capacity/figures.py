@@ -1,12 +1,20 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import chain
 from math import isinf
 from typing import Any, Final, NamedTuple
 
-from busplan.analysis.capacity.certainty import VERDICTS, Certainty, VerdictWord, certainty, verdict_code
-from busplan.analysis.capacity.cycle import TIME, available_us, broken_limits, fits_in
+from busplan.analysis.capacity.certainty import (
+    VERDICTS,
+    Certainty,
+    VerdictWord,
+    certainty,
+    limit_codes,
+    time_code,
+    verdict_code,
+)
+from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
@@ -14,6 +22,7 @@ from busplan.buses import kind_named
 from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.figure import CERTAINTY
 from busplan.buses.network import Network
+from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, plain
 from busplan.profile.toml import at_periods
@@ -80,6 +89,8 @@ class CapacityFigures(NamedTuple):
     safe_axes: int | None
     safe_limited_by: str | None
     safe_min_period_us: float | None
+    not_shown: tuple[str, ...] | None
+    """Keys of the limits that are neither broken nor shown to be kept, time among them."""
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
     """What the uncertainty is made of."""
@@ -102,7 +113,8 @@ class CapacityFigures(NamedTuple):
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the document by key, in its order."""
-        return {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).capacity_figures}
+        found = {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).capacity_figures}
+        return {key: list(one) if isinstance(one, tuple) else one for key, one in found.items()}
 
 
 class Capacity(NamedTuple):
@@ -174,7 +186,8 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
     numbers: dict[str, Any] = {key: _existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
-    broken = broken_limits(profile)
+    codes = limit_codes(network)
+    broken = tuple(key for key, code in codes.items() if code == BROKEN)
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
     groups = tuple(_group_capacity(profile, name, model=model) for name in network.names) if with_counts else ()
@@ -189,7 +202,7 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
         **counts,
         exceeded=exceeded,
         fits=not exceeded,
-        **(_certainty_figures(cycle, is_broken=bool(broken)) if decides else _UNDECIDED),
+        **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
         groups=() if whole else groups,
         safe=bus.is_safe(network),
         own=own,
@@ -223,12 +236,14 @@ def _group_capacity(profile: Profile, name: str, *, model: str) -> GroupCapacity
     )
 
 
-def _certainty_figures(cycle: BusCycle, *, is_broken: bool) -> dict[str, Any]:
+def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Any]:
     """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
     found = certainty(cycle)
+    codes = {**limits, TIME: time_code(found, cycle.network)}
     return {
         **{key: None if one is None else _existing(one) for key, one in certainty_numbers(found, cycle).items()},
-        "verdict": VERDICTS[int(verdict_code(found, cycle.network, is_broken=is_broken))],
+        "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
+        "verdict": VERDICTS[int(verdict_code(codes))],
         "doubts": found.doubts,
     }
 

@@ -108,7 +108,7 @@ def _in_closed_form(limit: Limit, network: Network) -> Number | None:
     """The most nodes within one limit, infinite where they play no part; None where there is no closed form."""
     try:
         at = network.with_nodes(NODES)
-        value, most = limit.value(at), limit.most(at)
+        value, most = limit.least_value(at), limit.most(at)
         if isinstance(most, Polynomial):
             return None
         if isinstance(value, Polynomial):
@@ -139,7 +139,7 @@ def _searched(limit: Limit, network: Network, ceiling: int) -> Number:
     whole = _size(limit.is_broken(alone))
     if whole == 1:
         return _by_halves(limit, network, ceiling)
-    counted = ceiling * (_size(limit.value(alone)) * _VALUE_COST + whole)
+    counted = ceiling * (_size(limit.least_value(alone)) * _VALUE_COST + whole)
     if counted > ceiling.bit_length() * whole * _VALUE_COST:
         return _by_halves(limit, network, ceiling)
     # Once broken, a limit stays broken.

@@ -3,12 +3,13 @@
 from typing import Any, NamedTuple
 
 from busplan.analysis.capacity.bottleneck import NextBottleneck, next_bottleneck
-from busplan.analysis.capacity.certainty import VERDICTS, VerdictWord, certainty, verdict_code
+from busplan.analysis.capacity.certainty import VERDICTS, VerdictWord, certainty, limit_codes, time_code, verdict_code
 from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
 from busplan.analysis.capacity.figures import Capacity
 from busplan.analysis.capacity.perturbations import Perturbed, perturbed
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.network import Network
+from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.elementwise import plain
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -24,6 +25,8 @@ class Standing(NamedTuple):
     """Whether the bus is set so that it works reliably."""
     exceeded: tuple[str, ...]
     """Keys of the limits that are broken."""
+    not_shown: tuple[str, ...]
+    """Keys of the limits that are neither broken nor shown to be kept, time among them."""
 
 
 class Effect(NamedTuple):
@@ -88,14 +91,17 @@ def standing(network: Network) -> Standing:
     """Compute where a network stands: what `capacity` says of a profile, of any network."""
     bus = bus_of(network.profile)
     cycle = bus.cycle(network, model=bus.deciding_model)
-    found, broken = certainty(cycle), tuple(limit.key for limit in bus.broken(network))
+    found, codes = certainty(cycle), limit_codes(network)
+    broken = tuple(key for key, code in codes.items() if code == BROKEN)
+    codes[TIME] = time_code(found, network)
     late = not fits_in(cycle.required_us, available_us=available_us(network))
     return Standing(
         margin_corrected_us=plain(found.margin_corrected_us),
         uncertainty_us=plain(found.uncertainty_us),
-        verdict=VERDICTS[int(verdict_code(found, network, is_broken=bool(broken)))],
+        verdict=VERDICTS[int(verdict_code(codes))],
         safe=bus.is_safe(network),
         exceeded=(*broken, *((TIME,) if late else ())),
+        not_shown=tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
     )
 
 

@@ -5,7 +5,7 @@ from math import inf
 from string import Formatter
 from typing import Any, Final, NamedTuple
 
-from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.capacity.certainty import FITS, limits_behind
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.network import bus_of, network_of
@@ -179,7 +179,8 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
         Its figures under the timing model that decides.
     """
     network = network_of(profile)
-    broken = [one for one in bus_of(profile).limits if one.key in capacity.exceeded]
+    behind = limits_behind(capacity)
+    broken = [one for one in bus_of(profile).limits if one.key in behind]
     late: tuple[Failure, ...] = ()
     if TIME in capacity.exceeded:
         late = (Failure("required_us", capacity.required_us, capacity.available_us),)

@@ -124,19 +124,27 @@ def _certainty(profile: Profile, cycle: BusCycle, plain: CapacityFigures) -> dic
     }
     if network.is_uniform:
         named |= _most_safe(network, plain)
+    limits = _limits(bus, network)
+    named["not_shown"] = Traced(
+        list(plain.not_shown or ()),
+        formula="which limits are neither broken nor shown to be kept, time among them",
+        numbers=", ".join(plain.not_shown or ()) or "none",
+        parts=(named["safe_required_us"], named["uncertainty_us"], *limits),
+    )
     named["verdict"] = Traced(
         plain.verdict,
-        formula="fits where T_safe <= alpha T_s, does not fit where margin_c + U < 0 or a limit is broken",
+        formula="fits where T_safe <= alpha T_s and every limit is shown to be kept, does not fit where margin_c + U < "
+        "0 or a limit is broken",
         numbers=(
             f"T_safe {short(value_of(named['safe_required_us']))}, alpha T_s {short(plain.available_us)}, margin_c + U "
             f"{short((plain.margin_corrected_us or 0) + (plain.uncertainty_us or 0))}, broken: "
-            f"{', '.join(plain.exceeded) or 'none'}"
+            f"{', '.join(plain.exceeded) or 'none'}, not shown: {', '.join(plain.not_shown or ()) or 'none'}"
         ),
         parts=(
             named["safe_required_us"],
             named["margin_corrected_us"],
             named["uncertainty_us"],
-            *_limits(bus, network),
+            *limits,
         ),
     )
     return named
@@ -165,10 +173,10 @@ def _limit_names(bus: Bus) -> str:
 
 
 def _limits(bus: Bus, network: Network, *, with_safety: bool = False) -> tuple[Number, ...]:
-    """Values and bounds of the limits of the bus."""
+    """Values, bounds and uncertainties of the limits of the bus."""
     limits = (limit for limit in bus.limits if with_safety or not limit.is_safety)
-    pairs = ((limit.value(network), limit.most(network)) for limit in limits)
-    return tuple(one for pair in pairs for one in pair)
+    each = ((limit.value(network), limit.most(network), limit.uncertainty(network)) for limit in limits)
+    return tuple(number for numbers in each for number in numbers)
 
 
 def _words(

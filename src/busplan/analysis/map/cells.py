@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple, get_args
 
-from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, VerdictWord
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VerdictWord
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.parts import Value
@@ -13,7 +13,7 @@ State = Literal["fits", "circle fails", "circle not judged", "not shown to fit",
 STATES: Final[tuple[State, ...]] = get_args(State)
 """In the order of reports."""
 CELL_FIGURES: Final = (
-    *("nodes", "axes", "verdict", "binding_term", "exceeded"),
+    *("nodes", "axes", "verdict", "binding_term", "exceeded", "not_shown"),
     *("margin_corrected_us", "uncertainty_us"),
 )
 """Columns of a sweep that a cell is made of."""
@@ -81,7 +81,8 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
     network = network_of(setting.profile)
     unsafe = tuple(one.key for one in bus_of(setting.profile).limits if one.is_safety and one.is_broken(network))
     verdict = figures["verdict"]
-    broken = tuple(key for key in figures["exceeded"] if key != TIME) or (TIME,)
+    keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
+    broken = tuple(key for key in keys if key != TIME) or (TIME,)
     state, limits = _judged(verdict, broken=broken, unsafe=unsafe)
     return Cell(
         x=x,

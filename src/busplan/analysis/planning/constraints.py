@@ -46,7 +46,7 @@ def shown(network: Network) -> Need:
             continue
         # A limit that a period cures is asked at the one that all before it need, whatever the profile's own is.
         at = network if limit.slice_us is None else network._replace(period_us=_period_us(network, found.us))
-        if limit.is_broken(at):
+        if limit.shown.is_broken(at):
             slice_us = inf if limit.slice_us is None else limit.slice_us(at)
             if slice_us == inf:
                 way_out = f" ({limit.way_out})" if limit.way_out else ""
@@ -61,7 +61,7 @@ def _period_us(network: Network, slice_us: float) -> float:
 
 def keeps_limits(network: Network) -> bool:
     """Whether a network keeps the limits that its period plays a part in, at its own period and slice ratio."""
-    return not any(one.slice_us is not None and one.is_broken(network) for one in bus_of(network.profile).limits)
+    return not any(one.slice_us is not None and one.shown.is_broken(network) for one in bus_of(network.profile).limits)
 
 
 def verdict(profile: Profile) -> Iterator[Need]:

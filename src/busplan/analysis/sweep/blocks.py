@@ -10,7 +10,14 @@ from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 
-from busplan.analysis.capacity.certainty import VERDICTS, certainty, limits_to_be_safe, verdict_code
+from busplan.analysis.capacity.certainty import (
+    VERDICTS,
+    certainty,
+    limit_codes,
+    limits_to_be_safe,
+    time_code,
+    verdict_code,
+)
 from busplan.analysis.capacity.cycle import TIME, fits_in, limits_with_time
 from busplan.analysis.capacity.figures import COUNTS, certainty_numbers, numeric_figures
 from busplan.analysis.capacity.node_limit import most_nodes
@@ -19,7 +26,7 @@ from busplan.analysis.sweep.grid import Array, Chunk, Grid
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, Sort
 from busplan.buses.network import Network
-from busplan.buses.parts import Limit
+from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import Profile
@@ -172,17 +179,15 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     numbers = {**figures, **cycle.figures(), **{term.key: term.us for term in cycle.terms}}
     limits = limits_with_time(network, model=model)
     late = np.logical_not(np.asarray(fits_in(figures["required_us"], available_us=figures["available_us"])))
-    flags = [late if limit.key == TIME else np.asarray(limit.is_broken(network)) for limit in limits]
-    bits = np.min_scalar_type((1 << len(flags)) - 1)
-    exceeded: Array = np.asarray(sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags)))
-    numbers |= {"fits": np.equal(exceeded, 0)}
-    keys = tuple(limit.key for limit in limits)
-    own = _certainty(cycle) if model == bus.deciding_model else _UNDECIDED
+    codes = limit_codes(network)
+    exceeded = _sets({**_where(codes, BROKEN), TIME: late})
+    numbers |= {"fits": np.equal(exceeded.values, 0)}
+    own = _certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED
     words = {
         **_counts(network, limits, model=model),
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
         "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
-        "exceeded": Column(exceeded, _combinations(keys)),
+        "exceeded": exceeded,
         **own,
     }
     sorts = {figure.key: figure.sort for figure in bus.capacity_figures}
@@ -195,7 +200,9 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
 _NO_WORD: Final = Column(np.zeros((), np.uint8), (None,))
 _NO_NUMBER: Final = Column(np.full((), np.nan))
 _UNDECIDED: Final = {
-    figure.key: _NO_WORD if figure.sort == "word" else _NO_NUMBER for figure in CERTAINTY if figure.key not in COUNTS
+    figure.key: _NO_WORD if figure.sort in ("word", "words") else _NO_NUMBER
+    for figure in CERTAINTY
+    if figure.key not in COUNTS
 }
 """Figures that a timing model does not have."""
 
@@ -233,19 +240,28 @@ def _counts_of(network: Network, limits: Sequence[Limit], *, model: str) -> dict
     }
 
 
-def _certainty(cycle: BusCycle) -> dict[str, Column]:
+def _certainty(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Column]:
     """Figures of how sure the verdict is, of a cycle under the timing model that decides."""
-    network, bus = cycle.network, bus_of(cycle.network.profile)
     found = certainty(cycle)
-    broken: Array = np.asarray(False)
-    for limit in bus.limits:
-        if not limit.is_safety:
-            broken = np.logical_or(broken, np.asarray(limit.is_broken(network)))
+    codes = {**limits, TIME: time_code(found, cycle.network)}
     sorts = {figure.key: figure.sort for figure in CERTAINTY}
     return {
         **{key: _number(number, sorts[key]) for key, number in certainty_numbers(found, cycle).items()},
-        "verdict": Column(np.asarray(verdict_code(found, network, is_broken=broken), np.uint8), VERDICTS),
+        "not_shown": _sets(_where(codes, NOT_SHOWN_KEPT)),
+        "verdict": Column(np.asarray(verdict_code(codes), np.uint8), VERDICTS),
     }
+
+
+def _where(codes: Mapping[str, Number], code: int) -> dict[str, Array]:
+    """Where each limit has a verdict."""
+    return {key: np.equal(np.asarray(own), code) for key, own in codes.items()}
+
+
+def _sets(flags: Mapping[str, Array]) -> Column:
+    """The limits that are flagged, as one word for each set of them."""
+    bits = np.min_scalar_type((1 << len(flags)) - 1)
+    codes: Array = np.asarray(sum(flag * bits.type(1 << bit) for bit, flag in enumerate(flags.values())))
+    return Column(codes, _combinations(tuple(flags)))
 
 
 @cache
