@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure
 from busplan.buses.network import Group, Network
+from busplan.buses.node_time import NODE, shortest_us
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
-from busplan.elementwise import Number, plain
+from busplan.elementwise import Number, larger, plain
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
@@ -223,7 +224,8 @@ class Bus(ABC):
     def shortest_period_us(self, network: Network, needed_us: Number) -> Number:
         """The shortest period that gives a cycle its time, of those that the bus knows; infinite where none does [us].
 
-        A kind with a limit that a longer period keeps adds what that asks for, where operators alone give it.
+        Nodes that execute beside the telegrams have their time in it, too. A kind with another limit that a longer
+        period keeps adds what that asks for, where operators alone give it.
 
         Parameters
         ----------
@@ -232,7 +234,10 @@ class Bus(ABC):
         needed_us
             What the cycle needs [us].
         """
-        return self.periods.from_us(needed_us / network.slice_ratio)
+        least_us = needed_us / network.slice_ratio
+        if self.limit(NODE) is not None:
+            least_us = larger(least_us, shortest_us(network))
+        return self.periods.from_us(least_us)
 
     def latency_has_execution(self, network: Network) -> bool:
         """Whether a latency holds an execution time of the nodes."""

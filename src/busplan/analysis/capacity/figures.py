@@ -84,6 +84,7 @@ class CapacityFigures(NamedTuple):
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
     uncertainty_us: float | None
+    """None also where nothing is known of it."""
     safe_required_us: float | None
     safe_nodes: int | None
     safe_axes: int | None
@@ -183,7 +184,7 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Any] = {key: _existing(number) for key, number in numeric_figures(cycle).items()}
+    numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     codes = limit_codes(network)
@@ -241,7 +242,7 @@ def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[st
     found = certainty(cycle)
     codes = {**limits, TIME: time_code(found, cycle.network)}
     return {
-        **{key: None if one is None else _existing(one) for key, one in certainty_numbers(found, cycle).items()},
+        **{key: None if one is None else existing(one) for key, one in certainty_numbers(found, cycle).items()},
         "not_shown": tuple(key for key, code in codes.items() if code == NOT_SHOWN_KEPT),
         "verdict": VERDICTS[int(verdict_code(codes))],
         "doubts": found.doubts,
@@ -261,7 +262,7 @@ def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | N
     return {
         "bias_us": found.bias_us,
         "margin_corrected_us": found.margin_corrected_us,
-        "uncertainty_us": found.uncertainty_us,
+        "uncertainty_us": found.known_uncertainty_us,
         "safe_required_us": found.safe_required_us,
         "safe_min_period_us": _shortest_us(cycle.network, found.safe_required_us),
     }
@@ -300,7 +301,7 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
     }
 
 
-def _existing(number: Number) -> float | None:
+def existing(number: Number) -> float | None:
     """A plain number; None for an infinite one, which does not exist."""
     return None if isinf(found := plain(number)) else found
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from busplan.analysis.capacity.bottleneck import NextBottleneck, next_bottleneck
 from busplan.analysis.capacity.certainty import VERDICTS, VerdictWord, certainty, limit_codes, time_code, verdict_code
 from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
-from busplan.analysis.capacity.figures import Capacity
+from busplan.analysis.capacity.figures import Capacity, existing
 from busplan.analysis.capacity.perturbations import Perturbed, perturbed
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.network import Network
@@ -19,7 +19,8 @@ class Standing(NamedTuple):
     """Where a network stands under the timing model that decides."""
 
     margin_corrected_us: float
-    uncertainty_us: float
+    uncertainty_us: float | None
+    """None where nothing is known of it."""
     verdict: VerdictWord
     safe: bool
     """Whether the bus is set so that it works reliably."""
@@ -97,7 +98,7 @@ def standing(network: Network) -> Standing:
     late = not fits_in(cycle.required_us, available_us=available_us(network))
     return Standing(
         margin_corrected_us=plain(found.margin_corrected_us),
-        uncertainty_us=plain(found.uncertainty_us),
+        uncertainty_us=existing(found.known_uncertainty_us),
         verdict=VERDICTS[int(verdict_code(codes))],
         safe=bus.is_safe(network),
         exceeded=(*broken, *((TIME,) if late else ())),

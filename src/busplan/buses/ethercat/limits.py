@@ -7,6 +7,7 @@ from busplan.buses.ethercat.constants import MOST_CABLE_M, MOST_DEVICES
 from busplan.buses.ethercat.equations import room_bytes
 from busplan.buses.ethercat.traffic import datagrams, devices
 from busplan.buses.network import Network
+from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, larger
 
@@ -21,6 +22,7 @@ def _longest_cable(network: Network) -> Number:
 
 
 LIMITS: Final = (
+    NODE_LIMIT,
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} addresses of a segment",
