@@ -5,6 +5,7 @@ from typing import Final
 
 from busplan.buses.network import Group, Network
 from busplan.buses.parts import COVERAGE, Limit
+from busplan.buses.rule import told_apart
 from busplan.elementwise import Number, choose, plain
 
 NODE: Final = "node"
@@ -29,11 +30,16 @@ def slow_groups(network: Network) -> Iterator[Group]:
 
 
 def busy_words(group: Group, network: Network) -> str:
-    """Say for how long a node of a group executes in each period; of plain numbers."""
-    own = f"a node of {group.name}" if group.name else "a node"
+    """Say how much of each period a node of a group executes; of plain numbers."""
     doubt_us = COVERAGE * plain(busy_doubt_us(group))
-    busy = f"{plain(busy_us(group)):g} +/- {doubt_us:.3g}" if doubt_us else f"{plain(busy_us(group)):g}"
-    return f"{own} executes for {busy} us, a read and a write, and has {plain(network.period_us):g} us, the period"
+    either_way = f" +/- {doubt_us:.1f}" if doubt_us else ""
+    busy, most = told_apart(plain(busy_us(group)), plain(network.period_us))
+    return f"a node executes for {busy}{either_way} us of {most} us"
+
+
+def _all_words(network: Network) -> str:
+    found = ((one.name, busy_words(one, network)) for one in slow_groups(network))
+    return "; ".join(f"{name}: {words}" if name else words for name, words in found)
 
 
 def shortest_us(network: Network) -> Number:
@@ -64,7 +70,7 @@ NODE_LIMIT: Final = Limit(
     doubt=lambda network: _slowest(network)[1],
     way_out="a longer period or a faster node would do",
     has_rule=True,
-    says=lambda network: "; ".join(busy_words(group, network) for group in slow_groups(network)),
+    says=_all_words,
     slice_us=lambda network: plain(shortest_us(network)) * plain(network.slice_ratio),
 )
 """T_exec(read) + T_exec(write) + both worst extras <= T_s, of every group."""

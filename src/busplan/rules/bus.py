@@ -93,7 +93,7 @@ def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
         for group in slow_groups(network):
             words = busy_words(group, network)
             name = "time_us" if isinstance(group.node.execution, TableExecution) else "base_us"
-            said = words if is_broken else f"not shown to be done: {words}"
+            said = words if is_broken else f"not shown: {words}"
             yield RuleProblem(group.key(f"execution.{name}"), said, *subject.cure())
 
 

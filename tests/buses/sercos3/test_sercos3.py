@@ -136,9 +136,9 @@ def test_connection_control_comes_with_v1_1_and_hot_plug_fields_in_all_telegrams
         ({}, ()),
         ({"cycle.period_us": 300.0}, ("period",)),
         ({"cycle.period_us": 125.0}, ("time",)),
-        ({"payload.read_bytes": 1494}, ("telegrams", "time")),
-        ({"payload.read_bytes": 1493}, ("telegrams", "time")),
-        ({"payload.read_bytes": 1495}, ("payload", "telegrams", "time")),
+        ({"payload.read_bytes": 1494}, ("node", "telegrams", "time")),
+        ({"payload.read_bytes": 1493}, ("node", "telegrams", "time")),
+        ({"payload.read_bytes": 1495}, ("node", "payload", "telegrams", "time")),
         ({"bus.nodes": 512, "cycle.period_us": 2000.0}, ("nodes", "telegrams")),
     ],
 )
