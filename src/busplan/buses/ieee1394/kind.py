@@ -283,7 +283,9 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """Say whose hops each node is charged."""
         if is_broadcast(network):
             return "every packet at the hops of the farthest"
-        return f"every node at {'its own hops' if charges_own_hops(network) else 'the hops of the farthest'}"
+        if not charges_own_hops(network):
+            return "every node at the hops of the farthest"
+        return f"every node at its own hops{'' if network.profile.bus.root == 'host' else ', arbitration at all'}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Hops, gap count, and a schedule that is not the individual one."""
