@@ -100,6 +100,10 @@ class Bus(ABC):
     """What a change of a key means on the machine, where the key does not say so."""
     reset_changes: ClassVar[Mapping[str, Value]] = {}
     """Keys as they are after a bus reset, until somebody sets them again."""
+    cable_key: ClassVar[str] = ""
+    """Key of the length of a cable [m]: of the bus, or of each node; empty where the kind has none."""
+    host_keys: ClassVar[tuple[str, ...]] = ()
+    """Keys of the host's own time in the cycle: what a comparison assumes of it is no ground to rank a kind."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """What would take a term of its own out of the cycle, each new values by dotted key."""
     change_words: ClassVar[Mapping[str, str]] = {}

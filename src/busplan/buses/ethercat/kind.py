@@ -92,6 +92,8 @@ master_us = 50             # assumed: the master's own time, from its task to th
         _COMMAND: "if all devices can",
     }
     change_words: ClassVar[Mapping[str, str]] = {_COMMAND: "command {}"}
+    cable_key = "node.cable_m"
+    host_keys = ("bus.master_us",)
     term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
         {"bus.master_us": 0.0},
         {"bus.mailbox_polls": 0},

@@ -139,6 +139,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "node.write_response": "if the nodes can",
     }
     reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
+    cable_key = "bus.cable_length_m"
+    host_keys = ("host.transaction_us",)
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
         {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
         {"host.transaction_us": 0.0},
