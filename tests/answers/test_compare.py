@@ -51,7 +51,7 @@ def test_a_row_has_the_verdict_margin_smallest_period_axes_and_what_binds() -> N
     other = f"CAN does not fit -548.467 14.693 2126.320 load 0 time {new} PASSED 96.651"
     assert " ".join(row(PAPER, "IEEE 1394, as it is")) == own
     assert " ".join(row(PAPER, "CAN")) == other
-    assert row(GANTRY, "CAN")[5:10] == ["-", "payload,", "load", "0", "payload"]
+    assert row(GANTRY, "CAN")[6:11] == ["-", "payload,", "load", "0", "payload"]
 
 
 def test_a_kind_whose_host_is_assumed_is_not_ranked() -> None:
