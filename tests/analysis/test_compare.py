@@ -73,12 +73,15 @@ def assert_accounted(one: Profile, kind: str) -> None:
     """Each key that the profile sets is kept, left out or assumed; each that it does not set is assumed or common."""
     found = converted(one, kind)
     said, new = dotted_keys(one), dotted_keys(found.profile)
-    cables_m = {key: each.value for key, each in said.items() if key.rpartition(".")[2] in CABLES and each.value}
-    if cables_m := {key: value for key, value in cables_m.items() if said[key].source == "file"}:
-        for key, each in new.items():
-            if key.rpartition(".")[2] in CABLES:
-                assert each.value == max(cables_m.values())
-                said[key] = each
+    cables_m = {
+        key: float(str(each.value))
+        for key, each in said.items()
+        if key.rpartition(".")[2] in CABLES and each.value and each.source == "file"
+    }
+    for key, each in new.items():
+        if cables_m and key.rpartition(".")[2] in CABLES:
+            assert each.value == max(cables_m.values())
+            said[key] = each
     assumed = {each.key: each.value for each in found.assumed}
     for key, value in said.items():
         out = any(key == each or key.startswith(f"{each}.") for each in found.left_out)
