@@ -34,6 +34,8 @@ Profiles = Mapping[str, st.SearchStrategy[Profile]]
 SOME = settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 KINDS = pytest.mark.parametrize("kind", kind_names())
 BOTH = ("ieee1394", "can")
+CABLES = ("cable_length_m", "cable_m")
+"""Length of a cable, by the names of two kinds."""
 GANTRY = load("gantry-24").profile
 
 
@@ -56,7 +58,8 @@ def assert_same_machine(one: Profile, other: Profile) -> None:
             said["grade"] = "assumed"
         assert said.items() >= {key: found[key] for key in said.keys() & found.keys()}.items()
         assert {"kind", "grade", "uncertainty_us", "worst_extra_us"} <= said.keys() & found.keys()
-    assert (other.cycle.period_us, other.cycle.nonperiodic_us) == (one.cycle.period_us, one.cycle.nonperiodic_us)
+    for key in ("period_us", "slice_ratio", "nonperiodic_us"):
+        assert getattr(other.cycle, key) == getattr(one.cycle, key)
     assert other.limits.reserve == one.limits.reserve
     assert other.asks_for_circle == one.asks_for_circle
     for section in CIRCLE_SECTIONS:
@@ -69,12 +72,21 @@ def assert_accounted(one: Profile, kind: str) -> None:
     """Each key that the profile sets is kept, left out or assumed; each that it does not set is assumed or common."""
     found = converted(one, kind)
     said, new = dotted_keys(one), dotted_keys(found.profile)
+    cables_m = {
+        key: float(str(each.value))
+        for key, each in said.items()
+        if key.rpartition(".")[2] in CABLES and each.value and each.source == "file"
+    }
+    for key, each in new.items():
+        if cables_m and key.rpartition(".")[2] in CABLES:
+            assert each.value == max(cables_m.values())
+            said[key] = each
     assumed = {each.key: each.value for each in found.assumed}
     for key, value in said.items():
         out = any(key == each or key.startswith(f"{each}.") for each in found.left_out)
         is_machine = key not in {"bus.kind", "bus.timing_model"} and not key.endswith("execution.grade")
         if value.source == "file" and is_machine:
-            assert out or key in assumed or new[key].value == value.value, key
+            assert out or key in assumed or key in cables_m or new[key].value == value.value, key
     for key, value in assumed.items():
         assert new[key].value == value
     for key in new.keys() - said.keys():
@@ -104,10 +116,27 @@ def test_the_machine_stays_and_every_key_is_accounted_for(
 ) -> None:
     profile = data.draw(profiles_by_kind[kind])
     for other in kind_names():
+        longest_m = max(getattr(one.node, "cable_m", 0) for one in profile.alike_nodes)
+        if other == "ieee1394" and longest_m > 4.5:
+            with pytest.raises(BusplanError, match="cable_length_m"):
+                converted(profile, other)
+            continue
         found = converted(profile, other)
         assert found.profile.bus.kind == other
         assert_same_machine(profile, found.profile)
         assert_accounted(profile, other)
+
+
+def test_the_host_keeps_its_share_of_the_period_and_the_machine_its_cables() -> None:
+    for kind in kind_names():
+        assert converted(load("paper-4ms").profile, kind).profile.cycle.slice_ratio == 0.5
+    # A length that nobody has said is that of the other kind.
+    for name, kind, key, cable_m in (
+        ("paper-1ms", "ethercat", "node.cable_m", 4.5),
+        ("ethercat-servo-8", "ieee1394", "bus.cable_length_m", 2),
+        ("gantry-24", "ethercat", "group.drives.cable_m", 0),
+    ):
+        assert dotted_keys(converted(load(name).profile, kind).profile)[key].value == cable_m
 
 
 @pytest.mark.parametrize("other", kind_names())
@@ -146,7 +175,8 @@ def test_the_smallest_period_fits_and_a_smaller_one_does_not(
 def test_the_smallest_period_of_a_limit_is_exact() -> None:
     # By hand: 8 s + 47 + (34 + 8 s - 1) // 4 bits of a frame (Davis 2007); two nodes, 12 bytes each way in two frames.
     frames_us = 2 * 2 * (135 + 95) + 55
-    (one,) = compare(load("paper-1ms").profile, kinds=["can"]).compared
+    machine = override(load("paper-1ms").profile, {"cycle.slice_ratio": 1.0})
+    (one,) = compare(machine, kinds=["can"]).compared
     assert one.smallest.us == pytest.approx(frames_us / 0.8, rel=1e-9)
     assert one.figures.bus_load == pytest.approx(frames_us / 1000, rel=1e-9)
     # Whatever share of the period is for communication.

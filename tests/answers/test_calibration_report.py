@@ -71,13 +71,12 @@ def test_warnings() -> None:
     many = rows(*((4, 50.0 if index % 4 else 90.0 + index) for index in range(60)))
     (warning,) = calibration_warnings(run(many, robust=True))
     assert warning.startswith(
-        "15 outliers: line 2 (90 us at 4 bytes: T_exec +40.0 us off what the others say), line 6 (94 us at 4 bytes: "
+        "15 slow measurements: line 2 (90 us at 4 bytes: T_exec +40.0 us off what the others say), line 6 (94 us at 4 "
     )
-    assert warning.endswith(
-        "and 5 more; left out of the fit; measure again, or use --keep-outliers where they are real."
-    )
-    (pair,) = calibration_warnings(run(rows((4, 50.0), (4, 198.0))))
-    assert pair.startswith("lines 2 and 3 contradict each other, T_exec ")
+    assert warning.endswith("and 5 more; not in the fit: the slowest execution takes 96.001 us more, worst_extra_us.")
+    quick = calibration_warnings(run(rows((4, 50.0), (4, 50.1), (4, 20.0), (4, 50.2), (4, 120.0))))
+    assert [one.split(":")[0] for one in quick] == ["1 slow measurement", "1 fast measurement"]
+    assert quick[1].endswith("; left out of the fit; measure again, or use --keep-outliers where they are real.")
     assert "No outlier can be told at 4 bytes: it takes 3 measurements" in said(run(rows((4, 50.0), (4, 198.0))))
 
 

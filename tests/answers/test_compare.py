@@ -45,11 +45,26 @@ def test_the_first_lines_say_where_it_fits_and_which_kind_is_best() -> None:
 
 
 def test_a_row_has_the_verdict_margin_smallest_period_axes_and_what_binds() -> None:
-    own = "IEEE 1394, as it is fits 230.064 6.311 552.494 execution 12 time 0 PASSED 92.082"
-    other = "CAN does not fit -48.467 14.693 1218.750 load 4 load 7 PASSED 93.750"
+    own = "IEEE 1394, as it is fits 230.064 6.311 552.494 execution 12 time - PASSED 92.082"
+    # The host keeps its half of the period on CAN, too.
+    new = "bus.bit_rate_kbit_s = 1000, 5 defaults"
+    other = f"CAN does not fit -548.467 14.693 2126.320 load 0 time {new} PASSED 96.651"
     assert " ".join(row(PAPER, "IEEE 1394, as it is")) == own
     assert " ".join(row(PAPER, "CAN")) == other
-    assert row(GANTRY, "CAN")[-6:] == ["-", "payload,", "load", "0", "payload", "9"]
+    assert row(GANTRY, "CAN")[6:11] == ["-", "payload,", "load", "0", "payload"]
+
+
+def test_a_kind_whose_host_is_assumed_is_not_ranked() -> None:
+    found = compare(load("paper-1ms").profile, kinds=["ieee1394", "ethercat"])
+    assert said(found)[1:4] == [
+        "The smallest period is 552.494 us on IEEE 1394.",
+        "The most axes at 1 ms are 12 on IEEE 1394.",
+        "Not ranked, for the host's own time is assumed there: EtherCAT (bus.master_us = 50).",
+    ]
+    own, other = plain(found)["buses"]
+    assert (own["assumed_host"], other["assumed_host"]) == ([], ["bus.master_us"])
+    assert other["smallest_period_us"] < own["smallest_period_us"]
+    assert "bus.master_us = 50" in " ".join(row(found, "EtherCAT"))
 
 
 def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None:
@@ -70,7 +85,7 @@ def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None
 
 def test_assumed_are_the_values_of_a_new_profile_and_the_defaults() -> None:
     short, whole = said(PAPER), said(PAPER, whole=True)
-    assert sum(line.endswith("new profile") for line in short) == 2
+    assert sum(line.endswith("new profile") for line in short) == 1
     assert not [line for line in short if line.endswith("default")]
     assert short[-1] == "Not shown: 5 rows. --all shows all."
     assert sum(line.endswith("default") for line in whole) == 5
@@ -86,7 +101,7 @@ def test_an_unsafe_bus_does_not_pass() -> None:
 def test_a_circle_that_fails_or_is_not_run_says_why() -> None:
     tight = override(load("paper-1ms").profile, {"tolerance.max_contour_error_mm": 1e-6})
     (note,) = [line for line in said(compare(tight, kinds=["can"], with_circle=True)) if line.startswith("CAN: ")]
-    assert "The circle at 1218.750 us: " in note
+    assert "The circle at 2126.320 us: " in note
     assert "max_contour_error_mm" in note or "contour error" in note
     assert "NOT RUN" in "\n".join(said(compare(load("gantry-24").profile, kinds=["can"], with_circle=True)))
 
@@ -99,7 +114,7 @@ def test_the_document_is_plain_and_whole() -> None:
         assert len({tuple(one) for one in document["buses"]}) == 1
     own, can = plain(PAPER)["buses"]
     assert (own["is_own"], own["assumed"], own["left_out"]) == (True, [], [])
-    assert can["circle"]["step_us"] == pytest.approx(1218.75 / 13)
+    assert can["circle"]["step_us"] == pytest.approx(2126.32 / 22)
     assert can["circle"]["passed"] is True
     assert can["assumed"][0] == {"key": "bus.bit_rate_kbit_s", "value": 1000, "source": "new profile"}
     assert plain(GANTRY)["counted_group"] == "drives"

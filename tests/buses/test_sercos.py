@@ -147,7 +147,8 @@ def test_a_plan_leaves_an_unknown_period_for_the_nearest(kind: str) -> None:
 
 def test_the_smallest_period_of_a_plan_may_be_no_whole_number(run: Run, tmp_path: Path) -> None:
     text = (
-        'schema_version = 1\nname = "pair"\n[bus]\nkind = "sercos3"\nnodes = 2\n[cycle]\nperiod_us = 250\n'
+        'schema_version = 1\nname = "pair"\n[bus]\nkind = "sercos3"\nnodes = 2\nring_grade = "measured"\n'
+        "[cycle]\nperiod_us = 250\n"
         "[payload]\nread_bytes = 8\nwrite_bytes = 8\n[node]\naxes = 1\n"
         '[node.execution]\nkind = "linear"\nbase_us = 5\nper_byte_us = 0\n'
     )
@@ -235,7 +236,7 @@ def test_constants_have_sources(kind: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "nodes", "has_doubts"),
-    [("sercos3-servo-8", 8, False), ("sercos2-servo-8", 1, False), ("sercos2-servo-8", 2, True)],
+    [("sercos3-servo-8", 8, True), ("sercos2-servo-8", 1, False), ("sercos2-servo-8", 2, True)],
 )
 def test_a_margin_without_doubts_says_that_no_uncertainty_is_known(
     run: Run, name: str, nodes: int, has_doubts: bool

@@ -88,7 +88,7 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
     run = busplan("calibrate", "bench.toml", "m.csv", "--timing", "standard", "--robust", "--apply", cwd=bench.parent)
     assert (run.returncode, run.stderr[:36]) == (0, "wrote [node.execution] of bench.toml")
     note = (
-        "# busplan calibrate: table (median) of 6 measurements in m.csv, 1 outlier left out, packets by the "
+        "# busplan calibrate: table (median) of 6 measurements in m.csv, 1 slow in worst_extra_us, packets by the "
         "standard model, rms residual "
     )
     after = bench.read_text()
@@ -105,7 +105,7 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
     # Half of 0.5, 0.5 and 1 us off the median: 1.4826 * 0.5 us, whatever the outlier.
     assert [new[start + 1], *new[start + 3 :]] == [
         "payload_bytes = [4, 64, 256]",
-        *("uncertainty_us = 0.741", 'residual = "standard"', "measured_gap_count = 63"),
+        *("uncertainty_us = 0.741", 'residual = "standard"', "measured_gap_count = 63", "worst_extra_us = 239.501"),
     ]
     execution = load(str(bench)).profile.alike_nodes[0].node.execution
     assert (execution.grade, execution.uncertainty_us) == ("measured", 0.741)
@@ -137,10 +137,10 @@ def test_apply_from_a_table_to_a_line_and_back(busplan: Run, bench: Path) -> Non
     run = busplan("calibrate", "bench.toml", "-", "--form", "linear", "--apply", cwd=bench.parent, stdin=MEASURED)
     assert run.returncode == 0
     execution = load(str(bench)).document.data()["node"]["execution"]
-    fitted = {"residual", "measured_gap_count", "uncertainty_us"}
+    fitted = {"residual", "measured_gap_count", "uncertainty_us", "worst_extra_us"}
     assert set(execution) == {"grade", "kind", "base_us", "per_byte_us", *fitted}
     # The timing model that decides, whatever leads the tables of the profile.
-    assert "in <stdin>, 1 outlier left out, packets by the standard model" in bench.read_text()
+    assert "in <stdin>, 1 slow in worst_extra_us, packets by the standard model" in bench.read_text()
     content = bench.read_bytes()
     assert content.startswith(b"\xef\xbb\xbf")
     assert content.count(b"\n") == content.count(b"\r\n")
@@ -173,8 +173,10 @@ def test_a_new_fit_leaves_nothing_of_the_one_before(busplan: Run, bench: Path) -
     busplan("calibrate", "bench.toml", "m.csv", "--gap-count", "10", "--apply", cwd=bench.parent)
     busplan("calibrate", "bench.toml", "table-1.csv", "--apply", cwd=bench.parent)
     execution = load(str(bench)).document.data()["node"]["execution"]
-    # One measurement of a payload says nothing of how far they scatter.
-    assert set(execution) == {"grade", "kind", "payload_bytes", "time_us", "residual", "measured_gap_count"}
+    # One measurement of a payload says nothing of how far they scatter; and what was once seen can happen again.
+    new = {"grade", "kind", "payload_bytes", "time_us", "residual", "measured_gap_count"}
+    assert set(execution) == new | {"worst_extra_us"}
+    assert execution["worst_extra_us"] > 200
     assert (execution["grade"], execution["residual"], execution["measured_gap_count"]) == ("derived", "none", 63)
 
 
@@ -197,9 +199,14 @@ def test_an_outlier_is_no_entry_and_every_form_of_answer_says_so(busplan: Run, b
     run = busplan("calibrate", "bench.toml", "wild.csv", "--apply", "--format", "json", cwd=bench.parent)
     document = json.loads(run.stdout)
     (outlier,) = document["outliers"]
-    assert (outlier["line"], round(outlier["off_us"]), document["outliers_kept"]) == (8, 128, False)
+    assert (outlier["line"], round(outlier["off_us"]), document["outliers_kept"]) == (8, 127, False)
+    # Table I without 64 bytes lies between 45.381 and 84.881 us there, a third of the way.
+    wild_us = 200.0 - 7.5 - (6.0 - 32 / 393.216)
+    worst_us = document["worst_extra_us"]
+    assert worst_us == pytest.approx(wild_us - (45.381 + (84.881 - 45.381) / 3), abs=0.002)
+    assert document["execution"]["worst_extra_us"] == worst_us
     assert [one["left_out"] for one in document["payloads"]] == [0, 0, 0, 1, 0, 0, 0, 0]
-    assert "in wild.csv, 1 outlier left out, T1+T2 as measured" in bench.read_text()
+    assert "in wild.csv, 1 slow in worst_extra_us, T1+T2 as measured" in bench.read_text()
     assert 64 not in load(str(bench)).document.data()["node"]["execution"]["payload_bytes"]
     rows = csv.DictReader(
         busplan("calibrate", "bench.toml", "wild.csv", "--format", "csv", cwd=bench.parent).stdout.splitlines()
@@ -221,11 +228,12 @@ def test_a_layout_that_cannot_be_edited_is_left_with_the_lines_to_change(busplan
     first, note, header, *lines = run.stderr.splitlines()
     assert first.endswith(", so that it stays as it is; change these lines by hand:")
     assert note.startswith(
-        "# busplan calibrate: linear (least squares) of 6 measurements in m.csv, 1 outlier left out, "
+        "# busplan calibrate: linear (least squares) of 6 measurements in m.csv, 1 slow in worst_extra_us, "
     )
     assert header == "[node.execution]"
     assert [line.partition(" = ")[0] for line in lines] == [
         *("kind", "grade", "uncertainty_us", "base_us", "per_byte_us", "residual", "measured_gap_count"),
+        "worst_extra_us",
         *("# remove payload_bytes", "# remove time_us"),
     ]
     assert bench.read_bytes() == before
@@ -277,8 +285,8 @@ def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run,
         in run.stdout
     )
     assert (
-        "Warning: 1 outlier: line 7 (400 us at 256 bytes: T_exec +239.5 us off what the others say); left out "
-        in run.stdout
+        "Warning: 1 slow measurement: line 7 (400 us at 256 bytes: T_exec +239.5 us off what the others say); not in "
+        "the fit: the slowest execution takes 239.500 us more, worst_extra_us." in run.stdout
     )
 
 

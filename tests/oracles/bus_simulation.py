@@ -68,6 +68,9 @@ class Scene(NamedTuple):
     """Whether a cycle start waits for the subaction gap; else it goes as soon as the bus is idle."""
     isochronous_us: float = 0.0
     """Traffic behind each cycle start."""
+    root_hops: int | None = None
+    """Where the root of a chain lies, in hops from the host: a sender asks it for the bus. None has a packet arbitrate
+    over its own way, as equation (4) may be read."""
 
     @property
     def hop_us(self) -> float:
@@ -87,6 +90,10 @@ class Scene(NamedTuple):
     def arbitration_us(self, hops: int) -> float:
         """Equation (4)."""
         return hops * self.hop_us + 4 * self.gap_count / BASE_MBIT_S + MAX_HOLD_US
+
+    def asking_us(self, sender_hops: int, way_hops: int) -> float:
+        """Arbitration of a packet whose sender is some hops from the host, and whose way is some hops long."""
+        return self.arbitration_us(way_hops if self.root_hops is None else abs(sender_hops - self.root_hops))
 
     def data_us(self, hops: int, packet_bytes: int) -> float:
         """Equation (5)."""
@@ -178,7 +185,7 @@ class _Bus:
 def simulate(scene: Scene, execution: Execution, *, cycles: int = 1) -> Run:
     """Run cycles one after the other, each as soon as the bus lets it."""
     bus, ready_us, starts_us = _Bus(scene), 0.0, []
-    broadcast_us = scene.arbitration_us(scene.hops) + scene.data_us(scene.hops, BROADCAST_BYTES)
+    broadcast_us = scene.asking_us(0, scene.hops) + scene.data_us(scene.hops, BROADCAST_BYTES)
     for cycle in range(cycles + 1):
         ready_us = bus.send("broadcast", HOST, ready_us=ready_us, wire_us=broadcast_us)
         starts_us.append(bus.packets[-1].start_us)
@@ -253,14 +260,14 @@ def _transaction(
         f"{name}, response",
         number,
         ready_us=acknowledged_us + execution_us,
-        wire_us=scene.arbitration_us(node.hops) + response_us,
+        wire_us=scene.asking_us(node.hops, node.hops) + response_us,
         priority=scene.priority,
     )
 
 
 def _request_us(scene: Scene, node: Node, kind: str) -> float:
     """A request and its acknowledge."""
-    packet_us = scene.arbitration_us(node.hops) + scene.data_us(node.hops, _packets(node, kind)[0])
+    packet_us = scene.asking_us(0, node.hops) + scene.data_us(node.hops, _packets(node, kind)[0])
     return packet_us + scene.acknowledge_us(node.hops)
 
 

@@ -7,7 +7,7 @@ from typing import Final
 from busplan.analysis.calibration.calibrate import Calibration, PayloadFit
 from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.network import bus_of
-from busplan.answers.calibration_sentences import fit_sentences, time_value, warning_sentences
+from busplan.answers.calibration_sentences import fit_sentences, slow_and_fast, time_value, warning_sentences
 from busplan.answers.documents import document, with_profile
 from busplan.forms.blocks import (
     Block,
@@ -55,30 +55,32 @@ _MEASURED_COLUMNS: Final = {
 """Further columns if T1+T2 was measured, too."""
 
 
-_KEPT: Final = "worst_extra_us"
-"""No measurement of typical latencies says it."""
+_WORST: Final = "worst_extra_us"
 
 
 def execution_keys(result: Calibration) -> dict[str, object]:
     """Keys and values of the execution time, as in a profile."""
-    found = {**result.execution.model_dump(exclude_none=True, exclude={_KEPT}), **result.fit_keys}
+    found = {**result.execution.model_dump(exclude_none=True, exclude={_WORST}), **result.fit_keys}
     if result.uncertainty_us is not None:
         found["uncertainty_us"] = result.uncertainty_us
+    if result.worst_extra_us is not None:
+        # The profile may know of a slower one.
+        found[_WORST] = max(result.worst_extra_us, result.nodes.node.execution.worst_extra_us)
     return {key: list(value) if isinstance(value, tuple) else value for key, value in found.items()}
 
 
 def execution_changes(result: Calibration) -> dict[str, object]:
     """Changes that set a profile's execution time; None removes a key of the other form, or of the old one."""
     gone = dict.fromkeys((*LinearExecution.model_fields, *TableExecution.model_fields))
-    changes = {**gone, **execution_keys(result)}
-    return {f"{section(result)}.{key}": value for key, value in changes.items() if key != _KEPT}
+    del gone[_WORST]
+    return {f"{section(result)}.{key}": value for key, value in {**gone, **execution_keys(result)}.items()}
 
 
 def execution_section(result: Calibration) -> dict[str, object]:
     """The whole section of the execution time, with what the measurements do not say as it was."""
     old = result.nodes.node.execution
-    kept = {_KEPT: getattr(old, _KEPT)} if _KEPT in old.model_fields_set else {}
-    return {**kept, **{key: value for key, value in execution_keys(result).items() if key != _KEPT}}
+    kept = {_WORST: getattr(old, _WORST)} if _WORST in old.model_fields_set else {}
+    return {**kept, **execution_keys(result)}
 
 
 def provenance(result: Calibration, *, source: str) -> str:
@@ -92,10 +94,12 @@ def provenance(result: Calibration, *, source: str) -> str:
 
 
 def _doubts(result: Calibration) -> str:
-    """Outliers and contradictions, for a list in words."""
-    number, pairs = len(result.outliers), len(result.undecided)
-    outliers = f"{plural(number, 'outlier')} {'kept' if result.outliers_kept else 'left out'}, " if number else ""
-    return outliers + (f"{plural(pairs, 'pair')} in contradiction, " if pairs else "")
+    """Outliers, for a list in words."""
+    slow, fast = slow_and_fast(result)
+    if result.outliers_kept:
+        return f"{plural(len(result.outliers), 'outlier')} kept, " if result.outliers else ""
+    said = (f"{len(slow)} slow in {_WORST}, " if slow else "", f"{len(fast)} fast left out, " if fast else "")
+    return "".join(said)
 
 
 def calibration_report(result: Calibration, *, source: str, applied_to: str | None) -> Report:
@@ -188,7 +192,7 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         largest_residual=result.largest._asdict(),
         outliers=[one._asdict() for one in result.outliers],
         outliers_kept=result.outliers_kept,
-        undecided=[[one._asdict() for one in pair] for pair in result.undecided],
+        worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),
         payloads=calibration_records(result),
         warnings=calibration_warnings(result),

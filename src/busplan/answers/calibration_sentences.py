@@ -124,9 +124,7 @@ def _unexplained(result: Calibration) -> Iterator[Sentence]:
 
 def warning_sentences(result: Calibration) -> Iterator[Sentence]:
     """Say what to check before using these figures."""
-    if result.outliers:
-        yield _outliers(result)
-    yield from _undecided(result)
+    yield from _outliers(result)
     execution = result.execution
     if isinstance(execution, TableExecution):
         outside = [size for kind in TRANSACTION_KINDS if not execution.covers(size := int(result.nodes.bytes_of(kind)))]
@@ -151,44 +149,42 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
         )
 
 
-def _outliers(result: Calibration) -> Sentence:
-    number = len(result.outliers)
-    shown = [
-        sentence(
-            "line {} ({} at {}: T_exec {} off what the others say)",
-            count_value(one.line, "line", at=f"/outliers/{at}/line"),
-            ShownValue(one.latency_us, "latency_us", "us", at=f"/outliers/{at}/latency_us"),
-            ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"/outliers/{at}/payload_bytes"),
-            time_value(one.off_us, "off_us", at=f"/outliers/{at}/off_us")._replace(signed=True, decimals=1),
+def slow_and_fast(result: Calibration) -> tuple[list[int], list[int]]:
+    """Places of the outliers that are slow executions, and of those that the others contradict."""
+    slow = [place for place, one in enumerate(result.outliers) if one.off_us > 0]
+    return slow, [place for place in range(len(result.outliers)) if place not in slow]
+
+
+def _outliers(result: Calibration) -> Iterator[Sentence]:
+    """Name the slow executions, and the measurements that the others contradict."""
+    for places, word in zip(slow_and_fast(result), ("slow", "fast"), strict=True):
+        if not places:
+            continue
+        said = joined(
+            sentence(f"{{}} {word} {nouns(len(places), 'measurement')}: ", count_value(len(places))),
+            joined(*(_outlier(result, place) for place in places[:_MOST_LINES]), by=", "),
+            by="",
         )
-        for at, one in enumerate(result.outliers[:_MOST_LINES])
-    ]
-    said = joined(sentence(f"{{}} {nouns(number, 'outlier')}: ", count_value(number)), joined(*shown, by=", "), by="")
-    if number > _MOST_LINES:
-        said = joined(said, sentence("and {} more", count_value(number - _MOST_LINES)))
-    effect = (
-        "in the fit by --keep-outliers, so that the grade is assumed"
-        if result.outliers_kept
-        else "left out of the fit; measure again, or use --keep-outliers where they are real"
+        if len(places) > _MOST_LINES:
+            said = joined(said, sentence("and {} more", count_value(len(places) - _MOST_LINES)))
+        yield joined(said, _effect(result, word), by="")
+
+
+def _effect(result: Calibration, word: str) -> Sentence:
+    if result.outliers_kept:
+        return sentence("; in the fit by --keep-outliers, so that the grade is assumed.")
+    if word == "fast":
+        return sentence("; left out of the fit; measure again, or use --keep-outliers where they are real.")
+    worst = time_value(result.worst_extra_us or 0.0, "worst_extra_us", at="/worst_extra_us")
+    return sentence("; not in the fit: the slowest execution takes {} more, worst_extra_us.", worst)
+
+
+def _outlier(result: Calibration, at: int) -> Sentence:
+    one = result.outliers[at]
+    return sentence(
+        "line {} ({} at {}: T_exec {} off what the others say)",
+        count_value(one.line, "line", at=f"/outliers/{at}/line"),
+        ShownValue(one.latency_us, "latency_us", "us", at=f"/outliers/{at}/latency_us"),
+        ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"/outliers/{at}/payload_bytes"),
+        time_value(one.off_us, "off_us", at=f"/outliers/{at}/off_us")._replace(signed=True, decimals=1),
     )
-    return joined(said, sentence(f"; {effect}."), by="")
-
-
-def _undecided(result: Calibration) -> Iterator[Sentence]:
-    for at, (one, two) in enumerate(result.undecided[:_MOST_LINES]):
-        yield sentence(
-            "lines {} and {} contradict each other, T_exec {} and {} at {}, and no third measurement says which is "
-            "right: both are in the fit, and the grade is assumed.",
-            *(
-                count_value(each.line, "line", at=f"/undecided/{at}/{side}/line")
-                for side, each in enumerate((one, two))
-            ),
-            *(
-                time_value(each.execution_us, "execution_us", at=f"/undecided/{at}/{side}/execution_us")
-                for side, each in enumerate((one, two))
-            ),
-            ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"/undecided/{at}/0/payload_bytes"),
-        )
-    hidden = len(result.undecided) - _MOST_LINES
-    if hidden > 0:
-        yield sentence(f"{{}} more {nouns(hidden, 'pair')} contradict each other.", count_value(hidden))

@@ -1,6 +1,6 @@
 """Answer of `busplan compare`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
@@ -32,7 +32,8 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.columns import sentence_text
-from busplan.forms.numbers import nouns, period_value
+from busplan.forms.numbers import listed, nouns, period_value
+from busplan.profile.conversion import AssumedKey
 from busplan.profile.write import short_text
 
 _COLUMNS: Final = (
@@ -44,7 +45,7 @@ _COLUMNS: Final = (
     TableColumn("binds", kind="words", rank=1, leaves="below", wraps=True),
     TableColumn("most", group="safe axes"),
     TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
-    TableColumn("assumed", rank=2),
+    TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True),
 )
 _CIRCLE: Final = (
     TableColumn("", kind="words", group="circle"),
@@ -103,14 +104,15 @@ def headline(found: KindComparison) -> Sentence:
 
 
 def _best(found: KindComparison) -> Iterator[Sentence]:
-    """Say which kind has the smallest period, and which the most axes."""
+    """Say which kind has the smallest period, and which the most axes, of those whose host's time is known."""
     placed = [(number, one) for number, one in enumerate(found.kinds) if isinstance(one, MachineOnKind)]
-    shortest = [(one.smallest.us, number, one) for number, one in placed if one.smallest.us is not None]
+    ranked = [(number, one) for number, one in placed if not one.assumed_host]
+    shortest = [(one.smallest.us, number, one) for number, one in ranked if one.smallest.us is not None]
     if shortest:
         us, number, one = min(shortest, key=lambda each: each[:2])
         value = ShownValue(us, "smallest_period_us", "us", 3, at=f"/buses/{number}/smallest_period_us")
         yield sentence(f"The smallest period is {{}} on {bus_of(one.profile).title}.", value)
-    most = [(one.safe.axes, -number, one) for number, one in placed if one.safe.axes]
+    most = [(one.safe.axes, -number, one) for number, one in ranked if one.safe.axes]
     if most:
         axes, number, one = max(most, key=lambda each: each[:2])
         value = count_value(axes, SAFE_AXES.key, at=f"/buses/{-number}/{SAFE_AXES.key}")
@@ -119,6 +121,21 @@ def _best(found: KindComparison) -> Iterator[Sentence]:
             period_value(found.profile.cycle.period_us, at="/period_us"),
             value,
         )
+    unranked = [f"{bus_of(one.profile).title} ({_words(one.assumed_host)})" for _, one in placed if one.assumed_host]
+    if unranked:
+        words = f"Not ranked, for the host's own time is assumed there: {listed(unranked, 'and')}."
+        yield Sentence((words,), "warns")
+
+
+def _words(assumed: Sequence[AssumedKey]) -> str:
+    return ", ".join(f"{one.key} = {short_text(one.value)}" for one in assumed)
+
+
+def _assumed(one: MachineOnKind) -> str:
+    """What a kind has of a new profile, with the number of its defaults."""
+    new = [each for each in one.assumed if each.source == "new profile"]
+    defaults = len(one.assumed) - len(new)
+    return ", ".join(filter(None, (_words(new), f"{defaults} {nouns(defaults, 'default')}" if defaults else ""))) or "-"
 
 
 def _remarks(found: KindComparison) -> Iterator[Sentence]:
@@ -162,7 +179,7 @@ def _row(found: KindComparison, number: int, *, columns: int) -> TableRow:
         _binds(one),
         ShownValue(one.safe.axes, SAFE_AXES.key, at=f"{at}/{SAFE_AXES.key}"),
         one.safe.limited_by,
-        count_value(len(one.assumed)),
+        _assumed(one),
     )
     return TableRow((*cells, *(_circle(one, at=at) if found.with_circle else ())))
 

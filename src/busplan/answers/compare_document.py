@@ -58,7 +58,7 @@ def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
         empty: Record = dict.fromkeys(
             (*_FIGURES, "verdict_after_reset", *_SAFE, "smallest_period_us", "no_period", "circle")
         )
-        lists: Record = {"assumed": [], "left_out": [], "curve": []}
+        lists: Record = {"assumed": [], "assumed_host": [], "left_out": [], "curve": []}
         return {**_head(one.kind, is_own=False, why_not=list(one.why)), **empty, **lists}
     bus = bus_of(one.profile)
     return {
@@ -70,6 +70,7 @@ def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
         "no_period": one.smallest.why or None,
         "circle": None if one.circle is None else _circle_record(one.circle),
         "assumed": [{**each._asdict(), "value": _plain(each.value)} for each in one.assumed],
+        "assumed_host": [each.key for each in one.assumed_host],
         "left_out": list(one.left_out),
         "curve": [{"period_us": each.period_us, **_safe_record(each)} for each in one.curve],
     }

@@ -12,8 +12,8 @@ from busplan.analysis.planning.plan import Plan
 from busplan.analysis.planning.relaxations import Relaxation
 from busplan.answers.documents import document, with_profile
 from busplan.answers.key_values import NewValues, settings_sentence
-from busplan.answers.plan_options import option_margin, options_table
-from busplan.answers.verdict import reset_sentence, warning_sentences
+from busplan.answers.plan_options import options_table
+from busplan.answers.verdict import margin_parts, reset_sentence, warning_sentences
 from busplan.buses.figure import AXES, NODES
 from busplan.forms.blocks import (
     Block,
@@ -99,8 +99,8 @@ def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
     judged = plan.goal.tolerance.judges_contour
     circle = (" and passes the circle" if judged else ", and its circle is not judged") if with_circle else ""
     number = plan.options.index(option)
-    margin, doubt = option_margin(option, at=f"/options/{number}")
-    result = (Words("fits", "passes"), " with a margin of ", margin, " +/- ", doubt, f"{circle}.")
+    margin = margin_parts(option.deciding, at=f"/options/{number}")
+    result = (Words("fits", "passes"), " with a margin of ", *margin, f"{circle}.")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = (

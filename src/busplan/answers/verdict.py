@@ -206,7 +206,7 @@ def _margin(figures: CapacityFigures, *, at: str) -> Sentence:
         bias = _figure(BIAS, figures, at=at)
         return sentence("Margin {} +/- {} of {}, less a bias of {}.", margin, uncertainty, of, bias)
     unknown = "how far the bus is from this timing model is not known, so no bias"
-    if figures.uncertainty_us:
+    if figures.uncertainty_us is not None:
         return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
     return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)
 
@@ -345,10 +345,22 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
         carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
         return Sentence((*way, *carried, untested, "."))
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
-    margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
-    either_way = (" +/- ", doubt) if change.figures.uncertainty_us else ()
-    return Sentence((*way, margin, *either_way, untested, "."))
+    return Sentence((*way, *margin_parts(change.figures, at=at), untested, "."))
+
+
+def margin_parts(figures: CapacityFigures, *, at: str = "") -> tuple[Part, ...]:
+    """A corrected margin with its uncertainty, as far as that is known.
+
+    Parameters
+    ----------
+    figures
+        Figures under the timing model that decides.
+    at
+        JSON pointer to them.
+    """
+    margin, doubt = (_figure(one, figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
 def period_must_change(profile: Profile) -> str:

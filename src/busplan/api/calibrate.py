@@ -70,7 +70,7 @@ class CalibrateAnswer(Answer):
 
     @property
     def outliers(self) -> tuple[Outlier, ...]:
-        """Measurements that the others contradict, by line: of rows in memory the number of the row, from 1."""
+        """Measurements far from the others, by line: of rows in memory the number of the row, from 1."""
         return self.calibration.outliers
 
     @property

@@ -99,9 +99,9 @@ def compare(
     >>> import busplan
     >>> answer = busplan.compare("paper-4ms", buses=["ieee1394", "can"])
     >>> [(one.figures.verdict, one.safe.axes, round(one.smallest.us)) for one in answer.kinds]
-    [('fits', 52, 552), ('fits', 24, 1219)]
+    [('fits', 52, 552), ('fits', 16, 2126)]
     >>> [one.key for one in answer.on("can").assumed if one.source == "new profile"]
-    ['bus.bit_rate_kbit_s', 'cycle.slice_ratio']
+    ['bus.bit_rate_kbit_s']
     """
     network = load_profile(profile)
     kinds = None

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from busplan.buses.figure import NODES, REQUIRED, TIMING_MODEL, TRANSACTION, Figure
-from busplan.buses.network import Network
+from busplan.buses.network import Group, Network
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.buses.rule import Rule
 from busplan.elementwise import Number, plain
@@ -79,7 +79,7 @@ class Bus(ABC):
     event_kinds: ClassVar[tuple[EventKind, ...]]
     """In the order of the cycle."""
     command_events: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Transaction and kind of the events after which a node has its command, the last of them; without them the whole
+    """Transaction and kind of the events that end with a node's command, the last of them; without them the whole
     cycle."""
     stretch_kinds: ClassVar[tuple[EventKind, ...]] = ()
     """What several events make together."""
@@ -103,6 +103,10 @@ class Bus(ABC):
     """What a change of a key means on the machine, where the key does not say so."""
     reset_changes: ClassVar[Mapping[str, Value]] = {}
     """Keys as they are after a bus reset, until somebody sets them again."""
+    cable_key: ClassVar[str] = ""
+    """Key of the length of a cable [m]: of the bus, or of each node; empty where the kind has none."""
+    host_keys: ClassVar[tuple[str, ...]] = ()
+    """Keys of the host's own time in the cycle: what a comparison assumes of it is no ground to rank a kind."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """What would take a term of its own out of the cycle, each new values by dotted key."""
     change_words: ClassVar[Mapping[str, str]] = {}
@@ -191,8 +195,22 @@ class Bus(ABC):
                 found |= dict.fromkeys(owners, now_us)
         return found or dict.fromkeys(range(1, nodes + 1), now_us)
 
+    def taking_us(self, group: Group, network: Network) -> float:  # noqa: ARG002 - most take commands alike
+        """From a command's arrival at a node of a group to its effect: the slowest execution of a write [us]."""
+        return plain(group.write_execution_us + group.worst_extra_us)
+
+    def sampled_us(self, cycle: BusCycle) -> float:  # noqa: ARG002 - most sample when the cycle starts
+        """When nodes sample what a loop on the host rests on, from the start of the cycle that carries it [us].
+
+        Parameters
+        ----------
+        cycle
+            A cycle of plain numbers.
+        """
+        return 0.0
+
     def loop_periods(self, network: Network, *, at_sync: bool) -> int:  # noqa: ARG002 - most read and write in a cycle
-        """Whole periods inside a loop on the host, from a sample to its command [1].
+        """Whole periods inside a loop on the host, from the cycle of a sample to that of its command [1].
 
         Parameters
         ----------
@@ -211,7 +229,8 @@ class Bus(ABC):
     def shortest_period_us(self, network: Network, needed_us: Number) -> Number:
         """The shortest period that gives a cycle its time, of those that the bus knows; infinite where none does [us].
 
-        A kind with a limit that a longer period keeps adds what that asks for, where operators alone give it.
+        A kind with a limit that a longer period keeps adds what that asks for, where operators alone give it and the
+        limit has no share of the period.
 
         Parameters
         ----------

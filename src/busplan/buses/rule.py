@@ -181,10 +181,10 @@ def overrun(one: RuleFigures) -> str:
 
 def margin(one: RuleFigures) -> str:
     """Say how large the margin is, as far as it is known."""
-    if one.uncertainty_us is None or one.margin_corrected_us is None:
+    if one.margin_corrected_us is None:
         return f"margin {told_apart(one.margin_us, 0.0)[0]} us under the {one.timing_model} timing"
     value = told_apart(one.margin_corrected_us, 0.0)[0]
+    if one.uncertainty_us is None:
+        return f"margin {value} us, no bias or uncertainty known"
     said = f"{value} +/- {one.uncertainty_us:.1f} us"
-    if one.bias_us is not None:
-        return f"corrected margin {said}"
-    return f"margin {said}, no bias known" if one.uncertainty_us else f"margin {value} us, no bias or uncertainty known"
+    return f"margin {said}, no bias known" if one.bias_us is None else f"corrected margin {said}"

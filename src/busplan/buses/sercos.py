@@ -1,14 +1,48 @@
-"""What SERCOS I, II and III share: how long feedback and a command are on their way."""
+"""What SERCOS I, II and III share: whole words, the master's pipeline, and how long feedback and commands take."""
 
-from collections.abc import Callable
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
 from functools import reduce
+from math import ceil
 from typing import Final, TypeAlias
 
 from busplan.buses.bus import Bus
-from busplan.buses.cycle import BusLatency
+from busplan.buses.cycle import BusCycle, BusLatency
 from busplan.buses.figure import NODES, TIMING_MODEL, TRANSACTION, Figure
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, larger, total
+from busplan.elementwise import Number, larger, plain, rounded_up, total
+from busplan.sourced import Sourced, constants
+
+WORD_BYTES: Final = Sourced(
+    2,
+    unit="bytes",
+    grade="published",
+    source="CoSeMa, CSMD_RND_UP_2; Kollmorgen, sercos IDN set of S300/S700",
+    meaning="step of a device's cyclic data",
+)
+PIPELINE_CYCLES: Final = Sourced(
+    1,
+    unit="1",
+    grade="assumed",
+    source="chosen: the master computes between the feedback of a cycle and the next MDT",
+    meaning="cycles from the AT that bring feedback to the MDT with the commands computed from it",
+)
+
+CONSTANTS: Final = constants(globals())
+MOST_PIPELINE: Final = 1000
+"""Most cycles of a pipeline that a profile takes."""
+
+
+def word_bytes(payload_bytes: Number) -> Number:
+    """Cyclic data of a device in whole words [bytes].
+
+    Examples
+    --------
+    >>> word_bytes(5), word_bytes(6)
+    (6.0, 6.0)
+    """
+    return rounded_up(payload_bytes / WORD_BYTES) * WORD_BYTES
+
 
 _CYCLE: Final = "cycle"
 DELAYS: Final = (
@@ -26,9 +60,7 @@ DELAYS: Final = (
 )
 """In the order in which they add up."""
 Sent: TypeAlias = tuple[Number, Number]
-WHOLE_PERIOD: Final = (
-    "1            # assumed: the host computes in the next cycle with what it has received in this one"
-)
+WHOLE_PERIOD: Final = "1            # assumed: the master computes beside the telegrams, within bus.pipeline_cycles"
 MEASURE: Final = "it runs beside the telegrams; take it from the drives' data, S-0-0005 (SERCOS III: S-0-1005)"
 BASE: Final = "from a sample to the telegram that carries it, and from a command to its effect"
 """What a new profile says of the slice and of the execution times."""
@@ -48,12 +80,21 @@ def delays(network: Network, *, feedback_us: Sent, command_us: Sent, ring_us: Nu
         Delay of the ring [us].
     """
     return (
-        _delay("feedback", _slowest(network, lambda one: one.read_execution_us), *feedback_us, ring_us),
-        _delay("command", _slowest(network, lambda one: one.write_execution_us), *command_us, ring_us),
+        _delay("feedback", slowest_us(network, lambda one: one.read_execution_us), *feedback_us, ring_us),
+        _delay("command", slowest_us(network, lambda one: one.write_execution_us), *command_us, ring_us),
     )
 
 
-def _slowest(network: Network, execution_us: Callable[[Group], Number]) -> Number:
+def slowest_us(network: Network, execution_us: Callable[[Group], Number]) -> Number:
+    """The slowest execution of any node [us].
+
+    Parameters
+    ----------
+    network
+        The network.
+    execution_us
+        From a group to the execution time of its nodes [us].
+    """
     return reduce(larger, (execution_us(one) + one.worst_extra_us for one in network.groups))
 
 
@@ -61,6 +102,15 @@ def _delay(name: str, *parts_us: Number) -> BusLatency:
     *parts, whole = DELAYS
     phases = dict(zip((one.key for one in parts), parts_us, strict=True))
     return BusLatency(name, None, {**phases, whole.key: total(parts_us)})
+
+
+class SercosCycle(BusCycle):
+    """A cycle of SERCOS."""
+
+    @property
+    @abstractmethod
+    def feedback_due_us(self) -> Number:
+        """When all nodes must have their feedback ready, from the start of the cycle [us]."""
 
 
 class SercosBus(Bus):
@@ -82,3 +132,25 @@ class SercosBus(Bus):
     def latency_has_execution(self, network: Network) -> bool:  # noqa: ARG002 - always
         """The nodes' time is in every latency."""
         return True
+
+    def arrivals_us(self, cycle: BusCycle) -> Mapping[int, float]:
+        """When the last byte of the MDT has passed the ring: all nodes have their commands then [us]."""
+        _, command = cycle.latencies()
+        phases = {key: plain(us) for key, us in command.phases.items()}
+        arrived_us = phases["delay_us"] - phases["node_us"]
+        return dict.fromkeys(range(1, int(plain(cycle.network.nodes)) + 1), arrived_us)
+
+    def sampled_us(self, cycle: BusCycle) -> float:
+        """All nodes sample at once, early enough for the slowest of them [us]."""
+        assert isinstance(cycle, SercosCycle)  # noqa: S101 - for mypy: both kinds have one
+        return plain(cycle.feedback_due_us) - plain(slowest_us(cycle.network, lambda one: one.read_execution_us))
+
+    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
+        """The master's pipeline; and where drives act at their next sample, the cycles until a command is executed."""
+        pipeline = int(network.profile.bus.pipeline_cycles)
+        if not at_sync:
+            return pipeline
+        cycle = self.cycle(network, model=self.deciding_model)
+        _, command = cycle.latencies()
+        late_us = plain(command.phases["delay_us"]) - self.sampled_us(cycle)
+        return pipeline + ceil(late_us / plain(network.period_us))

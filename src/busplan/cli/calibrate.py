@@ -73,7 +73,8 @@ def calibrate_command(
         bool,
         typer.Option(
             "--keep-outliers",
-            help="Fit the outliers, too, with the grade assumed. They are left out otherwise, each named by its line.",
+            help="Fit the outliers, too, with the grade assumed. Otherwise the slow ones are in worst_extra_us, and "
+            "the fast ones left out, each named by its line.",
         ),
     ] = False,
     changes: KeyChanges = NO_CHANGES,
@@ -98,8 +99,8 @@ def calibrate_command(
     T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
     where the bench was not as the profile; --apply does not write these two. With a column request_and_acknowledge_us,
     the measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements
-    that the others contradict are named by their line and left out of the fit, in every form. Times are in us. A
-    report: it exits 0 whatever the figures are.
+    far from the others are named by their line and are not in the fit: slow ones are in worst_extra_us, and the others
+    contradict fast ones. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
     """

@@ -1,17 +1,17 @@
 """A profile as one of another kind of bus: the same machine, on a bus as a new profile of that kind has it.
 
-The machine is what profiles of every kind say: nodes, axes, payloads, execution times, the period, the servo and the
-circle. What only its own kind has is left out, and what the other kind needs is assumed.
+The machine is what profiles of every kind say: nodes, axes, payloads, execution times, the period, the share of it that
+is for communication, the servo and the circle; and its cables, by whatever key. What only its own kind has is left out,
+and what the other kind needs is assumed.
 """
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from pydantic import BaseModel
 
 from busplan.buses import kind_named
-from busplan.buses.parts import Starter
 from busplan.profile.document import TomlTable
 from busplan.profile.keys import dotted_keys, flat, named_tables
 from busplan.profile.kinds import models_of
@@ -19,8 +19,6 @@ from busplan.profile.toml import profile_of
 from busplan.sections.profile import Profile
 
 _KIND, _NODES, _SHOWN_FIRST = "kind", "nodes", "timing_model"
-_RATIO: Final = "slice_ratio"
-"""The share that a kind of bus needs for communication is a matter of the kind, though all have the key."""
 
 
 class AssumedKey(NamedTuple):
@@ -70,14 +68,37 @@ def converted(profile: Profile, kind: str) -> Conversion:
         return Conversion(profile, (), ())
     data = profile.model_dump(exclude_unset=True)
     machine, left_out = _common(data)
+    # The host keeps its share of the period, whatever each kind has by default.
+    machine["cycle"]["slice_ratio"] = profile.cycle.slice_ratio
+    bus = kind_named(kind)
+    new = tomllib.loads(bus.starter.section())
+    cables_m = _cables_m(profile)
+    if cables_m and bus.cable_key:
+        left_out = tuple(one for one in left_out if one not in cables_m)
+        section, _, name = bus.cable_key.partition(".")
+        for table in [machine["bus"]] if section == "bus" else [machine.get("node"), *machine.get("group", ())]:
+            if table is not None:
+                table[name] = max(cables_m.values())
     for nodes in (machine.get("node"), *machine.get("group", ())):
         if nodes and "execution" in nodes:
             # Whoever measured it did so on the other bus.
             nodes["execution"]["grade"] = "assumed"
-    new = _new_bus(kind_named(kind).starter)
     found = profile_of(_merged(machine, new))
     given = [AssumedKey(key, value, "new profile") for key, value in flat(new) if key != f"bus.{_KIND}"]
     return Conversion(found, (*given, *_defaults(found)), left_out)
+
+
+def _cables_m(profile: Profile) -> dict[str, float]:
+    """Lengths of cables that a profile says, by key [m]; a cable of no length says nothing."""
+    section, _, name = kind_named(profile.bus.kind).cable_key.partition(".")
+    tables = [(f"bus.{name}", profile.bus)] if section == "bus" else []
+    if section == "node":
+        tables = [(one.node_key(name), one.node) for one in profile.alike_nodes]
+    return {
+        key: float(getattr(table, name))
+        for key, table in tables
+        if name in table.model_fields_set and getattr(table, name)
+    }
 
 
 def _common(data: TomlTable) -> tuple[TomlTable, tuple[str, ...]]:
@@ -106,13 +127,6 @@ def _part(table: Mapping[str, Any], models: Sequence[type[BaseModel]], prefix: s
         else:
             found[name] = value
     return found
-
-
-def _new_bus(starter: Starter) -> TomlTable:
-    """The sections of a new profile that are a matter of its kind."""
-    found = tomllib.loads(starter.section())
-    ratio = tomllib.loads(f"{_RATIO} = {starter.slice_ratio}")
-    return {**found, "cycle": {**found.get("cycle", {}), **ratio}}
 
 
 def _merged(machine: TomlTable, new: TomlTable) -> TomlTable:

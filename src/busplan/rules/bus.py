@@ -7,9 +7,11 @@ from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_
 from busplan.analysis.capacity.cycle import TIME, fits_in
 from busplan.analysis.derivation.inputs import given
 from busplan.analysis.network import bus_of, network_of
+from busplan.buses.node_time import NODE, busy_words, slow_groups
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
 from busplan.elementwise import plain
 from busplan.sections.base import value_at
+from busplan.sections.execution import TableExecution
 from busplan.sourced import Sourced
 
 
@@ -85,6 +87,18 @@ def _room(subject: RuleSubject, counts: Any) -> Mending:
     """How to make room for more nodes."""
     limit = bus_of(subject.profile).limit(counts.safe_limited_by)
     return subject.cure() if limit is None or limit.is_safety else Mending(limit.way_out)
+
+
+def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """A node is not done once a cycle, where the bus does not wait for it."""
+    one, network = subject.deciding, network_of(subject.profile)
+    is_broken = NODE in one.exceeded
+    if is_broken or NODE in (one.not_shown or ()):
+        for group in slow_groups(network):
+            words = busy_words(group, network)
+            name = "time_us" if isinstance(group.node.execution, TableExecution) else "base_us"
+            said = words if is_broken else f"not shown: {words}"
+            yield RuleProblem(group.key(f"execution.{name}"), said, *subject.cure())
 
 
 _MUCH: Final = Sourced(
@@ -172,6 +186,16 @@ RULES: Final = (
         "fewer axes to spare than limits.min_spare_axes",
         "[limits] min_spare_axes asks that so many more axes are shown to fit the same period.",
         too_few_spare_axes,
+    ),
+    Rule(
+        "BP115",
+        "node-too-slow",
+        "error",
+        "a node is not done once a cycle",
+        "Where nodes execute beside the telegrams, no cycle waits for them. But each has a read and a write in every "
+        "period: both execution times, with execution.worst_extra_us of each and their uncertainty, must fit into "
+        "cycle.period_us.",
+        node_too_slow,
     ),
     Rule(
         "BP112",

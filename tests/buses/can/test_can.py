@@ -255,9 +255,10 @@ def test_the_circle_has_its_set_points_from_sync() -> None:
     at_sync, on_arrival = (
         loop_delays_us(override(host, {"servo.update": update})) for update in ("next_sync", "on_arrival")
     )
-    # The first and the last command arrive behind SYNC, the wait for feedback and nine, or sixteen, frames.
+    # The first and the last command arrive behind SYNC, the wait for feedback and nine, or sixteen, frames; each is
+    # executed then.
     assert at_sync == (4000, 4000)
-    assert on_arrival == (55 + 200 + 9 * 135, 55 + 200 + 16 * 135)
+    assert on_arrival == (55 + 200 + 9 * 135 + 200, 55 + 200 + 16 * 135 + 200)
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,10 @@ class Case(NamedTuple):
     """Whether each node is as far away as the farthest."""
     own: bool = False
     """Whether the closed form charges each node its own hops."""
+    root: str | None = None
+    """Which root the closed form is told."""
+    root_hops: int | None = None
+    """Where the root lies, in hops from the host; None for arbitration over a packet's own way."""
 
     @property
     def hops(self) -> int:
@@ -78,6 +82,7 @@ class Case(NamedTuple):
             "nodes": 1,
             "max_hops": self.max_hops,
             "charge_hops": "own" if self.own else "farthest",
+            "root": self.root,
             "cable_length_m": self.cable_length_m,
             "cycle_master": self.first_start_us is not None,
             "isochronous_us": self.isochronous_us,
@@ -130,6 +135,7 @@ class Case(NamedTuple):
             first_start_us=self.first_start_us,
             start_waits=self.start_waits,
             isochronous_us=self.isochronous_us,
+            root_hops=self.root_hops,
         )
         starts_us: Sequence[float] = BUS.simulate(scene, execution, cycles=cycles).starts_us
         return starts_us
@@ -183,6 +189,9 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
     # Beyond its bound an execution is the bound itself.
     executions_us = st.just(1000.0) | times_us
     max_hops, farthest = draw(st.none() | st.integers(1, 16)), draw(st.booleans())
+    # The host is the root, and the closed form may know it; or another node is, anywhere, and it does not.
+    root_hops = draw(st.none() | st.integers(0, nodes if max_hops is None else max_hops))
+    root = None if root_hops else draw(st.sampled_from(("host", None)))
     return Case(
         tuple(one_group(number) for number in (first, second) if number),
         speed=speed,
@@ -201,6 +210,8 @@ def cases(draw: st.DrawFn, *, alone: bool) -> Case:
         start_waits=draw(st.booleans()),
         farthest=farthest,
         own=max_hops is None and not farthest and draw(st.booleans()),
+        root=root,
+        root_hops=root_hops,
     )
 
 
@@ -239,9 +250,12 @@ EXACT = {
     "with priority": Case((group(3, read_us=5.0),), priority=True),
     "read and write differ": Case((group(3, read_us=5.0, write_us=50.0, size=100),)),
     "two sorts of nodes": Case((group(3, read_us=5.0, size=4), group(2, read_us=70.0, size=200))),
-    "own hops": Case((group(3, read_us=50.0),), farthest=False, own=True),
+    "own hops": Case((group(3, read_us=50.0),), farthest=False, own=True, root="host"),
     "own hops of two sorts": Case(
-        (group(3, read_us=5.0, size=4), group(2, read_us=70.0, size=200)), farthest=False, own=True
+        (group(3, read_us=5.0, size=4), group(2, read_us=70.0, size=200)), farthest=False, own=True, root="host"
+    ),
+    "own hops, and a root at the other end": Case(
+        (group(3),), read="concatenated", write="unified", farthest=False, own=True, root_hops=3
     ),
     "concatenated reads": Case((group(3, read_us=50.0),), read="concatenated", response_us=1.0),
     "unified writes": Case((group(3, read_us=50.0),), write="unified"),
@@ -261,6 +275,13 @@ def test_the_closed_form_is_what_the_bus_takes_at_its_slowest(name: str) -> None
     first_us = case.starts_us(cycles=1)[1]
     # 0.0001 us: a node or a host is that much faster than the arbitration reset gap, up to six times.
     assert 0 <= case.required_us - first_us + ROUNDING_US < 6 * 0.0001
+
+
+def test_own_hops_to_a_root_that_is_not_the_host_would_be_too_few() -> None:
+    case = EXACT["own hops, and a root at the other end"]
+    hop_us = 0.023 + 14 / 98.304
+    # Six requests of the host arbitrate over three hops: 1, 2 and 3 of them are the nodes' own, twice.
+    assert case.required_us - case._replace(root="host").required_us == pytest.approx(2 * (2 + 1) * hop_us)
 
 
 @pytest.mark.parametrize("start_waits", [False, True])

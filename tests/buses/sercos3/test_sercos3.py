@@ -25,7 +25,7 @@ DATA: dict[str, Any] = {
 MDT_US = (12 + 40 * (6 + 2 + 6) + 32 + 25) * 0.08
 AT_US = (8 + 40 * (6 + 2 + 10) + 32 + 25) * 0.08
 JITTER_US = (1 + 25 * 0.08) / 2
-RING_US = 2 * 40 * 0.9 + 1
+RING_US = 2 * 40 * 0.9 + 1 + 1.8
 HEADER_US, MASTER_US, CHANNELS_US = 28 * 0.08, 2.56, 32 * 0.4
 
 
@@ -51,19 +51,73 @@ def terms(one: Profile, model: str = "window") -> dict[str, float]:
 )
 def test_its_window_is_that_by_hand(method: str, jitter_us: float, master_us: float, ring_us: float) -> None:
     found = terms(profile(bus__timing_method=method))
-    expected = {"mdt": MDT_US, "at": AT_US, "jitter": jitter_us, "master": master_us, "ring": ring_us}
+    expected = {"mdt": MDT_US, "wait": 0, "at": AT_US, "jitter": jitter_us, "master": master_us, "ring": ring_us}
     assert found == pytest.approx({**expected, "nonperiodic": 125.0})
     alone = terms(profile(bus__timing_method=method), "telegrams")
-    assert alone == pytest.approx({"mdt": MDT_US, "at": AT_US, "jitter": 0, "master": 0, "ring": 0, "nonperiodic": 125})
+    idle = dict.fromkeys(("wait", "jitter", "master", "ring"), 0)
+    assert alone == pytest.approx({"mdt": MDT_US, "at": AT_US, "nonperiodic": 125, **idle})
 
 
-def test_the_first_method_is_what_the_library_asks() -> None:
-    # CoSeMa: t6 = (MDT + J) + J + AT, t7 = T - (J + header + master), and t6 + UCC <= t7.
-    period_us, ucc_us = 500.0, 125.0
-    t6_us = MDT_US + JITTER_US + JITTER_US + AT_US
-    t7_us = period_us - (JITTER_US + HEADER_US + MASTER_US)
-    (found,) = busplan.capacity(profile(), timing_model=["window"]).results
-    assert found.margin_us == pytest.approx(t7_us - ucc_us - t6_us)
+def library_margin_us(method: str, *, devices: int, least_us: float, ucc_us: float) -> float:
+    """What CoSeMa's own check leaves of a period of 500 us: t7 less t6 and the channel, or t1max less a later t1."""
+    mdt_us, at_us = ((own + devices * (8 + size) + 32 + 25) * 0.08 for own, size in ((12, 6), (8, 10)))
+    ring_us = 2 * devices * 0.9 + 25 * 0.08 / 2 + 1.8
+    behind_us = max(JITTER_US + MASTER_US, min(devices, 32) * 0.4)
+    t1_max_us = 500 - (at_us + behind_us + ring_us)
+    if method == "mdt-at-ucc":
+        t6_us = max(mdt_us + JITTER_US, least_us) + JITTER_US + at_us
+        return 500 - (JITTER_US + HEADER_US + MASTER_US) - ucc_us - t6_us
+    t6_us = mdt_us - HEADER_US + (JITTER_US if method == "mdt-ucc-at" else 0)
+    t7_us = t1_max_us - (JITTER_US + HEADER_US)
+    return min(t7_us - t6_us - ucc_us, t1_max_us - least_us)
+
+
+@pytest.mark.parametrize("method", ["mdt-at-ucc", "mdt-ucc-at", "at-last"])
+@pytest.mark.parametrize("least_us", [0.0, 40.0, 100.0, 230.0])
+@pytest.mark.parametrize(("devices", "ucc_us"), [(3, 125.0), (40, 125.0), (40, 0.0)])
+def test_each_method_is_what_the_library_asks(method: str, least_us: float, devices: int, ucc_us: float) -> None:
+    changes: dict[str, Any] = {"bus__timing_method": method, "bus__nodes": devices, "bus__at_start_us": least_us}
+    one = profile(**changes, cycle__nonperiodic_us=ucc_us)
+    (found,) = busplan.capacity(one, timing_model=["window"]).results
+    expected_us = library_margin_us(method, devices=devices, least_us=least_us, ucc_us=ucc_us)
+    assert found.margin_us == pytest.approx(expected_us)
+    events = busplan.timeline(one, timing_model="window").cycle_events
+    assert sum(event.duration_us for event in events if event.term) == pytest.approx(found.required_us)
+
+
+def test_a_least_time_that_nobody_has_said_is_not_in_it() -> None:
+    def left_out(**changes: Any) -> list[str]:
+        cycle = kind_named("sercos3").cycle(network_of(profile(**changes)), model="window")
+        return [one.key for one in cycle.left_out()]
+
+    assert left_out() == ["bus.at_start_us"]
+    assert left_out(bus__at_start_us=0.0) == []
+
+
+@pytest.mark.parametrize("method", ["mdt-at-ucc", "mdt-ucc-at", "at-last"])
+def test_its_uncertainty_is_that_of_the_published_ranges(method: str) -> None:
+    # Three devices: the service channels of more hide the jitter in the master's own time.
+    one = profile(bus__timing_method=method, bus__nodes=3)
+
+    def required_us(key: str, value: float) -> float:
+        (found,) = busplan.capacity(override(one, {key: value}), timing_model=["window"]).results
+        return float(found.required_us)
+
+    def swing_us(key: str, value: float, share: float) -> float:
+        # What the ends of a range of this width about the value change; a rectangular one (JCGM 100, 4.3.7).
+        steps = (round(value * (1 - share)), round(value * (1 + share))) if key == "bus.gap_bytes" else None
+        low, high = steps or (value * (1 - share), value * (1 + share))
+        return (required_us(key, high) - required_us(key, low)) / (high - low) * value
+
+    parts_us = (
+        swing_us("bus.gap_bytes", 25, 0.4) * 25 / 37 / 12**0.5,
+        swing_us("bus.master_jitter_us", 1.0, 0.1) / 12**0.5,
+        swing_us("bus.device_delay_us", 0.9, 0.1) * 0.4 / 0.9 / 12**0.5,
+    )
+    (found,) = busplan.capacity(one, timing_model=["window"]).results
+    assert found.uncertainty_us == pytest.approx(2 * sum(us**2 for us in parts_us) ** 0.5)
+    (measured,) = busplan.capacity(override(one, {"bus.ring_grade": "measured"}), timing_model=["window"]).results
+    assert (measured.uncertainty_us, measured.bias_us) == (None, None)
 
 
 def test_few_service_channels_are_through_before_the_master_begins() -> None:
@@ -82,8 +136,9 @@ def test_connection_control_comes_with_v1_1_and_hot_plug_fields_in_all_telegrams
         ({}, ()),
         ({"cycle.period_us": 300.0}, ("period",)),
         ({"cycle.period_us": 125.0}, ("time",)),
-        ({"payload.read_bytes": 1494}, ("telegrams", "time")),
-        ({"payload.read_bytes": 1495}, ("payload", "telegrams", "time")),
+        ({"payload.read_bytes": 1494}, ("node", "telegrams", "time")),
+        ({"payload.read_bytes": 1493}, ("node", "telegrams", "time")),
+        ({"payload.read_bytes": 1495}, ("node", "payload", "telegrams", "time")),
         ({"bus.nodes": 512, "cycle.period_us": 2000.0}, ("nodes", "telegrams")),
     ],
 )
@@ -115,10 +170,33 @@ def test_a_slow_master_delays_its_commands_and_a_quick_one_never_hurries_them() 
     assert before_us(0.0) == 0.0
 
 
-def test_a_command_has_come_with_the_last_mdt() -> None:
-    host = override(load("sercos3-servo-8").profile, {"servo.loop": "host", "servo.update": "on_arrival"})
-    mdt_us = terms(host)["mdt"]
-    assert loop_delays_us(host) == pytest.approx((mdt_us, mdt_us))
+def delay_us(update: str, **changes: Any) -> float:
+    """Delay of a loop on the host of the shipped profile at 1 ms, of both axes alike."""
+    own = {"servo.loop": "host", "servo.update": update, "cycle.period_us": 1000.0, "cycle.nonperiodic_us": 0}
+    one = override(
+        load("sercos3-servo-8").profile, {**own, **{key.replace("__", "."): to for key, to in changes.items()}}
+    )
+    x_us, y_us = loop_delays_us(one)
+    assert x_us == y_us
+    return x_us
+
+
+def test_a_loop_on_the_host_rests_on_the_feedback_of_the_cycle_before() -> None:
+    mdt_us, at_us, ring_us = 20.72, 20.24, 2 * 8 * 0.9 + 37 * 0.08 / 2 + 1.8
+    jitter_us = (1 + 37 * 0.08) / 2
+    # Sampled 60 us before the AT, which follow the MDT; executed 60 us behind the next one.
+    effect_us = 2.56 - HEADER_US + mdt_us + ring_us + 60
+    sampled_us = 2.56 - HEADER_US + mdt_us + jitter_us - 60
+    assert delay_us("on_arrival") == pytest.approx(1000 + effect_us - sampled_us)
+    assert delay_us("next_sync") == 2000
+    assert delay_us("on_arrival", bus__pipeline_cycles=2) == pytest.approx(2000 + effect_us - sampled_us)
+    assert delay_us("next_sync", bus__pipeline_cycles=2) == 3000
+    # By the last method the AT end with the cycle, and the next MDT follows: one period is enough.
+    last_us = 1000 - at_us - ring_us - max(2.56, 8 * 0.4 - jitter_us) - jitter_us - 60
+    assert delay_us("on_arrival", bus__timing_method="at-last") == pytest.approx(1000 + effect_us - last_us)
+    assert delay_us("next_sync", bus__timing_method="at-last") == 1000
+    # A node that is slower than a period acts a cycle later.
+    assert delay_us("next_sync", node__execution__base_us=600) == 3000
 
 
 def test_the_order_of_the_cycle_is_that_of_the_method() -> None:

@@ -36,7 +36,10 @@ class Written(NamedTuple):
 
 
 def written(data: Sequence[int], *, is_mdt: bool, version: str, hot_plug: str, gap: int) -> Written:
-    """Write each telegram byte by byte: what is in it first, then the Ethernet frame around it."""
+    """Write each telegram byte by byte: what is in it first, then the Ethernet frame around it.
+
+    A device's data are whole words, as CoSeMa takes the length of a connection (CSMD_RND_UP_2).
+    """
     hot_plug_field = bytes(8)
     first = bytearray(hot_plug_field)
     if is_mdt:
@@ -53,7 +56,7 @@ def written(data: Sequence[int], *, is_mdt: bool, version: str, hot_plug: str, g
     for _ in data:
         put(b"DV")
     for size in data:
-        put((b"CC" if version == "V1.1" else b"") + bytes(size))
+        put((b"CC" if version == "V1.1" else b"") + bytes(size) + bytes(size % 2))
     wire = bytearray()
     for one in fields:
         wire += b"\x55" * 7 + b"\xd5" + bytes(6 + 6) + b"\x88\xcd" + bytes(6)

@@ -2,6 +2,7 @@
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
+from math import ceil
 from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
@@ -24,6 +25,8 @@ from busplan.sections.profile import Profile
 Way = Literal["timing-model", "measured-halves"]
 """Source of the two halves that are subtracted from a latency."""
 
+_PICOSECOND: Final = 1e-3
+"""A picosecond in nanoseconds: what rounding adds is no nanosecond."""
 _EXACT_DECIMALS: Final = 6
 """A picosecond: smaller residuals are rounding of the subtraction."""
 
@@ -44,7 +47,10 @@ class Residual(NamedTuple):
 
 
 class Outlier(NamedTuple):
-    """One measurement that the others contradict, compared with them and with the fit."""
+    """One measurement far from the others, compared with them and with the fit.
+
+    Above them it is a slow execution, which belongs to `worst_extra_us`; below, the others contradict it.
+    """
 
     line: int
     transaction: str
@@ -113,11 +119,11 @@ class Calibration(NamedTuple):
     largest: Residual
     """The measurement farthest from the fit."""
     outliers: tuple[Outlier, ...]
-    """Measurements farther from the others than chance explains."""
+    """Measurements far from the others, slow or fast."""
     outliers_kept: bool
     """Whether the outliers are in the fit, because that was asked for."""
-    undecided: tuple[tuple[Residual, Residual], ...]
-    """Pairs of one payload that contradict each other, and nothing says which is right; both are in the fit."""
+    worst_extra_us: float | None
+    """What the slowest execution takes beyond the fit; None where no measurement outside the fit is slow."""
     unchecked_bytes: tuple[int, ...]
     """Payloads with too few measurements to tell an outlier."""
     uncertainty_us: float | None
@@ -168,10 +174,10 @@ def calibrate(
         of the slopes between any two payloads, its base the median of the remainders. The line has no tuning constant
         and tolerates about 29 % of wrong payloads.
     keep_outliers
-        If True, outliers are in the fit, too; by default they are left out of it, in every form.
+        If True, outliers are in the fit, too; by default they are left out of it, in every form: the slow ones are what
+        the slowest execution takes more, and the others contradict the fast ones.
     grade
-        How the execution time is known. It is "assumed" where the fit holds an outlier, or a pair that contradict each
-        other: no measurement confirms such a time.
+        How the execution time is known. It is "assumed" where the fit holds an outlier: no measurement confirms it.
 
     Returns
     -------
@@ -207,10 +213,11 @@ def calibrate(
     for one, packets_us in (raw[place] for place in kept):
         groups[one.payload_bytes].append(one.latency_us - packets_us)
     chosen = form or nodes.node.execution.kind
-    doubtful = screening.undecided or (keep_outliers and screening.expected_us)
+    doubtful = keep_outliers and screening.expected_us
     fit = fit_execution(groups, chosen, robust=robust, grade="assumed" if doubtful else grade, source=source)
     compared = _compared(raw, fit)
     residuals = tuple(_residual(compared[place]) for place in kept)
+    outliers = _outliers(compared, screening)
     return Calibration(
         profile=profile,
         nodes=nodes,
@@ -223,9 +230,9 @@ def calibrate(
         payloads=tuple(_payload_fits(compared, halves, left_out=left_out, robust=robust)),
         rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
         largest=max(residuals, key=lambda one: abs(one.residual_us)),
-        outliers=_outliers(compared, screening),
+        outliers=outliers,
         outliers_kept=keep_outliers,
-        undecided=tuple((_residual(compared[one]), _residual(compared[two])) for one, two in screening.undecided),
+        worst_extra_us=None if keep_outliers else _worst_extra_us(outliers, residuals),
         unchecked_bytes=screening.unchecked_bytes,
         uncertainty_us=_uncertainty_us(residuals, fit, robust=robust),
         fit_keys=bus_of(profile).fit_keys(network_of(profile), model=model if way == "timing-model" else None),
@@ -408,6 +415,15 @@ def _outliers(compared: Sequence[_Compared], screening: Screening) -> tuple[Outl
             )
         )
     return tuple(found)
+
+
+def _worst_extra_us(outliers: Sequence[Outlier], residuals: Sequence[Residual]) -> float | None:
+    """What the slowest of all measurements takes beyond the fit, where some are slow [us]."""
+    slow_us = [one.off_us if one.residual_us is None else one.residual_us for one in outliers if one.off_us > 0]
+    if not slow_us:
+        return None
+    worst_us = max(*slow_us, *(one.residual_us for one in residuals))
+    return ceil(1000 * worst_us - _PICOSECOND) / 1000
 
 
 def _payload_fits(

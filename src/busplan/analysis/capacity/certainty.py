@@ -7,6 +7,7 @@ JCGM 100 (GUM): the combined standard uncertainty of independent inputs (5.1), a
 
 from collections.abc import Mapping
 from functools import reduce
+from math import inf
 from typing import Final, Literal, NamedTuple, Protocol
 
 from busplan.analysis.capacity.cycle import TIME, available_us, fits_in, time_limit
@@ -36,6 +37,13 @@ class Certainty(NamedTuple):
     safe_required_us: Number
     """What the slice must give for the cycle to be shown to fit, with the reserve."""
     doubts: tuple[Doubt, ...]
+
+    @property
+    def known_uncertainty_us(self) -> Number:
+        """U; infinite, for it is not known, where neither a bias nor any doubt is."""
+        return (
+            choose(self.uncertainty_us > 0, self.uncertainty_us, inf) if self.bias_us is None else self.uncertainty_us
+        )
 
 
 def certainty(cycle: BusCycle) -> Certainty:

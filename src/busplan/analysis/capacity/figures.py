@@ -83,6 +83,7 @@ class CapacityFigures(NamedTuple):
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
     uncertainty_us: float | None
+    """None also where nothing is known of it."""
     safe_required_us: float | None
     safe_nodes: int | None
     safe_axes: int | None
@@ -260,7 +261,7 @@ def certainty_numbers(found: Certainty, cycle: BusCycle) -> dict[str, Number | N
     return {
         "bias_us": found.bias_us,
         "margin_corrected_us": found.margin_corrected_us,
-        "uncertainty_us": found.uncertainty_us,
+        "uncertainty_us": found.known_uncertainty_us,
         "safe_required_us": found.safe_required_us,
         "safe_min_period_us": shortest_us(cycle.network, found.safe_required_us, is_shown=True),
     }

@@ -10,7 +10,7 @@ from busplan.analysis.capacity.perturbations import Perturbed, perturbed
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
-from busplan.elementwise import plain
+from busplan.elementwise import existing, plain
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -19,7 +19,8 @@ class Standing(NamedTuple):
     """Where a network stands under the timing model that decides."""
 
     margin_corrected_us: float
-    uncertainty_us: float
+    uncertainty_us: float | None
+    """None where nothing is known of it."""
     verdict: VerdictWord
     safe: bool
     """Whether the bus is set so that it works reliably."""
@@ -97,7 +98,7 @@ def standing(network: Network) -> Standing:
     late = not fits_in(cycle.required_us, available_us=available_us(network))
     return Standing(
         margin_corrected_us=plain(found.margin_corrected_us),
-        uncertainty_us=plain(found.uncertainty_us),
+        uncertainty_us=existing(found.known_uncertainty_us),
         verdict=VERDICTS[int(verdict_code(codes))],
         safe=bus.is_safe(network),
         exceeded=(*broken, *((TIME,) if late else ())),

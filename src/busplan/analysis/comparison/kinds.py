@@ -77,6 +77,12 @@ class MachineOnKind(NamedTuple):
     curve: tuple[SafeAxes, ...]
     """The most axes over the period."""
 
+    @property
+    def assumed_host(self) -> tuple[AssumedKey, ...]:
+        """What is assumed of the host's own time: then its figures rank with no kind whose host is known."""
+        keys = kind_named(self.profile.bus.kind).host_keys
+        return tuple(one for one in self.assumed if one.key in keys)
+
 
 class NotOnKind(NamedTuple):
     """A kind of bus that cannot have the machine."""

@@ -1,6 +1,7 @@
 """A cell of a map: the verdict at one setting, and what limits it."""
 
 from collections.abc import Mapping
+from math import isnan
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, NOT_SHOWN, VerdictWord
@@ -42,7 +43,8 @@ class Cell(NamedTuple):
     """The largest term of the cycle."""
     verdict: VerdictWord
     margin_corrected_us: float
-    uncertainty_us: float
+    uncertainty_us: float | None
+    """None where nothing is known of it."""
     is_safe: bool
     circle_passed: bool | None = None
     """None where no circle was run, or no tolerance judges it."""
@@ -94,7 +96,7 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
         binding_term=figures["binding_term"],
         verdict=verdict,
         margin_corrected_us=figures["margin_corrected_us"],
-        uncertainty_us=figures["uncertainty_us"],
+        uncertainty_us=None if isnan(figures["uncertainty_us"]) else figures["uncertainty_us"],
         is_safe=not unsafe,
     )
 

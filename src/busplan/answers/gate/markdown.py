@@ -37,8 +37,9 @@ def _lines(report: CheckReport) -> Iterator[str]:
 def _profile(file: FileResult) -> list[str]:
     fit = file.fit or Fit(None, None, None)
     margin = MISSING
-    if fit.margin_corrected_us is not None and fit.uncertainty_us is not None:
-        margin = f"{told_apart(fit.margin_corrected_us, 0.0)[0]} +/- {fit.uncertainty_us:.1f}"
+    if fit.margin_corrected_us is not None:
+        doubt = "" if fit.uncertainty_us is None else f" +/- {fit.uncertainty_us:.1f}"
+        margin = f"{told_apart(fit.margin_corrected_us, 0.0)[0]}{doubt}"
     return [code(file.path), _result(file), fit.verdict or MISSING, margin]
 
 

@@ -10,6 +10,7 @@ from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.streams import Stream, collisions, load_before, response, streams
 from busplan.buses.can.traffic import Traffic, traffic_of
 from busplan.buses.network import Network
+from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
 from busplan.elementwise import Number, larger, plain, pointwise, total
 from busplan.sections.base import MAX_TIME_US
@@ -170,6 +171,7 @@ def _load_words(network: Network) -> str:
 
 
 LIMITS: Final = (
+    NODE_LIMIT,
     Limit(
         "nodes",
         "{value:.0f} PDOs in one direction are over the {most:.0f} node-IDs of a bus",

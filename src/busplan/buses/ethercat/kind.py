@@ -106,6 +106,8 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     }
     loop_key = "bus.pipeline_cycles"
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second segment"}
+    cable_key = "node.cable_m"
+    host_keys = ("bus.master_us",)
     term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
         {"bus.master_us": 0.0},
         {"bus.master_jitter_us": 0.0},

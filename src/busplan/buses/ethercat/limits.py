@@ -8,6 +8,7 @@ from busplan.buses.ethercat.equations import room_bytes
 from busplan.buses.ethercat.latency import command_doubt_us, last_command_us, sync0_share
 from busplan.buses.ethercat.traffic import datagrams, devices
 from busplan.buses.network import Network
+from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit, share_limit
 from busplan.elementwise import Number, larger, total
 
@@ -40,6 +41,7 @@ SYNC0: Final = share_limit(
 )
 """A command must be in every device before SYNC0."""
 LIMITS: Final = (
+    NODE_LIMIT,
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} addresses of a segment",

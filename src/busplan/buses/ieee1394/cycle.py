@@ -10,6 +10,7 @@ from busplan.buses.figure import AVAILABLE
 from busplan.buses.ieee1394 import doubts, equations
 from busplan.buses.ieee1394.constants import SYNC_PACKET_BYTES
 from busplan.buses.ieee1394.cycle_starts import CycleWithStarts
+from busplan.buses.ieee1394.timing import Delays, Link
 from busplan.buses.ieee1394.transactions import (
     Exchange,
     Ways,
@@ -43,7 +44,8 @@ _SHOWN: Final = (
 class Ieee1394Cycle(CycleWithStarts):
     """The synchronous packet, a read and then a write of every node, and the window for non-periodic data.
 
-    Every node is charged the hops of the farthest, or, with `charge_hops = "own"`, its own. What all nodes hear, as the
+    Every node is charged the hops of the farthest, or, with `charge_hops = "own"`, its own: for its arbitration only
+    where the host is the root. What all nodes hear, as the
     synchronous packet, goes to the farthest.
 
     References
@@ -68,8 +70,14 @@ class Ieee1394Cycle(CycleWithStarts):
         """The transaction of a group by its place, with a node at some hops or, without them, on the mean."""
         network, own = self.network, charges_own_hops(self.network)
         link = self.link._replace(hops=self._ways[place].mean if hops is None else hops) if own else self.link
-        common = self.delays_of(link, self.delays) if own else self.delays
+        common = self._own_delays(link) if own else self.delays
         return exchange(network, network.groups[place], kind, model=self.model, link=link, common=common, suffix=suffix)
+
+    def _own_delays(self, link: Link) -> Delays:
+        """Delays over a node's own way; its arbitration goes to the root, wherever that is."""
+        found = self.delays_of(link, self.delays)
+        is_at_host = self.network.profile.bus.root == "host"
+        return found if is_at_host else found._replace(arbitration_us=self.delays.arbitration_us)
 
     @cached_property
     def sync_us(self) -> Number:

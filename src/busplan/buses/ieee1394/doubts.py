@@ -21,7 +21,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.idle import Gaps, busy_us
 from busplan.buses.ieee1394.table_1 import residual
 from busplan.buses.ieee1394.timing import Link
-from busplan.buses.ieee1394.transactions import PACKET_PARTS, Exchange
+from busplan.buses.ieee1394.transactions import ARBITRATION, PACKET_PARTS, Exchange, arbitration_hops
 from busplan.buses.network import Network
 from busplan.elementwise import Number, alike, choose, is_off, larger, named, total
 
@@ -77,9 +77,7 @@ def of_cycle(
     # One reading is wrong by the same share in all: signs count.
     of_split_us = total(halves * _gap_term_us(_measured_at(node), link.gap_count, "d_split") for node, halves in split)
     gap_term_us = of_split_us + others * _gap_term_us(MAX_GAP_COUNT, link.gap_count, "d")
-    of_packets = total(
-        one.nodes * sum(part.term in PACKET_PARTS for part in one.parts) * one.link.hops for one in exchanges
-    )
+    of_packets = total(one.nodes * _hop_delays(one, network) for one in exchanges)
 
     def swing_us(one: Exchange, execution_us: Number, host_us: Number) -> Number:
         """What one standard uncertainty changes, as the larger of two steps of two: up and down.
@@ -175,6 +173,14 @@ _LABELS: Final = {
     "bus.phy_delay_us": "PHY delay",
     "host.transaction_us": "host time",
 }
+
+
+def _hop_delays(one: Exchange, network: Network) -> Number:
+    """Delays of hops in a transaction: arbitrations over the way to the root, other parts over its own [1]."""
+    packets = [part.term for part in one.parts if part.term in PACKET_PARTS]
+    arbitrations = packets.count(ARBITRATION)
+    hops = (len(packets) - arbitrations) * one.link.hops
+    return hops + arbitrations * arbitration_hops(network, one.link)
 
 
 def _phy_doubt_us(delays: Number, link: Link) -> Number:

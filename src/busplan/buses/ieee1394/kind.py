@@ -1,6 +1,7 @@
 """IEEE 1394 (FireWire) up to S400, as a kind of bus."""
 
 from collections.abc import Mapping, Sequence
+from math import ceil
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from busplan.buses.bus import Bus
@@ -25,7 +26,7 @@ from busplan.buses.ieee1394.limits import LIMITS
 from busplan.buses.ieee1394.settings import gap_count, responses, schedule
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Responder, transaction
 from busplan.buses.ieee1394.transactions import charges_own_hops, farthest_link, gap_count_of, hops_of, is_broadcast
-from busplan.buses.network import Network
+from busplan.buses.network import Group, Network
 from busplan.buses.parts import (
     EventKind,
     Halves,
@@ -138,6 +139,8 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         "node.write_response": "if the nodes can",
     }
     reset_changes: ClassVar[Mapping[str, Value]] = {"bus.gap_count": MAX_GAP_COUNT}
+    cable_key = "bus.cable_length_m"
+    host_keys = ("host.transaction_us",)
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = (
         {"bus.cycle_master": False, "bus.isochronous_us": 0.0},
         {"host.transaction_us": 0.0},
@@ -230,6 +233,20 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """The timing model and the gap count."""
         return {"residual": model or "none", "measured_gap_count": int(gap_count_of(network))}
 
+    def taking_us(self, group: Group, network: Network) -> float:
+        """Nothing behind a split write, which holds the execution; else the node executes beside the bus [us]."""
+        is_split = group.node.write_response == "split" and not is_broadcast(network)
+        return 0.0 if is_split else super().taking_us(group, network)
+
+    def loop_periods(self, network: Network, *, at_sync: bool) -> int:
+        """One, or more where a node has not executed its command when the next synchronous packet comes."""
+        if not at_sync:
+            return 0
+        behind_us = max(self.taking_us(one, network) for one in network.groups)
+        period_us = plain(network.period_us)
+        needed_us = min(plain(self.cycle(network, model=self.deciding_model).required_us), period_us)
+        return max(1, ceil((needed_us + behind_us) / period_us)) if behind_us else 1
+
     def has_execution(self, network: Network) -> bool:
         """Whether a transaction is split: other answers keep the execution off the bus, and so do broadcasts."""
         return not is_broadcast(network) and any(
@@ -267,7 +284,9 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         """Say whose hops each node is charged."""
         if is_broadcast(network):
             return "every packet at the hops of the farthest"
-        return f"every node at {'its own hops' if charges_own_hops(network) else 'the hops of the farthest'}"
+        if not charges_own_hops(network):
+            return "every node at the hops of the farthest"
+        return f"every node at its own hops{'' if network.profile.bus.root == 'host' else ', arbitration at all'}"
 
     def setup_words(self, network: Network) -> tuple[str, ...]:
         """Hops, gap count, and a schedule that is not the individual one."""

@@ -81,6 +81,12 @@ class Ieee1394Bus(BusSection):
         "the hops of its group. A broadcast goes to the farthest",
         examples=["own"],
     )
+    root: Literal["host"] | None = Field(
+        default=None,
+        description='Which node is the root that grants arbitration: "host", or none named. Where none is, with '
+        'charge_hops = "own", arbitration is charged the whole chain',
+        examples=["host"],
+    )
     timing_model: TimingModelName = Field(
         default="standard",
         description="Timing model whose figures lead the tables, paper or standard; the verdict is always by standard",

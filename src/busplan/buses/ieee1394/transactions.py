@@ -68,6 +68,19 @@ def charges_own_hops(network: Network) -> bool:
     return network.profile.bus.charge_hops == "own" and not is_broadcast(network)
 
 
+def arbitration_hops(network: Network, link: Link) -> Number:
+    """Cable hops that the arbitration of a packet is charged: to the root, which may be at the far end of the bus [1].
+
+    Parameters
+    ----------
+    network
+        The network.
+    link
+        The way of the packet.
+    """
+    return link.hops if network.profile.bus.root == "host" else hops_of(network)
+
+
 def is_broadcast(network: Network) -> bool:
     """Whether the nodes broadcast their data, instead of being read one by one."""
     found: bool = network.profile.cycle.schedule == "broadcast"
@@ -210,7 +223,8 @@ def _with_names(phases: Phases, suffix: str) -> Phases:
 
 
 Who = Literal["host", "node"]
-PACKET_PARTS: Final = ("cycle_arbitration_us", "cycle_data_us", "cycle_acknowledge_us")
+ARBITRATION: Final = "cycle_arbitration_us"
+PACKET_PARTS: Final = (ARBITRATION, "cycle_data_us", "cycle_acknowledge_us")
 """Terms whose parts are one packet's way over the hops."""
 
 

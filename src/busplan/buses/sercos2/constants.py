@@ -2,6 +2,7 @@
 
 from typing import Final, Literal
 
+from busplan.buses import sercos
 from busplan.buses.periods import Periods
 from busplan.sourced import Sourced, constants
 
@@ -31,9 +32,6 @@ STUFF_STEP_BITS: Final = Sourced(
 FRAME_BYTES: Final = _bytes(3, "address 1 and check sequence 2 of a telegram")
 MST_BYTES: Final = _bytes(1, "data of the synchronisation telegram")
 RECORD_BYTES: Final = _bytes(4, "status 2 and service 2 of an AT; control 2 and service 2 of a record of the MDT")
-WORD_BYTES: Final = _bytes(
-    2, "step of the data of a drive, for records begin at odd places and the MDT is even", source=_KOLLMORGEN
-)
 MOST_MDT_BYTES: Final = _bytes(65_534, "most data of the MDT", source=_KOLLMORGEN)
 MOST_DRIVE_BYTES: Final = _bytes(
     32, "data of a drive that can be configured in either direction", source="Rexroth, IndraDrive MPx-02"
@@ -65,4 +63,4 @@ PERIODS_SOURCE: Final = (
     "0.5, 1, 2, ... 8 ms (Kollmorgen)"
 )
 
-CONSTANTS: Final = constants(globals())
+CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}

@@ -4,11 +4,11 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Network
-from busplan.buses.sercos import delays
+from busplan.buses.sercos import SercosCycle, delays, word_bytes
 from busplan.buses.sercos2.constants import GAP_SHARE, MST_BYTES, RECORD_BYTES
-from busplan.buses.sercos2.equations import start_us, telegram_us, word_bytes
+from busplan.buses.sercos2.equations import start_us, telegram_us
 from busplan.elementwise import Number, named, plain, total
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
@@ -16,7 +16,7 @@ WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
 
 
-class Sercos2Cycle(BusCycle):
+class Sercos2Cycle(SercosCycle):
     """MST, t1, one AT of each drive with gaps between them, t_ATMT, the MDT, and the drives' recovery."""
 
     def __init__(self, network: Network, model: str) -> None:
@@ -74,6 +74,11 @@ class Sercos2Cycle(BusCycle):
     def figures(self) -> Mapping[str, Number | None]:
         """The data rate, and the data of the MDT."""
         return {"data_rate_mbit_s": self.network.profile.bus.data_rate_mbit_s, "mdt_bytes": self.mdt_bytes}
+
+    @property
+    def feedback_due_us(self) -> Number:
+        """Feedback is that of the start of MST [us]."""
+        return 0.0
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """How old feedback is when the host has it, and how late a command takes effect."""

@@ -13,9 +13,8 @@ from busplan.buses.sercos2.constants import (
     SLOW_MBIT_S,
     SLOW_START_US,
     STUFF_STEP_BITS,
-    WORD_BYTES,
 )
-from busplan.elementwise import Number, choose, rounded_down, rounded_up
+from busplan.elementwise import Number, choose, rounded_down
 
 
 def telegram_bits(data_bytes: Number, *, is_stuffed: bool) -> Number:
@@ -59,17 +58,6 @@ def telegram_us(data_bytes: Number, *, data_rate_mbit_s: Number, is_stuffed: boo
     13.5
     """
     return telegram_bits(data_bytes, is_stuffed=is_stuffed) / data_rate_mbit_s
-
-
-def word_bytes(payload_bytes: Number) -> Number:
-    """Data of a drive in whole words [bytes].
-
-    Examples
-    --------
-    >>> word_bytes(5), word_bytes(6)
-    (6.0, 6.0)
-    """
-    return rounded_up(payload_bytes / WORD_BYTES) * WORD_BYTES
 
 
 def start_us(data_rate_mbit_s: Number) -> Number:

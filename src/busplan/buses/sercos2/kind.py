@@ -7,9 +7,9 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, MEASURE, WHOLE_PERIOD, SercosBus
+from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos2 import figures, rules
-from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US, WORD_BYTES
+from busplan.buses.sercos2.constants import CONSTANTS, MOST_DRIVE_BYTES, PERIODS, TURNAROUND_US
 from busplan.buses.sercos2.cycle import NONE, WORST, Sercos2Cycle
 from busplan.buses.sercos2.limits import LIMITS
 from busplan.elementwise import plain
@@ -53,7 +53,6 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         measure=MEASURE,
         base=BASE,
     )
-    command_events = (("mdt_stretch", "mdt"),)
     event_kinds = (
         EventKind("mst", "MST", _TELEGRAMS, "S", "sync"),
         EventKind("wait", "wait for drives", "profile", "=", "work"),
@@ -68,7 +67,10 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         EventKind("mdt_stretch", "MDT", "", "M", "out"),
     )
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
-    key_sources: ClassVar[Mapping[str, Sourced]] = {"bus.turnaround_us": TURNAROUND_US}
+    key_sources: ClassVar[Mapping[str, Sourced]] = {
+        "bus.turnaround_us": TURNAROUND_US,
+        "bus.pipeline_cycles": PIPELINE_CYCLES,
+    }
     key_grades: ClassVar[Mapping[str, Grade]] = {"bus.at_gap_us": "assumed"}
     key_symbols: ClassVar[Mapping[str, str]] = {
         "bus.data_rate_mbit_s": "f",
@@ -76,6 +78,7 @@ at_gap_us = 5              # assumed: no public figure says it; the master's tim
         "bus.at_start_us": "t_1",
         "bus.turnaround_us": "t_ATMT",
         "bus.recovery_us": "t_MTSY",
+        "bus.pipeline_cycles": "n",
         "node.execution.worst_extra_us": "T_extra",
     }
     change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second ring"}

@@ -3,12 +3,14 @@
 from typing import Final
 
 from busplan.buses.known_period import period_limit
+from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
 from busplan.buses.sercos2.constants import MOST_DRIVES, MOST_MDT_BYTES, PERIODS
 from busplan.buses.sercos2.cycle import NONE, Sercos2Cycle
 
 LIMITS: Final = (
     period_limit(PERIODS),
+    NODE_LIMIT,
     Limit(
         "nodes",
         "{value:.0f} drives are over the {most:.0f} of a ring",

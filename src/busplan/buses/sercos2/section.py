@@ -1,9 +1,10 @@
 """The keys that only profiles of SERCOS I and II have, in [bus]."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
+from busplan.buses.sercos import MOST_PIPELINE, PIPELINE_CYCLES
 from busplan.buses.sercos2.constants import TURNAROUND_US, DataRate
 from busplan.buses.sercos2.cycle import WORST, TimingModelName
 from busplan.sections.base import Count, TimeUs
@@ -39,6 +40,12 @@ class Sercos2Bus(BusSection):
         default=0.0,
         description="From the MDT to the next MST, t_MTSY of the slowest drive (S-0-0088) [us]",
         examples=[20],
+    )
+    pipeline_cycles: Annotated[int, Field(ge=0, le=MOST_PIPELINE)] = Field(
+        default=int(PIPELINE_CYCLES),
+        description="Cycles from the AT that bring feedback to the MDT with the command computed from it; 0 where the "
+        "master computes between them, within turnaround_us. Of a loop on the host",
+        examples=[2],
     )
     timing_model: TimingModelName = Field(
         default=WORST,

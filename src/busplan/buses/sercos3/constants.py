@@ -1,7 +1,9 @@
 """Figures of SERCOS III, each with its source and grade."""
 
+from math import sqrt
 from typing import Final, Literal
 
+from busplan.buses import sercos
 from busplan.buses.periods import Periods
 from busplan.sourced import Sourced, constants
 
@@ -41,6 +43,7 @@ MOST_DEVICES: Final = Sourced(511, unit="1", grade="published", source="sercos.c
 DEFAULT_GAP_BYTES: Final = _bytes(37, "gap between telegrams that every device takes")
 LEAST_GAP_BYTES: Final = _bytes(12, "least gap between telegrams, that of Ethernet")
 DEVICE_DELAY_US: Final = _us(0.9, "delay of a device, one way", symbol="t_dev")
+COMPONENT_DELAY_US: Final = _us(1.8, "delay of all components in the ring that are no devices", symbol="t_comp")
 MASTER_JITTER_US: Final = Sourced(
     1.0, unit="us", grade="published", source=f"{_PAGE}: a sub-microsecond jitter", meaning="jitter of the master"
 )
@@ -48,6 +51,27 @@ MASTER_DELAY_US: Final = _us(2.56, "from the start of a cycle in the master to t
 CHANNEL_US: Final = _us(0.4, "time of the master's hardware for a service channel")
 HARDWARE_CHANNELS: Final = Sourced(
     32, unit="1", grade="published", source=_COSEMA, meaning="service channels that its hardware serves"
+)
+DEVICE_DELAY_SHARE: Final = Sourced(
+    0.4 / sqrt(12) / 0.9,
+    unit="1",
+    grade="derived",
+    source=f"{_COSEMA}: 0.5 to 0.9 us, typically",
+    meaning="standard uncertainty of the delay of a device, as a share of it",
+)
+MASTER_JITTER_SHARE: Final = Sourced(
+    1 / sqrt(12),
+    unit="1",
+    grade="derived",
+    source=f"{_PAGE}: anything below it",
+    meaning="standard uncertainty of the master's jitter, as a share of it",
+)
+GAP_SHARE: Final = Sourced(
+    25 / sqrt(12) / 37,
+    unit="1",
+    grade="derived",
+    source=f"{_COSEMA}: 12 to 37 bytes",
+    meaning="standard uncertainty of the gap between two telegrams, as a share of it",
 )
 LEAST_UCC_US: Final = _us(125.0, "shortest channel for other frames that the master opens")
 
@@ -57,4 +81,4 @@ PERIODS: Final = Periods((31.25, 62.5, 125.0, *map(float, range(_STEP_US, _LONGE
 """Communication periods, CSMD_TSCYC of CoSeMa."""
 PERIODS_SOURCE: Final = f"31.25, 62.5 and 125 us, and multiples of 250 us up to 65 ms ({_COSEMA})"
 
-CONSTANTS: Final = constants(globals())
+CONSTANTS: Final = {**sercos.CONSTANTS, **constants(globals())}

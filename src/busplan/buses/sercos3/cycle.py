@@ -4,14 +4,17 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Final, Literal
 
-from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, LeftOut, Term
+from busplan.buses.cycle import BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Network
-from busplan.buses.sercos import delays
+from busplan.buses.sercos import SercosCycle, delays
 from busplan.buses.sercos3.constants import (
     BYTE_US,
     CHANNEL_US,
+    DEVICE_DELAY_SHARE,
+    GAP_SHARE,
     HARDWARE_CHANNELS,
     HEADER_US,
+    MASTER_JITTER_SHARE,
     MOST_BYTES,
     OVERHEAD_BYTES,
 )
@@ -19,11 +22,12 @@ from busplan.buses.sercos3.equations import (
     Filling,
     padded_bytes,
     ring_delay_us,
+    start_wait_us,
     sync_jitter_us,
     telegrams_us,
 )
 from busplan.buses.sercos3.telegrams import SORTS, Telegrams, telegrams_of
-from busplan.elementwise import Number, larger, named, plain, smaller
+from busplan.elementwise import Number, choose, larger, named, plain, smaller, total
 from busplan.sections.transactions import TransactionKind
 
 TimingModelName = Literal["window", "telegrams"]
@@ -31,8 +35,8 @@ WINDOW: Final[TimingModelName] = "window"
 TELEGRAMS: Final[TimingModelName] = "telegrams"
 
 
-class Sercos3Cycle(BusCycle):
-    """MDT, AT, the channel for other frames, and under the model `window` jitter, the master and the ring.
+class Sercos3Cycle(SercosCycle):
+    """MDT, AT, the channel for other frames, and under the model `window` jitter, the master, the ring and the devices.
 
     The window is that of CoSeMa: by the timing method it asks that the channel for other frames ends before the next
     cycle begins, or before the AT do. What the nodes execute runs beside the telegrams.
@@ -64,35 +68,88 @@ class Sercos3Cycle(BusCycle):
         if not self.is_window:
             return 0.0
         delay_us: Number = bus.device_delay_us
-        found = ring_delay_us(self.network.nodes, device_delay_us=delay_us, gap_bytes=bus.gap_bytes)
+        found = ring_delay_us(
+            self.network.nodes,
+            device_delay_us=delay_us,
+            gap_bytes=bus.gap_bytes,
+            component_delay_us=bus.component_delay_us,
+        )
         return named(found, "ring_delay_us", "t_ring")
 
-    def _kept_us(self) -> tuple[Number, Number, Number]:
-        """What the window keeps free for jitter, the master, and the ring [us]."""
+    @property
+    def _jitters(self) -> tuple[int, int]:
+        """How often the jitter is kept free: before the AT at the earliest, and in the whole cycle."""
+        return {"mdt-at-ucc": (1, 3), "mdt-ucc-at": (2, 3), "at-last": (1, 2)}[self.method]
+
+    @property
+    def _has_ring(self) -> bool:
+        return self.is_window and self.method != "mdt-at-ucc"
+
+    @cached_property
+    def _master_us(self) -> Number:
+        """What the window keeps free for the master [us]."""
         if not self.is_window:
-            return 0.0, 0.0, 0.0
+            return 0.0
         delay_us: Number = self.network.profile.bus.master_delay_us
         if self.method == "mdt-at-ucc":
-            return 3 * self.jitter_us, delay_us + HEADER_US, 0.0
+            return delay_us + HEADER_US
         channels_us = smaller(self.network.nodes, HARDWARE_CHANNELS) * CHANNEL_US
-        jitters = 2 if self.method == "at-last" else 3
-        return jitters * self.jitter_us, larger(delay_us, channels_us - self.jitter_us), self.ring_us
+        return larger(delay_us, channels_us - self.jitter_us)
+
+    @cached_property
+    def _start_wait_us(self) -> Number:
+        """What the devices make the AT wait [us]."""
+        least_us: Number | None = self.network.profile.bus.at_start_us
+        return 0.0 if least_us is None or not self.is_window else start_wait_us(least_us, earliest_us=self._earliest_us)
+
+    @property
+    def _earliest_us(self) -> Number:
+        """When the AT could begin, from the start of the cycle [us]."""
+        before_us = self.network.nonperiodic_us if self._has_ring else 0.0
+        return self._telegrams_us("write") + before_us + self._jitters[0] * self.jitter_us
+
+    @cached_property
+    def _sent_us(self) -> dict[str, Number]:
+        return {
+            "cycle_mdt_us": self._telegrams_us("write"),
+            "cycle_wait_us": self._start_wait_us,
+            "cycle_at_us": self._telegrams_us("read"),
+            "cycle_jitter_us": self._jitters[1] * self.jitter_us if self.is_window else 0.0,
+            "cycle_master_us": self._master_us,
+            "cycle_ring_us": self.ring_us if self._has_ring else 0.0,
+            "nonperiodic_us": self.network.nonperiodic_us,
+        }
 
     def computed_terms(self) -> tuple[Term, ...]:
-        """The telegrams, and what the window keeps free."""
-        jitter_us, master_us, ring_us = self._kept_us()
+        """The telegrams, the wait of the devices, and what the window keeps free."""
+        return tuple(Term(*one) for one in self._sent_us.items())
+
+    def doubts(self) -> tuple[Doubt, ...]:
+        """What is published as a range alone: the delay of a device, the master's jitter, and the gap.
+
+        Each is the same in the whole cycle. A wait of the devices may hide some of it.
+        """
+        bus = self.network.profile.bus
+        if not self.is_window or bus.ring_grade == "measured":
+            return ()
+        jitters, rings = self._jitters[1], 1 if self._has_ring else 0
+        count = total(one.telegrams for one in self.fillings.values())
+        gap_us: Number = bus.gap_bytes * BYTE_US * (count + (jitters + rings) / 2)
+        delays_us: Number = 2 * rings * self.network.nodes * bus.device_delay_us
         return (
-            Term("cycle_mdt_us", self._telegrams_us("write")),
-            Term("cycle_at_us", self._telegrams_us("read")),
-            Term("cycle_jitter_us", jitter_us),
-            Term("cycle_master_us", master_us),
-            Term("cycle_ring_us", ring_us),
-            Term("nonperiodic_us", self.network.nonperiodic_us),
+            Doubt("bus.gap_bytes", "gap between telegrams", gap_us * GAP_SHARE),
+            Doubt(
+                "bus.master_jitter_us", "jitter of the master", jitters / 2 * bus.master_jitter_us * MASTER_JITTER_SHARE
+            ),
+            Doubt("bus.device_delay_us", "delay of the devices", delays_us * DEVICE_DELAY_SHARE),
         )
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """The channel for other frames."""
-        return () if self.network.nonperiodic_us else (LeftOut("the channel for other frames", "cycle.nonperiodic_us"),)
+        """The channel for other frames, and the devices' least time before the AT."""
+        least = LeftOut("the devices' least time before the AT, S-0-1006", "bus.at_start_us")
+        other = LeftOut("the channel for other frames", "cycle.nonperiodic_us")
+        said = ((self.network.profile.bus.at_start_us is not None, least), (self.network.nonperiodic_us, other))
+        return tuple(one for is_said, one in said if not is_said)
 
     def figures(self) -> Mapping[str, Number | None]:
         """How many telegrams there are."""
@@ -105,6 +162,20 @@ class Sercos3Cycle(BusCycle):
         delay_us: Number = self.network.profile.bus.master_delay_us
         return larger(delay_us - HEADER_US, 0.0)
 
+    @property
+    def feedback_due_us(self) -> Number:
+        """The first AT begins then; by the last method it ends with the cycle [us]."""
+        mdt_us, sent = self._telegrams_us("write"), self._sent_us
+        if not self.is_window:
+            return mdt_us
+        if self.method == "at-last":
+            behind_us = sent["cycle_at_us"] + sent["cycle_ring_us"] + self._master_us + self.jitter_us
+            return self.network.period_us - behind_us
+        start_us, other_us = mdt_us + self.jitter_us, self.network.nonperiodic_us
+        if self.method == "mdt-ucc-at":
+            start_us = choose(other_us > 0, start_us + self.jitter_us + other_us + self.ring_us, start_us)
+        return self._start_us() + larger(start_us, self.network.profile.bus.at_start_us or 0.0)
+
     def latencies(self) -> tuple[BusLatency, ...]:
         """How old feedback is when the host has it, and how late a command takes effect."""
         return delays(
@@ -116,20 +187,21 @@ class Sercos3Cycle(BusCycle):
 
     def events(self) -> Iterator[BusEvent]:
         """Telegram by telegram and device by device."""
-        jitter_us, master_us, ring_us = map(plain, self._kept_us())
-        other = BusEvent(
-            "nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "channel for other frames"
-        )
+        us = {key: plain(one) for key, one in self._sent_us.items()}
+        other = BusEvent("nonperiodic", "nonperiodic_us", us["nonperiodic_us"], "channel for other frames")
         is_last = self.method == "mdt-at-ucc"
-        yield from self._sent("write")
+        yield from self._telegrams("write")
         yield from () if is_last else (other,)
-        yield from self._sent("read")
-        yield BusEvent("ring", "cycle_ring_us", ring_us, "the last telegram goes round the ring")
+        yield BusEvent("wait", "cycle_wait_us", us["cycle_wait_us"], "wait of the devices before the AT")
+        yield from self._telegrams("read")
+        yield BusEvent("ring", "cycle_ring_us", us["cycle_ring_us"], "the last telegram goes round the ring")
         yield from (other,) if is_last else ()
-        yield BusEvent("jitter", "cycle_jitter_us", jitter_us, "allowances for the jitter")
-        yield BusEvent("master", "cycle_master_us", master_us, "the master's own time before the next cycle")
+        yield BusEvent("jitter", "cycle_jitter_us", us["cycle_jitter_us"], "allowances for the jitter")
+        yield BusEvent(
+            "master", "cycle_master_us", us["cycle_master_us"], "the master's own time before the next cycle"
+        )
 
-    def _sent(self, kind: TransactionKind) -> Iterator[BusEvent]:
+    def _telegrams(self, kind: TransactionKind) -> Iterator[BusEvent]:
         """All telegrams of one sort."""
         sort, gap = SORTS[kind], self.network.profile.bus.gap_bytes
         term = f"cycle_{sort}_us"

@@ -124,12 +124,32 @@ def sync_jitter_us(master_jitter_us: Number, *, gap_bytes: Number) -> Number:
     return (master_jitter_us + gap_bytes * BYTE_US) / 2
 
 
-def ring_delay_us(devices: Number, *, device_delay_us: Number, gap_bytes: Number) -> Number:
-    """Delay of the ring, there and back through every device, and half a gap [us].
+def ring_delay_us(
+    devices: Number, *, device_delay_us: Number, gap_bytes: Number, component_delay_us: Number = 0.0
+) -> Number:
+    """Delay of the ring: there and back through every device, half a gap, and what is no device [us].
 
     Examples
     --------
-    >>> ring_delay_us(8, device_delay_us=0.9, gap_bytes=25)
-    15.4
+    >>> ring_delay_us(8, device_delay_us=0.9, gap_bytes=25, component_delay_us=1.8)
+    17.2
     """
-    return 2 * devices * device_delay_us + gap_bytes * BYTE_US / 2
+    return 2 * devices * device_delay_us + gap_bytes * BYTE_US / 2 + component_delay_us
+
+
+def start_wait_us(least_us: Number, *, earliest_us: Number) -> Number:
+    """Wait before the AT, where the devices ask for a later start, the minimum of S-0-1006 [us].
+
+    Parameters
+    ----------
+    least_us
+        The least time that they ask for, from the start of the cycle [us].
+    earliest_us
+        When the AT could begin without it [us].
+
+    Examples
+    --------
+    >>> start_wait_us(100.0, earliest_us=22.5), start_wait_us(100.0, earliest_us=130.0)
+    (77.5, 0.0)
+    """
+    return larger(least_us - earliest_us, 0.0)

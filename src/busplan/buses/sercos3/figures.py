@@ -14,6 +14,9 @@ AT_TELEGRAMS: Final = Figure(
 )
 TERMS: Final = (
     Figure("cycle_mdt_us", "MDT", _COSEMA, "master data telegrams with their gaps", "MDT", ink="out", letter="M"),
+    Figure(
+        "cycle_wait_us", "wait", _COSEMA, "what the devices make the AT wait", "wait of devices", ink="sync", letter="W"
+    ),
     Figure("cycle_at_us", "AT", _COSEMA, "device telegrams with their gaps", "AT", ink="in", letter="A"),
     Figure("cycle_jitter_us", "jitter", _COSEMA, "allowances for the jitter", "jitter", ink="contention", letter="J"),
     Figure("cycle_master_us", "master", _COSEMA, "the master's own time", "master", ink="work", letter="T"),

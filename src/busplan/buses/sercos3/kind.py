@@ -7,9 +7,10 @@ from busplan.buses.figure import NONPERIODIC
 from busplan.buses.network import Network
 from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
-from busplan.buses.sercos import BASE, DELAYS, MEASURE, WHOLE_PERIOD, SercosBus
+from busplan.buses.sercos import BASE, DELAYS, MEASURE, PIPELINE_CYCLES, WHOLE_PERIOD, WORD_BYTES, SercosBus
 from busplan.buses.sercos3 import figures, rules
 from busplan.buses.sercos3.constants import (
+    COMPONENT_DELAY_US,
     CONNECTION_BYTES,
     CONSTANTS,
     DEFAULT_GAP_BYTES,
@@ -41,7 +42,7 @@ class Sercos3(SercosBus):
     kind = "sercos3"
     title = "SERCOS III"
     timing_models = (
-        TimingModel(WINDOW, "telegrams, jitter allowances, the master, and the ring delay where the method has it"),
+        TimingModel(WINDOW, "telegrams, jitter, master and devices, and the ring delay where the method has it"),
         TimingModel(TELEGRAMS, "telegrams and their gaps alone, as performance tables count"),
     )
     deciding_model = WINDOW
@@ -64,10 +65,10 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         measure=MEASURE,
         base=BASE,
     )
-    command_events = (("mdt", "gap"),)
     event_kinds = (
         EventKind("mdt_frame", "MDT, its own fields", _COSEMA, "m", "request"),
         EventKind("mdt_data", "data to a device", _COSEMA, ">", "out"),
+        EventKind("wait", "wait of the devices", _COSEMA, "w", "sync"),
         EventKind("at_frame", "AT, its own fields", _COSEMA, "a", "response"),
         EventKind("at_data", "data of a device", _COSEMA, "<", "in"),
         EventKind("gap", "gap and padding", _COSEMA, ".", "gap"),
@@ -83,12 +84,17 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
         "bus.device_delay_us": DEVICE_DELAY_US,
         "bus.master_jitter_us": MASTER_JITTER_US,
         "bus.master_delay_us": MASTER_DELAY_US,
+        "bus.component_delay_us": COMPONENT_DELAY_US,
+        "bus.pipeline_cycles": PIPELINE_CYCLES,
     }
     key_symbols: ClassVar[Mapping[str, str]] = {
         "bus.gap_bytes": "gap",
         "bus.device_delay_us": "t_dev",
         "bus.master_jitter_us": "J_master",
         "bus.master_delay_us": "t_master",
+        "bus.component_delay_us": "t_comp",
+        "bus.at_start_us": "t_1,min",
+        "bus.pipeline_cycles": "n",
         "node.execution.worst_extra_us": "T_extra",
     }
     warning_keys = ("cycle.nonperiodic_us",)
@@ -131,7 +137,9 @@ gap_bytes = 37             # what every device takes; S-0-1036 of the network sa
     def payloads(self, network: Network) -> PayloadRange:
         """Whole words that four telegrams carry for all devices, no more than one carries for a device."""
         share = int(MOST_TELEGRAMS * MOST_BYTES) // int(plain(network.nodes))
-        return PayloadRange(2, min(share, int(MOST_BYTES - CONNECTION_BYTES)), "telegrams", carrier="four telegrams")
+        return PayloadRange(
+            int(WORD_BYTES), min(share, int(MOST_BYTES - CONNECTION_BYTES)), "telegrams", carrier="four telegrams"
+        )
 
     def way_charged(self, network: Network) -> str:  # noqa: ARG002 - all alike
         """Say what each device is charged."""

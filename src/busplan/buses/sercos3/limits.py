@@ -5,6 +5,7 @@ from typing import Final
 
 from busplan.buses.known_period import period_limit
 from busplan.buses.network import Network
+from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
 from busplan.buses.sercos3.constants import MOST_BYTES, MOST_DEVICES, MOST_TELEGRAMS, PERIODS
 from busplan.buses.sercos3.telegrams import SORTS, data_bytes, telegrams_of
@@ -21,6 +22,7 @@ def _largest_telegram(network: Network) -> Number:
 
 LIMITS: Final = (
     period_limit(PERIODS),
+    NODE_LIMIT,
     Limit(
         "nodes",
         "{value:.0f} devices are over the {most:.0f} of a network",

@@ -4,7 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from busplan.buses.sercos import MOST_PIPELINE, PIPELINE_CYCLES
 from busplan.buses.sercos3.constants import (
+    COMPONENT_DELAY_US,
     DEFAULT_GAP_BYTES,
     DEVICE_DELAY_US,
     LEAST_GAP_BYTES,
@@ -58,6 +60,29 @@ class Sercos3Bus(BusSection):
         default=float(MASTER_DELAY_US),
         description="From the start of a cycle in the master to the end of the first header [us]",
         examples=[2.56],
+    )
+    component_delay_us: TimeUs = Field(
+        default=float(COMPONENT_DELAY_US),
+        description="Delay of all components in the ring that are no devices [us]",
+        examples=[1.8],
+    )
+    at_start_us: TimeUs | None = Field(
+        default=None,
+        description="Least time from the start of the cycle to the first AT that the devices ask for: the largest of "
+        "their minima of S-0-1006. Without it none is counted [us]",
+        examples=[100],
+    )
+    ring_grade: Literal["measured", "published", "assumed"] | None = Field(
+        default=None,
+        description='How device_delay_us, master_jitter_us and gap_bytes are known; unless "measured", read from the '
+        "network itself, they have the uncertainty of the range that is published of each",
+        examples=["measured"],
+    )
+    pipeline_cycles: Annotated[int, Field(ge=1, le=MOST_PIPELINE)] = Field(
+        default=int(PIPELINE_CYCLES),
+        description="Cycles from the AT that bring feedback to the MDT with the command computed from it; of a loop on "
+        "the host",
+        examples=[2],
     )
     timing_model: TimingModelName = Field(
         default=WINDOW,

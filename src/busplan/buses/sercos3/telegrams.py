@@ -3,6 +3,7 @@
 from typing import Final, NamedTuple
 
 from busplan.buses.network import Group, Network
+from busplan.buses.sercos import word_bytes
 from busplan.buses.sercos3.constants import (
     ALIGNED_BYTES,
     CHANNEL_BYTES,
@@ -69,8 +70,9 @@ def sizes(network: Network, kind: TransactionKind) -> list[tuple[Group, Number]]
 
 
 def data_bytes(network: Network, payload_bytes: Number) -> Number:
-    """Cyclic data of a device, with the control of its connection [bytes]."""
-    return payload_bytes + CONNECTION_BYTES if has_connections(network) else payload_bytes
+    """Cyclic data of a device in whole words, with the control of its connection [bytes]."""
+    words: Number = word_bytes(payload_bytes)
+    return words + CONNECTION_BYTES if has_connections(network) else words
 
 
 def has_connections(network: Network) -> bool:
