@@ -4,7 +4,7 @@ from typing import Any
 
 from busplan.analysis.comparison.kinds import CircleAtSmallest, KindComparison, MachineOnKind, NotOnKind, SafeAxes
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.documents import document, with_profile
+from busplan.answers.documents import document, tested_parts, with_profile
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.published import parts_tested
@@ -45,7 +45,7 @@ def _row(record: Record) -> Record:
     flat = {key: value for key, value in record.items() if key not in {"circle", "curve", "assumed"}}
     return {
         **flat,
-        "tested": list(record["tested"]),
+        "tested": [one["part"] for one in record["tested"]],
         "assumed": [one["key"] for one in record["assumed"]],
         "circle_passed": circle["passed"],
         "circle_step_us": circle["step_us"],
@@ -79,7 +79,7 @@ def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
 def tested_record(bus: Bus) -> Record:
     """Which parts of a kind figures of others test, and which they do not."""
     found = parts_tested(bus.evidence_data)
-    return {"tested": dict(found.parts), "not_tested": list(found.untested)}
+    return {"tested": tested_parts(found), "not_tested": list(found.untested)}
 
 
 def _head(kind: str, *, is_own: bool, why_not: list[str]) -> Record:

@@ -6,6 +6,7 @@ Keys carry their units and are stable between releases; new ones may be added.
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from busplan.buses.published import Tested
 from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, joined
 from busplan.profile.changes import KeyChanges
 
@@ -20,6 +21,11 @@ def document(command: str, **content: object) -> JsonDocument:
 def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
     """Rows for CSV with the profile's name in front, so that tables of several runs can be joined."""
     return [{"profile": name, **record} for record in records]
+
+
+def tested_parts(found: Tested) -> list[Record]:
+    """Each part of a kind that figures of others test, with what tests it."""
+    return [{"part": part, "by": words} for part, words in found.parts.items()]
 
 
 def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDocument:
