@@ -8,7 +8,8 @@ from itertools import product
 from typing import Final
 
 from busplan.analysis.circle.check import MOST_STEPS
-from busplan.buses.rule import Rule, RuleProblem
+from busplan.analysis.planning.constraints import refused_step
+from busplan.buses.rule import Mending, Rule, RuleProblem
 from busplan.errors import BusplanError
 from busplan.rules.finding import Subject
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -51,7 +52,8 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
             is_said = key.rpartition(".")[2] == refused.name.rpartition(".")[2]
             message = f"{refused.value}: {refused.right}" if is_said else refused.message
             words, _, way_out = message.partition("; ")
-            yield "BP203", RuleProblem(key, words, way_out)
+            is_step = refused_step(subject.profile, subject.profile.cycle.period_us)
+            yield "BP203", RuleProblem(key, words, *(subject.cure() if is_step else Mending(way_out)))
         return
     except BusplanError as error:
         yield from (("BP203", RuleProblem(_key_of(profile=subject.profile), words)) for words in error.problems)
