@@ -319,6 +319,6 @@ def test_ticks_are_round_inside_the_window_and_few(start: float, width: float, m
     end = start + width
     marks = ticks(start, end, most=most)
     assert len(marks) <= most
-    assert all(start - width * 1e-6 <= mark.at_us <= end + width * 1e-6 for mark in marks)
+    assert all(start - width * 1e-6 <= mark.at <= end + width * 1e-6 for mark in marks)
     assert len({mark.label for mark in marks}) == len(marks)
-    assert all(float(mark.label) == pytest.approx(mark.at_us, abs=width * 1e-6) for mark in marks)
+    assert all(float(mark.label) == pytest.approx(mark.at, abs=width * 1e-6) for mark in marks)
