@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
-_DEFAULT_FIGURE: Final = "safe_axes"
-_FIGURE_OF_GROUPS: Final = "margin_corrected_us"
 
 
 @takes_changes(words="Not of a key that varies.")
@@ -193,7 +191,6 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    drawn = figure or (_FIGURE_OF_GROUPS if loaded.group else _DEFAULT_FIGURE)
     _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=of_circle)
     run_sweep(
         SweepJob(
@@ -211,7 +208,7 @@ def sweep_command(
             ascending=order == "asc",
             plot=plot,
             plot_form=plot_form_,
-            figure=drawn,
+            figure=figure,
             jobs=(jobs or available_processors()) if circle else None,
             force=force,
             cluster=cluster,

@@ -37,7 +37,8 @@ class SweepJob(NamedTuple):
     ascending: bool
     plot: Path | None
     plot_form: Picture | None
-    figure: str
+    figure: str | None
+    """Column of the picture; None for the default one."""
     jobs: int | None
     """Processes for circle tests, where there is no cluster; None without circle tests."""
     force: bool

@@ -117,10 +117,11 @@ def _work(
 def _drawing(job: "SweepJob") -> "FigureData | None":
     if job.plot is None:
         return None
-    from busplan.drawings.sweep_plot import FigureData, require_drawable
+    from busplan.drawings.sweep_plot import FigureData, default_figure, require_drawable
 
-    require_drawable(job.grid)
-    return FigureData(job.profile, job.grid, figure=job.figure, timing_models=job.timing_models)
+    require_drawable(job.grid, option="--plot")
+    figure = job.figure or default_figure(job.profile)
+    return FigureData(job.profile, job.grid, figure=figure, timing_models=job.timing_models)
 
 
 def _require_few(job: "SweepJob") -> None:

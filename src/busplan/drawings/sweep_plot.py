@@ -20,8 +20,20 @@ MAX_DRAWN: Final = 250_000
 _MAX_KEYS: Final = 2
 
 
-def require_drawable(grid: Grid) -> None:
-    """Refuse a grid that cannot be drawn, before it is computed.
+def default_figure(profile: Profile) -> str:
+    """Column that is drawn if none is asked for; of groups, the most axes are no single number."""
+    return "margin_corrected_us" if profile.group else "safe_axes"
+
+
+def require_drawable(grid: Grid, *, option: str) -> None:
+    """Refuse a grid that cannot be drawn.
+
+    Parameters
+    ----------
+    grid
+        The grid.
+    option
+        What asks for the picture, for messages.
 
     Raises
     ------
@@ -30,11 +42,11 @@ def require_drawable(grid: Grid) -> None:
     """
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
     if not grid.axes:
-        raise BusplanError("--plot: draws figures over one or two keys, and none varies but the seed; vary another")
+        raise BusplanError(f"{option}: draws figures over one or two keys, and none varies but the seed; vary another")
     if len(varied) > _MAX_KEYS:
-        raise BusplanError(f"--plot: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
+        raise BusplanError(f"{option}: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
     if grid.points > MAX_DRAWN:
-        raise BusplanError(f"--plot: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
+        raise BusplanError(f"{option}: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
 
 
 class FigureData:

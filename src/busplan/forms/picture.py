@@ -27,7 +27,7 @@ def first_picture(blocks: Sequence[Block]) -> str | None:
             found = first_picture(block.blocks)
         else:
             found = block.drawing.svg() if isinstance(block, Chart) else None
-            found = None if found is None else styled(found)
+            found = None if found is None else styled(found, css=block.drawing.stylesheet)
         if found is not None:
             return found
     return None
