@@ -38,7 +38,7 @@ class Plot:
 
     @staticmethod
     def _value(labels: dict[str, float], share: float) -> float:
-        (first, at), (last, end) = list(labels.items())[0], list(labels.items())[-1]
+        (first, at), *_, (last, end) = labels.items()
         return float(first) + (share - at) / (end - at) * (float(last) - float(first))
 
 

@@ -70,15 +70,13 @@ def cells(plot: Any) -> list[Cell]:
     """Rectangles of a map as shares, and their colours."""
     width, height = map(float, plot.path.get("viewBox").split()[2:])
     number = r"(-?[\d.]+)"
-    return [
-        (
-            *(float(end) / width for end in (left, right)),
-            *(float(end) / height for end in (top, bottom)),
-            tuple(int(path.get("fill")[at : at + 2], 16) for at in (1, 3, 5)),
-        )
-        for path in plot.path.iter(f"{SVG}path")
-        for left, top, right, bottom in findall(rf"M{number} {number}H{number}V{number}H", path.get("d", ""))
-    ]
+    found = []
+    for path in plot.path.iter(f"{SVG}path"):
+        colour = tuple(int(path.get("fill", "#000000")[at : at + 2], 16) for at in (1, 3, 5))
+        for run in findall(rf"M{number} {number}H{number}V{number}H", path.get("d", "")):
+            left, top, right, bottom = map(float, run)
+            found.append((left / width, right / width, top / height, bottom / height, colour))
+    return found
 
 
 def colours_of(plot: Any, rows: int, columns: int) -> list[list[tuple[int, ...] | None]]:
@@ -132,7 +130,7 @@ def test_points_stand_at_their_values(plots: Plots) -> None:
             assert drawn_at == pytest.approx((x, y), abs=8)
 
 
-def test_a_curve_has_a_gap_where_a_value_is_missing(plots: Plots) -> None:
+def test_a_curve_has_a_gap_where_a_value_is_missing() -> None:
     one = plotted("margin_us", bus__nodes=range(1, 7))
     (panel, *_) = one.panels
     panel.values[2] = float("nan")
@@ -168,12 +166,12 @@ def test_colours_of_a_margin_are_red_below_zero_and_blue_from_it_on(plots: Plots
     one = plotted("margin_us", bus__gap_count=(7, 63), cycle__period_us=range(250, 1001, 50))
     for plot, panel in zip(plots(drawn(one)), one.panels, strict=True):
         found = colours_of(plot, *panel.values.shape)
-        for value, colour in zip(panel.values.ravel(), sum(found, []), strict=True):
+        for value, colour in zip(panel.values.ravel(), [each for row in found for each in row], strict=True):
             assert colour is not None
             red, _, blue = colour
             assert (blue > red) == (value >= 0)
         # Farther from zero is darker, on either side.
-        ranked = sorted(zip(panel.values.ravel(), sum(found, []), strict=True))
+        ranked = sorted(zip(panel.values.ravel(), [each for row in found for each in row], strict=True))
         for side in ([c for v, c in ranked if v < 0][::-1], [c for v, c in ranked if v >= 0]):
             greens = [colour[1] for colour in side if colour]
             assert greens == sorted(greens, reverse=True)
@@ -224,7 +222,9 @@ def test_unsafe_points_and_this_design_are_marked(plots: Plots) -> None:
     root = drawn(plotted("margin_us", bus__gap_count=(5, 7, 63), cycle__period_us=(250, 4000)))
     for plot in plots(root):
         plot.up = {str(place): at for place, at in enumerate(plot.up.values())}
-        assert marks(plot, "path", "above") == [pytest.approx(place, rel=1e-3, abs=1e-3) for place in ((250, 0), (4000, 0))]
+        assert marks(plot, "path", "above") == [
+            pytest.approx(place, rel=1e-3, abs=1e-3) for place in ((250, 0), (4000, 0))
+        ]
         assert marks(plot, "circle", "above") == [pytest.approx((4000, 2), rel=1e-3)]
     assert texts(root)[-3:] == ["margin of 0", "unsafe gap count", "this design"]
     (plot,) = plots(drawn(plotted("margin_us", bus__gap_count=(5, 63))))

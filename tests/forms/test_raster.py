@@ -39,13 +39,13 @@ def test_a_picture_has_two_pixels_for_each_px() -> None:
     assert drawn("x").shape == (60, 1280, 3)
 
 
-@pytest.mark.parametrize("text", ["Margin", "Größe ± 5 µm", "Łódź", "α → β", "Привет"])
+@pytest.mark.parametrize("text", ["Margin", "Größe ± 5 µm", "Łódź", "δ → ω", "Ждфя"])
 def test_letters_are_of_the_font_that_travels_with_the_package(text: str) -> None:
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="640" height="30"><text x="4" y="20">{text}</text></svg>'
     nothing = resvg_py.svg_to_bytes(svg_string=svg, skip_system_fonts=True, background="#ffffff")
     assert ink(np.asarray(Image.open(BytesIO(bytes(nothing))).convert("RGB"))) == 0
     for letter in filter(str.strip, text):
-        assert 0 < ink(drawn(letter))
+        assert ink(drawn(letter)) > 0
         assert not np.array_equal(drawn(letter), drawn("\uf8fe"))
 
 

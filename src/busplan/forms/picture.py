@@ -23,11 +23,11 @@ def first_picture(blocks: Sequence[Block]) -> str | None:
         None if no chart can be drawn.
     """
     for block in blocks:
+        found = None
         if isinstance(block, Chapter):
             found = first_picture(block.blocks)
-        else:
-            found = block.drawing.svg() if isinstance(block, Chart) else None
-            found = None if found is None else styled(found, css=block.drawing.stylesheet)
+        elif isinstance(block, Chart) and (svg := block.drawing.svg()) is not None:
+            found = styled(svg, css=block.drawing.stylesheet)
         if found is not None:
             return found
     return None
