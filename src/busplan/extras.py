@@ -36,9 +36,9 @@ def require_extra(library: str, *, extra: str, option: str, module: str) -> None
         ) from None
 
 
-def require_matplotlib(option: str) -> None:
-    """Refuse to start if no figure can be drawn; as `require_extra`."""
-    require_extra("matplotlib", extra="plot", option=option, module="matplotlib.figure")
+def require_resvg(option: str) -> None:
+    """Refuse to start if no PNG can be made; as `require_extra`."""
+    require_extra("resvg_py", extra="plot", option=option, module="resvg_py")
 
 
 def require_pyarrow(option: str) -> None:

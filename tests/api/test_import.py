@@ -10,7 +10,7 @@ import pytest
 
 import busplan
 
-HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "matplotlib", "scipy", "tomllib", "tomli_w", "json"}
+HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "resvg_py", "scipy", "tomllib", "tomli_w", "json"}
 FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
 WITH_NUMPY = ("circle_test", "evidence", "sweep", "map_", "report")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
@@ -68,7 +68,7 @@ def test_a_name_loads_what_it_needs() -> None:
     assert "numpy" not in without
     assert ["numpy" in found for found in with_numpy] == [True] * len(WITH_NUMPY)
     for found in (without, *with_numpy):
-        assert not found & {"typer", "rich", "matplotlib", "busplan.cli"}
+        assert not found & {"typer", "rich", "resvg_py", "busplan.cli"}
 
 
 def test_what_simulates_nothing_loads_no_numpy() -> None:
@@ -84,7 +84,7 @@ def test_what_simulates_nothing_loads_no_numpy() -> None:
         "calibrate('paper-two-node', 'table-1.csv')",
     ]
     program = "".join(f"\nstr(busplan.{call}.to_dict())" for call in calls)
-    assert not loaded(f"import busplan{program}") & {"numpy", "typer", "rich", "matplotlib"}
+    assert not loaded(f"import busplan{program}") & {"numpy", "typer", "rich", "resvg_py"}
 
 
 def test_the_command_line_does_not_load_the_interface() -> None:

@@ -185,7 +185,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "a title of two lines": (lambda: busplan.report("paper-4ms", title="a\nb"), "title 'a\\nb': expected words"),
     "another ending": (
         lambda: busplan.latency("paper-4ms").save("x.pdf"),
-        "x.pdf: expected a name ending in .txt, .md, .html, .csv, .json, .svg",
+        "x.pdf: expected a name ending in .txt, .md, .html, .csv, .json, .svg, .png",
     ),
     "a picture that there is not": (
         lambda: busplan.latency("paper-4ms").save("x.svg"),

@@ -7,6 +7,7 @@ import pytest
 
 import busplan
 from busplan.api.answer import Answer
+from busplan.forms import PICTURES
 
 Run = Callable[..., object]
 COMMANDS: Mapping[str, Callable[[], Answer]] = {
@@ -16,18 +17,20 @@ COMMANDS: Mapping[str, Callable[[], Answer]] = {
     "compare paper-4ms --buses ieee1394,can": lambda: busplan.compare("paper-4ms", buses=["ieee1394", "can"]),
     "timeline paper-4ms --transaction read:1": lambda: busplan.timeline("paper-4ms", transaction=("read", 1)),
     "sweep paper-4ms --vary bus.nodes=1:9": lambda: busplan.sweep("paper-4ms", vary={"bus.nodes": "1:9"}),
+    "circle-test paper-4ms": lambda: busplan.circle_test("paper-4ms"),
 }
 FILES = [
     *((name, ending) for name in list(COMMANDS)[:3] for ending in (".png", ".svg", ".json")),
-    ("timeline paper-4ms --transaction read:1", ".mmd"),
-    *(("sweep paper-4ms --vary bus.nodes=1:9", ending) for ending in (".csv", ".json", ".jsonl", ".parquet")),
+    *(("sweep paper-4ms --vary bus.nodes=1:9", ending) for ending in (".csv", ".json", ".jsonl", ".parquet", ".svg")),
+    ("circle-test paper-4ms", ".png"),
 ]
 
 
 @pytest.mark.parametrize(("command", "ending"), FILES)
 def test_a_file_has_the_bytes_that_the_command_writes(command: str, ending: str, run: Run, tmp_path: Path) -> None:
     theirs, ours = tmp_path / f"theirs{ending}", tmp_path / f"ours{ending.upper()}"
-    run(*command.split(), "-o", str(theirs), cwd=tmp_path)
+    is_plot = command.startswith(("sweep", "circle")) and ending in PICTURES
+    run(*command.split(), "--plot" if is_plot else "-o", str(theirs), cwd=tmp_path)
     ours.write_text("old")
     COMMANDS[command]().save(ours)
     assert ours.read_bytes() == theirs.read_bytes()
@@ -52,7 +55,7 @@ def test_what_fails_leaves_the_old_file_whole_and_nothing_beside_it(
     assert target.stat().st_mode & 0o777 == 0o640
 
 
-@pytest.mark.parametrize(("library", "ending"), [("matplotlib", ".png"), ("pyarrow", ".parquet")])
+@pytest.mark.parametrize(("library", "ending"), [("resvg_py", ".png"), ("pyarrow", ".parquet")])
 def test_a_library_that_is_missing_is_named_with_its_extra(
     library: str, ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -192,7 +192,7 @@ FORMS = {
     "capacity --sensitivity": ("table", "json"),
     "latency": ("table", "csv"),
     "plan": ("table", "json"),
-    "timeline": ("table", "mermaid", "svg"),
+    "timeline": ("table", "markdown", "svg"),
     "map": ("markdown", "svg"),
     "report": ("html", "markdown"),
     "check": ("text", "sarif"),

@@ -163,8 +163,8 @@ def test_trace_has_every_nth_step_of_each_period(circle_test: Run, profile: Path
         assert float(row["time_us"]) % 10_000 == 0
 
 
-@pytest.mark.parametrize(("name", "magic"), [("c.png", b"\x89PNG"), ("c.svg", b"<?xml"), ("c.pdf", b"%PDF")])
-def test_plots_in_three_formats(circle_test: Run, profile: Path, name: str, magic: bytes) -> None:
+@pytest.mark.parametrize(("name", "magic"), [("c.png", b"\x89PNG"), ("c.svg", b"<svg")])
+def test_plots_in_both_formats(circle_test: Run, profile: Path, name: str, magic: bytes) -> None:
     run = circle_test(profile, "--plot", name, cwd=profile.parent)
     assert (run.returncode, run.stderr) == (0, f"wrote {name}\n")
     assert (profile.parent / name).read_bytes().startswith(magic)
@@ -179,7 +179,7 @@ def test_the_same_test_draws_the_same_svg(circle_test: Run, profile: Path) -> No
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--plot", "c.gif"], "expected a name ending in .png, .svg or .pdf"),
+        (["--plot", "c.pdf"], "expected a name ending in .svg, .png; for a PDF write .svg: a browser prints it"),
         (["--plot", "no/where/c.png"], "cannot be written"),
         (["--trace", "no/where/t.csv"], "cannot be written"),
         (["--trace", "."], "cannot be written"),
@@ -305,11 +305,10 @@ def test_a_full_disk_is_said_of_the_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_broken_matplotlib_is_said_before_the_simulation(profile: Path) -> None:
-    package = profile.parent / "broken" / "matplotlib"
+def test_a_broken_resvg_is_said_before_the_simulation(profile: Path) -> None:
+    package = profile.parent / "broken" / "resvg_py"
     package.mkdir(parents=True)
-    (package / "__init__.py").write_text("", encoding="utf-8")
-    (package / "figure.py").write_text("raise RuntimeError('wrong ABI')", encoding="utf-8")
+    (package / "__init__.py").write_text("raise RuntimeError('wrong ABI')", encoding="utf-8")
     code = "import sys; sys.path.insert(0, 'broken'); from busplan.__main__ import main; main()"
     run = subprocess.run(
         [sys.executable, "-c", code, "circle-test", str(profile), "--plot", "c.png"],

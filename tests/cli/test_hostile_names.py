@@ -62,7 +62,7 @@ def calls() -> Iterator[tuple[str, ...]]:
         yield from (("explain", PROFILE, *figure, "--format", form) for figure in ((), ("gaps_us",)))
     yield ("report", PROFILE, OTHER, "--no-circle", "--format", "html")
     yield ("report", PROFILE, "--no-circle", "--format", "markdown")
-    yield from (("timeline", PROFILE, "--format", form) for form in ("mermaid", "svg"))
+    yield from (("timeline", PROFILE, "--format", form) for form in ("markdown", "svg"))
     yield from ((command, PROFILE, "--format", "svg") for command in ("map", "compare"))
     yield ("compare", PROFILE, "--buses", EVIL)
     yield ("map", PROFILE, "--x", f"{EVIL}=1")

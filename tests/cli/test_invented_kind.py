@@ -224,7 +224,7 @@ FORMS = {
     "capacity": ("table", "json", "csv"),
     "latency": ("table", "json", "csv"),
     "plan": ("table", "json", "csv"),
-    "timeline": ("table", "json", "csv", "mermaid", "svg"),
+    "timeline": ("table", "json", "csv", "markdown", "svg"),
     "map": ("table", "markdown", "html", "csv", "json", "svg"),
     "circle-test": ("table", "json", "csv"),
     "report": ("html", "markdown"),

@@ -92,7 +92,7 @@ def test_circles_are_run_in_this_or_in_other_processes(busplan: Run, tmp_path: P
         (("--period", "4"), "--period 4: expected a time with its unit"),
         (("--gap-count", "64"), "--gap-count 64: expected a whole number from 0 to 63"),
         (("--nodes", "3", "--set", "bus.nodes=4"), "both set bus.nodes; give one of them"),
-        (("-o", "map.pdf"), "--output map.pdf: expected a name ending in .txt, .md, .html, .csv, .json, .svg, .png"),
+        (("-o", "map.pdf"), "for a PDF write .svg: a browser prints it"),
         (("-o", "no/map.svg"), "there is no folder"),
         (("-o", "map.toml"), "map.toml"),
         (("--format", "jpeg"), "jpeg"),
@@ -105,10 +105,10 @@ def test_what_cannot_be_done_is_said_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_png_needs_matplotlib_and_says_so(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_png_needs_resvg_and_says_so(refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("busplan.extras.find_spec", lambda _name: None)
     said = refused("map", "paper-4ms", "-o", "map.png", cwd=tmp_path)
-    assert said == "--format png needs matplotlib: install it with the extra, as in pip install 'busplan[plot]'"
+    assert said == "--format png needs resvg_py: install it with the extra, as in pip install 'busplan[plot]'"
 
 
 def test_on_a_terminal_states_have_colours_unless_no_color_is_set(run: Run) -> None:

@@ -275,7 +275,7 @@ def test_markdown_loads_no_templates_and_neither_do_other_commands(tmp_path: Pat
         "import sys; from busplan.__main__ import main\n"
         "try: main()\n"
         "except SystemExit as leaving: assert not leaving.code\n"
-        "print({'jinja2', 'matplotlib'} & set(sys.modules), file=sys.stderr)"
+        "print({'jinja2', 'resvg_py'} & set(sys.modules), file=sys.stderr)"
     )
     for arguments in (["report", "paper-4ms", "--no-circle", "--format", "markdown"], ["capacity", "paper-4ms"]):
         done = subprocess.run(

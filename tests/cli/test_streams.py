@@ -287,19 +287,19 @@ def modules(run: Run, *lines: str) -> set[str]:
 def test_what_needs_no_profile_loads_nothing_heavy(run: Run, option: str) -> None:
     loaded = modules(run, option)
     assert "typer" in loaded
-    assert not loaded & {"numpy", "pydantic", "rich", "tomllib", "tomli_w", "csv", "json", "matplotlib"}
+    assert not loaded & {"numpy", "pydantic", "rich", "tomllib", "tomli_w", "csv", "json", "resvg_py"}
     assert not {name for name in loaded - LIGHT if name.startswith(WORK)}
 
 
 def test_the_help_of_a_command_loads_nothing_of_its_work(run: Run) -> None:
     loaded = modules(run, *(f"{command} --help" for command in COMMANDS))
     # Typer reads the program's own options before a command's, and takes pydantic for it.
-    assert not loaded & {"numpy", "rich", "tomllib", "tomli_w", "matplotlib"}
+    assert not loaded & {"numpy", "rich", "tomllib", "tomli_w", "resvg_py"}
     assert not {name for name in loaded - LIGHT if name.startswith(WORK)}
 
 
 def test_reports_load_no_numpy_and_a_good_profile_no_places(run: Run) -> None:
     loaded = modules(run, "capacity paper-4ms", "latency paper-4ms", "capacity paper-4ms --format json", "profiles")
     assert "pydantic" in loaded
-    assert not loaded & {"numpy", "rich", "tomli_w", "matplotlib", "scipy"}
+    assert not loaded & {"numpy", "rich", "tomli_w", "resvg_py", "scipy"}
     assert not loaded & {"busplan.profile.positions", "busplan.profile.problems"}

@@ -179,13 +179,12 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(busplan: Ru
 
 @pytest.mark.parametrize("grid", [["bus.nodes=1:9"], ["bus.gap_count=optimal,63", "cycle.period_us=250,1000,500"]])
 def test_figures_are_drawn(busplan: Run, grid: list[str], tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     varied = [part for spec in grid for part in ("--vary", spec)]
     first, second = (
         busplan("sweep", "paper-4ms", *varied, "--plot", "f.svg", "--figure", "margin_us", cwd=tmp_path) for _ in "ab"
     )
     assert (first.returncode, first.stderr, second.returncode) == (0, "wrote f.svg\n", 0)
-    assert (tmp_path / "f.svg").read_bytes().startswith(b"<?xml")
+    assert (tmp_path / "f.svg").read_bytes().startswith(b"<svg")
 
 
 REFUSALS = {
@@ -197,7 +196,7 @@ REFUSALS = {
     "--vary bus.gap_count=1,optimal --sort bus.gap_count": "--sort bus.gap_count: expected a column in numbers",
     "--vary bus.nodes=1:9 --sort nodes:up": "--sort nodes:up: expected a column, or a column and :asc",
     "--vary bus.nodes=1:9 --columns foo": "--columns foo: no such column; there are bus.nodes, timing_model",
-    "--vary bus.nodes=1:9 --plot x.gif": "--plot x.gif: expected a name ending in .png, .svg or .pdf",
+    "--vary bus.nodes=1:9 --plot x.gif": "--plot x.gif: expected a name ending in .svg, .png",
     "--vary bus.nodes=1:9 --vary node.axes=1:3 --vary cycle.period_us=1:9 --plot x.svg": "draws one or two keys",
     "--vary cycle.period_us=1:900000 --plot x.svg": "--plot: 900,000 points",
     "--vary cycle.period_us=1:9000 --circle": "more circle tests than the 1,000",

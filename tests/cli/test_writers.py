@@ -168,7 +168,7 @@ def test_a_path_that_is_no_utf_8_is_escaped_in_every_document(run: Run, tmp_path
         ("check", "paper-4ms", "--no-circle", "--format", "json"),
         ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3", "--format", "csv"),
         ("sweep", "paper-4ms", "--vary", "bus.nodes=1:3"),
-        ("timeline", "paper-4ms", "--format", "mermaid"),
+        ("timeline", "paper-4ms", "--format", "svg"),
     ],
     ids=" ".join,
 )

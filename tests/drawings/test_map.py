@@ -10,7 +10,6 @@ from busplan.analysis.map.direction import AXES, PERIOD, Direction
 from busplan.analysis.map.trade_off import TradeOff, trade_off
 from busplan.drawings.map.characters import map_lines
 from busplan.drawings.map.labels import LOOKS, legend_of, look_of, looks_of
-from busplan.drawings.map.png import map_png
 from busplan.drawings.map.svg import map_svg
 from busplan.forms.inks import INKS
 from busplan.profile.shipped import load
@@ -157,14 +156,6 @@ def test_the_marks_of_the_svg_stand_on_their_cells() -> None:
     marks = "".join(text.text or "" for text in texts)
     assert len(marks) == len(HOLES.cells)
     assert [len((text.get("x") or "").split()) for text in texts] == [len(text.text or "") for text in texts]
-
-
-@pytest.mark.parametrize("found", [GAPS, WORDS, HOLES, CROWDED], ids=["gaps", "words", "holes", "crowded"])
-def test_the_png_is_one_and_the_same_each_time(found: TradeOff) -> None:
-    drawn = map_png(found, title="$x_1$ map")
-    assert drawn.startswith(b"\x89PNG")
-    if found is WORDS:
-        assert map_png(found, title="$x_1$ map") == drawn
 
 
 @pytest.mark.parametrize("state", LOOKS)

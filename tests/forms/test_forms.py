@@ -55,11 +55,10 @@ class Picture(Drawing):
     def svg(self) -> str:
         return '<svg class="busplan-picture"></svg>'
 
+    is_text_in_markdown = True
+
     def characters(self, width: int) -> list[Line]:
         return [Line("#" * width, "drawn")]
-
-    def mermaid(self) -> str:
-        return "gantt\n"
 
 
 def answer(*blocks: Block) -> Report:
@@ -241,9 +240,9 @@ def test_html_has_the_style_of_its_drawings_once() -> None:
     assert html.count('<svg class="busplan-picture">') == 2
 
 
-def test_markdown_has_mermaid_where_a_drawing_has_it() -> None:
+def test_markdown_has_a_drawing_in_characters() -> None:
     text = render(answer(*one_of_each()), "markdown")
-    assert "```mermaid\ngantt\n```" in text
+    assert "```text\n####" in text
     assert text.startswith("### An answer for `p`\n")
     assert render(answer()._replace(is_page=True), "markdown") == "# An answer for `p`\n"
     assert render(answer(Sentence(("Alone.",)))._replace(is_page=True), "table") == "An answer for p\nAlone.\n"

@@ -17,27 +17,16 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 
 
-def test_the_plot_of_axes_against_period_is_five_lines_and_true(
+def test_the_picture_of_axes_against_period_is_four_lines_and_true(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pytest.importorskip("matplotlib")
-    monkeypatch.setenv("MPLBACKEND", "Agg")
     monkeypatch.chdir(tmp_path)
     script = blocks("python")[0]
-    assert len(script.split("\n\n")) == 2
-    assert sum(map(bool, script.splitlines())) == 5
+    assert sum(map(bool, script.splitlines())) == 4
     names: dict[str, Any] = {}
     exec(compile(script, "python.md", "exec"), names)
-    figure = names["plt"].gcf()
-    try:
-        (line,) = figure.axes[0].lines
-        periods = list(range(250, 4001, 250))
-        found = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
-        assert line.get_xdata().tolist() == periods
-        assert line.get_ydata().tolist() == [one.safe_axes for one in found]
-        assert len(set(line.get_ydata())) > 5
-    finally:
-        names["plt"].close(figure)
+    found = busplan.capacity("paper-4ms", period_us=list(range(250, 4001, 250)), timing_model=["standard"]).results
+    assert names["most"] == max(one.safe_axes or 0 for one in found)
     assert (tmp_path / "axes.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -272,7 +272,7 @@ def test_without_a_circle_no_numpy_is_loaded() -> None:
     run = subprocess.run([sys.executable, "-c", code, *FORMATS], capture_output=True, text=True, check=True)
     loaded = set(run.stdout.splitlines()[-1].split())
     assert "busplan" in loaded
-    assert not {"numpy", "matplotlib", "rich", "multiprocessing"} & loaded
+    assert not {"numpy", "resvg_py", "rich", "multiprocessing"} & loaded
 
 
 def test_problems_that_are_not_listed_are_counted() -> None:

@@ -10,13 +10,13 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from busplan.errors import BusplanError
-from busplan.extras import require_matplotlib, require_pyarrow
+from busplan.extras import require_pyarrow, require_resvg
 from busplan.files import document_bytes, write_file
-from busplan.forms import ENDINGS, Form, render
+from busplan.forms import ENDINGS, Form, ending_expected, render
 from busplan.forms.blocks import Report
 from busplan.forms.terminal import block_lines
 
-_LIBRARIES: Final = MappingProxyType({".png": require_matplotlib, ".parquet": require_pyarrow})
+_LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
 """What must be there for a file, by ending."""
 
 
@@ -49,9 +49,8 @@ class Answer(ABC):
         Parameters
         ----------
         path
-            A name ending in .html, .md, .txt, .json or .csv; .svg for an answer with a picture. Maps, comparisons of
-            buses and timelines take .png (with the extra `plot`), timelines .mmd, and sweeps .jsonl and .parquet (with
-            the extra `table`).
+            A name ending in .html, .md, .txt, .json or .csv; .svg or .png (with the extra `plot`) for an answer with
+            a picture; .jsonl or .parquet (with the extra `table`) for a sweep.
 
         Raises
         ------
@@ -60,14 +59,15 @@ class Answer(ABC):
         """
         contents, ending = self._contents(), Path(path).suffix.lower()
         if ending not in contents:
-            raise BusplanError(f"{path}: expected a name ending in {', '.join(contents)}")
+            raise BusplanError(f"{path}: {ending_expected(ending, contents)}")
         if ending in _LIBRARIES:
             _LIBRARIES[ending](str(path))
         write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
 
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         """What makes the content of a file, by ending."""
-        return {**{ending: partial(self._text, form) for ending, form in ENDINGS.items()}, ".svg": self._svg}
+        texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
+        return {**texts, ".svg": self._svg, ".png": self._png}
 
     def _svg(self) -> str:
         """The picture, which not every answer has."""
@@ -75,6 +75,11 @@ class Answer(ABC):
         if found is None:
             raise BusplanError("there is nothing to draw: this answer has no picture")
         return found
+
+    def _png(self) -> bytes:
+        from busplan.forms.raster import png
+
+        return png(self._svg())
 
     def _text(self, form: Form) -> str:
         """The answer in a form."""
@@ -103,19 +108,3 @@ class Answer(ABC):
         from busplan.forms.picture import first_picture
 
         return first_picture(self._report().blocks())
-
-
-class DrawnAnswer(Answer):
-    """An answer that is a picture, which a file may hold alone."""
-
-    __slots__ = ()
-
-    @abstractmethod
-    def _pictures(self) -> Mapping[str, Callable[[], str | bytes]]:
-        """What draws it, by ending."""
-
-    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
-        return {**super()._contents(), **self._pictures()}
-
-    def _repr_svg_(self) -> str | None:
-        return str(self._pictures()[".svg"]())

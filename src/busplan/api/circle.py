@@ -8,6 +8,7 @@ from busplan.answers.circle import circle_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Periods, ProfileLike, load_profile, one_or_several
 from busplan.api.renamed import renamed
+from busplan.drawings.circle_plot import circle_svg
 from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -42,6 +43,9 @@ class CircleTestAnswer(Answer):
 
     def _report(self) -> Report:
         return circle_report(self._found, with_contributions=self.with_contributions)
+
+    def _repr_svg_(self) -> str | None:
+        return circle_svg(self._found) if any(self.runs) else None
 
     @property
     def _found(self) -> CircleTest:

@@ -1,16 +1,14 @@
 """`busplan.compare`."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 
 from busplan.analysis.comparison import kinds as analysis
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind
 from busplan.answers.compare import compare_report, headline, require_drawn
-from busplan.api.answer import DrawnAnswer
+from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, load_profile, one_or_several
-from busplan.drawings.pictures import compare_picture
-from busplan.forms import PICTURES, Picture
+from busplan.drawings.compare.svg import compare_svg
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.progress import Progress
@@ -18,7 +16,7 @@ from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CompareAnswer(DrawnAnswer):
+class CompareAnswer(Answer):
     """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
 
     Parameters
@@ -46,15 +44,12 @@ class CompareAnswer(DrawnAnswer):
         """
         return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
 
-    def _pictures(self) -> Mapping[str, Callable[[], str | bytes]]:
-        return {ending: partial(self._drawn, form) for ending, form in PICTURES.items()}
-
-    def _drawn(self, form: Picture) -> str | bytes:
+    def _svg(self) -> str:
         require_drawn(self._found)
-        return compare_picture(self._found, form, title=sentence_text(headline(self._found)))
+        return compare_svg(self._found, title=sentence_text(headline(self._found)))
 
     def _repr_svg_(self) -> str | None:
-        return DrawnAnswer._repr_svg_(self) if self._found.compared else None
+        return self._svg() if self._found.compared else None
 
     def _report(self) -> Report:
         return compare_report(self._found)

@@ -1,21 +1,19 @@
 """`busplan.map_`."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 from busplan.analysis.map import trade_off as analysis
 from busplan.analysis.map.cells import Cell, NotDrawn, Region
 from busplan.analysis.map.direction import Direction, checked_direction
 from busplan.analysis.map.trade_off import TradeOff
 from busplan.answers.map import headline, map_report
-from busplan.api.answer import DrawnAnswer
+from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, load_profile
 from busplan.api.renamed import renamed
 from busplan.api.sweep import axis_values
-from busplan.drawings.pictures import map_picture
+from busplan.drawings.map.svg import map_svg
 from busplan.errors import BusplanError
-from busplan.forms import PICTURES
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.sections.profile import Profile
@@ -24,7 +22,7 @@ Along = Mapping[str, str | Iterable[object]]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class MapAnswer(DrawnAnswer):
+class MapAnswer(Answer):
     """Answer of `map_`: where a design fits, which a notebook draws.
 
     Parameters
@@ -63,9 +61,8 @@ class MapAnswer(DrawnAnswer):
         """Cell of the profile's own setting; None if it is not on the map."""
         return self._found.own
 
-    def _pictures(self) -> Mapping[str, Callable[[], str | bytes]]:
-        draw = partial(map_picture, self._found, title=sentence_text(headline(self._found)))
-        return {ending: partial(draw, form) for ending, form in PICTURES.items()}
+    def _repr_svg_(self) -> str:
+        return map_svg(self._found, title=sentence_text(headline(self._found)))
 
     def _report(self) -> Report:
         return map_report(self._found)

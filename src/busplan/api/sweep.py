@@ -24,6 +24,7 @@ from busplan.answers.sweep.writers import rows_writer
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
 from busplan.api.renamed import renamed
+from busplan.drawings.sweep_plot import FigureData, default_figure, require_drawable
 from busplan.errors import BusplanError
 from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Report
@@ -88,6 +89,16 @@ class SweepAnswer(Answer):
     def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
         rows = {ending: partial(self._rows_in, form) for ending, form in ROWS_ENDINGS.items()}
         return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
+
+    def _svg(self) -> str:
+        """The picture of `busplan sweep --plot`."""
+        require_drawable(self.grid, option="the picture of a sweep")
+        drawn = FigureData(
+            self.profile, self.grid, figure=default_figure(self.profile), timing_models=self.timing_models
+        )
+        for block in self.blocks:
+            drawn.add(block)
+        return drawn.svg(self.profile.name)
 
     def _rows_in(self, form: RowsForm) -> bytes:
         """Every row in a form."""

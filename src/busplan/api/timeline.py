@@ -1,23 +1,20 @@
 """`busplan.timeline`."""
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule, totals, zoom
 from busplan.answers.timeline import timeline_report
-from busplan.api.answer import DrawnAnswer
+from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
-from busplan.drawings.pictures import timeline_picture
+from busplan.drawings.timeline.svg import timeline_svg
 from busplan.errors import BusplanError
-from busplan.forms import TIMELINE_PICTURES
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class TimelineAnswer(DrawnAnswer):
+class TimelineAnswer(Answer):
     """Answer of `timeline`.
 
     Parameters
@@ -51,9 +48,8 @@ class TimelineAnswer(DrawnAnswer):
     def _report(self) -> Report:
         return timeline_report(self._found)
 
-    def _pictures(self) -> Mapping[str, Callable[[], str | bytes]]:
-        draw = partial(timeline_picture, self._found, title=self._headline())
-        return {ending: partial(draw, form) for ending, form in TIMELINE_PICTURES.items()}
+    def _repr_svg_(self) -> str:
+        return timeline_svg(self._found, title=self._headline())
 
     @property
     def _found(self) -> Schedule:

@@ -17,11 +17,13 @@ from busplan.cli.changes import (
     takes_changes,
 )
 from busplan.cli.destinations import profile_files, require_apart
-from busplan.cli.options import AllOption, FormatOption, OutputOption, ProfileArgument, plot_format
+from busplan.cli.options import AllOption, FormatOption, OutputOption, ProfileArgument
 from busplan.cli.output import PlanFailsError, say
+from busplan.cli.pictures import plot_form
 from busplan.cli.progress import progress_bar
 from busplan.errors import BusplanError
-from busplan.files import NewFile, new_file
+from busplan.files import NewFile, document_bytes, new_file
+from busplan.forms import Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
@@ -84,7 +86,7 @@ def circle_test_command(
             "--plot",
             metavar="FILE",
             help="Draw the magnified polar error, the error over time and the ranked error sources, with tolerances, "
-            "into FILE.png, FILE.svg or FILE.pdf; an old file is replaced. Needs the extra plot (matplotlib).  "
+            "into FILE.svg or FILE.png; an old file is replaced. PNG needs the extra plot (resvg-py).  "
             "[default: no figure]",
         ),
     ] = None,
@@ -107,7 +109,7 @@ def circle_test_command(
     if every is not None and every < 1:
         raise BusplanError(f"--every {every}: must be 1 or more")
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
-    file_format = None if plot is None else plot_format(plot)
+    form = None if plot is None else plot_form(plot)
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
         from busplan.analysis.circle.roundness import circle_test
         from busplan.answers.circle import circle_report
@@ -126,22 +128,23 @@ def circle_test_command(
                 )
             if trace_file is not None:
                 _write_trace(test, trace_file, every=every or 10)
-            if plot_file is not None and file_format is not None:
-                _draw(test, plot_file, changes, file_format=file_format)
+            if plot_file is not None and form is not None:
+                _draw(test, plot_file, changes, form)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
         give(circle_report(test, with_contributions=contributions))
     if test.passed is False:
         raise PlanFailsError
 
 
-def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, *, file_format: str) -> None:
+def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, form: Picture) -> None:
     """Draw the simulated periods; without any, an old file stays unchanged."""
     if all(run is None for run in test.runs):
         file.abandon()
         return
-    from busplan.drawings.circle_plot import circle_figure
+    from busplan.drawings.circle_plot import circle_svg
+    from busplan.forms.raster import picture
 
-    file.write(circle_figure(test, file_format=file_format, note=changes.words))
+    file.write(document_bytes(picture(circle_svg(test, note=changes.words), form)))
 
 
 def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:

@@ -11,8 +11,7 @@ from busplan.cli.answering import answer, naming
 from busplan.cli.changes import NODES, load_changed, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
-from busplan.cli.output import write_document
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
 from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
@@ -84,7 +83,7 @@ def compare_command(
             require_apart({"--output": output}, inputs=profile_files(profile))
             with naming(changes):
                 found = _found(profile, buses, changes, with_circle=circle)
-                write_document(_picture(found, chosen, changes), output)
+                write_picture(_svg(found, changes), chosen, output)
         case _:
             with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
                 from busplan.answers.compare import compare_report
@@ -101,10 +100,10 @@ def _found(profile: str, buses: str | None, changes: KeyChanges, *, with_circle:
         return compare(load_changed(profile, changes), kinds=kinds, with_circle=with_circle, progress=progress)
 
 
-def _picture(found: "KindComparison", form: Picture, changes: KeyChanges) -> str | bytes:
+def _svg(found: "KindComparison", changes: KeyChanges) -> str:
     """The drawing as a file of its own."""
     from busplan.answers.compare import headline, require_drawn
-    from busplan.drawings.pictures import compare_picture
+    from busplan.drawings.compare.svg import compare_svg
 
     require_drawn(found)
-    return compare_picture(found, form, title=picture_title(headline(found), changes))
+    return compare_svg(found, title=picture_title(headline(found), changes))

@@ -11,8 +11,7 @@ from busplan.cli.answering import answer, naming
 from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
-from busplan.cli.output import write_document
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
 from busplan.cli.vary import VALUES_HELP, parse_axis
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, PICTURES, Form, Picture
@@ -91,7 +90,7 @@ def map_command(
             require_apart({"--output": output}, inputs=profile_files(profile))
             with naming(changes):
                 found = _found(load_changed(profile, changes), x, y, jobs=jobs, with_circle=circle)
-                write_document(_picture(found, chosen, changes), output)
+                write_picture(_svg(found, changes), chosen, output)
         case _:
             with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
                 from busplan.answers.map import map_report
@@ -120,9 +119,9 @@ def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: b
     return checked_direction(plan, key, values, option=option, circle_option=circle_option)
 
 
-def _picture(found: "TradeOff", form: Picture, changes: KeyChanges) -> str | bytes:
+def _svg(found: "TradeOff", changes: KeyChanges) -> str:
     """The drawing as a file of its own."""
     from busplan.answers.map import headline
-    from busplan.drawings.pictures import map_picture
+    from busplan.drawings.map.svg import map_svg
 
-    return map_picture(found, form, title=picture_title(headline(found), changes))
+    return map_svg(found, title=picture_title(headline(found), changes))

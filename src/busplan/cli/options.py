@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 import typer
 
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, Form
+from busplan.forms import ENDINGS, Form, ending_expected
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -121,24 +121,6 @@ def known_models(profile: "Profile") -> tuple[str, ...]:
     return model_names(profile)
 
 
-def plot_format(path: Path) -> str:
-    """File format of a figure, by the ending of its name.
-
-    Raises
-    ------
-    BusplanError
-        Another ending, or matplotlib is not installed.
-    """
-    from busplan.drawings.circle_plot import PLOT_FORMATS
-    from busplan.extras import require_matplotlib
-
-    file_format = path.suffix.removeprefix(".").lower()
-    if file_format not in PLOT_FORMATS:
-        raise BusplanError(f"--plot {path}: expected a name ending in .png, .svg or .pdf")
-    require_matplotlib("--plot")
-    return file_format
-
-
 STANDARD_OUTPUT: Final = Path("-")
 
 
@@ -187,7 +169,8 @@ def form_of_file(
     BusplanError
         The ending is not known.
     """
-    chosen = given or (default if output is None else forms.get(output.suffix.lower()))
+    ending = "" if output is None else output.suffix.lower()
+    chosen = given or (default if output is None else forms.get(ending))
     if chosen is None:
-        raise BusplanError(f"--output {output}: expected a name ending in {', '.join(forms)}, or --format")
+        raise BusplanError(f"--output {output}: {ending_expected(ending, forms, otherwise=', or --format')}")
     return chosen

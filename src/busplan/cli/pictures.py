@@ -5,7 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from busplan.cli.options import AnyForm, form_of_file
-from busplan.cli.output import refuse_terminal
+from busplan.cli.output import refuse_terminal, write_document
+from busplan.errors import BusplanError
+from busplan.extras import require_resvg
+from busplan.forms import PICTURES, Picture, ending_expected
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
 
 PICTURE_FORMAT_HELP: Final = (
     "Form of the answer; a table is text in lines. png is for a file or a pipe, and needs the extra plot "
-    "(matplotlib).  [default: by the ending of --output, else table]"
+    "(resvg-py).  [default: by the ending of --output, else table]"
 )
 """Of --format, where an answer may also be SVG or PNG."""
 
@@ -34,16 +37,43 @@ def picture_form(given: AnyForm | None, output: Path | None, *, forms: Mapping[s
     Raises
     ------
     BusplanError
-        The ending is not known, or the form is png and matplotlib is missing or standard output is a terminal.
+        The ending is not known, or the form is png and resvg-py is missing or standard output is a terminal.
     """
     chosen = form_of_file(given, output, forms=forms, default=forms[".txt"])
     if chosen == forms[".png"]:
         if output is None:
             refuse_terminal(chosen)
-        from busplan.extras import require_matplotlib
-
-        require_matplotlib(f"--format {chosen}")
+        require_resvg(f"--format {chosen}")
     return chosen
+
+
+def plot_form(path: Path) -> Picture:
+    """Form of the picture of --plot, by the ending of its name.
+
+    Raises
+    ------
+    BusplanError
+        The ending is not known, or the form is png and resvg-py is missing.
+    """
+    ending = path.suffix.lower()
+    if ending not in PICTURES:
+        raise BusplanError(f"--plot {path}: {ending_expected(ending, PICTURES)}")
+    if ending == ".png":
+        require_resvg("--plot")
+    return PICTURES[ending]
+
+
+def write_picture(svg: str, form: Picture, output: Path | None) -> None:
+    """Write a drawing to a file or to standard output.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be written.
+    """
+    from busplan.forms.raster import picture
+
+    write_document(picture(svg, form), output)
 
 
 def picture_title(headline: "Sentence", changes: KeyChanges) -> str:

@@ -16,9 +16,9 @@ from busplan.cli.options import (
     TimingOption,
     form_of_file,
     output_option,
-    plot_format,
 )
 from busplan.cli.output import refuse_terminal
+from busplan.cli.pictures import plot_form
 from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
 from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
-_DEFAULT_FIGURE: Final = "safe_axes"
-_FIGURE_OF_GROUPS: Final = "margin_corrected_us"
 
 
 @takes_changes(words="Not of a key that varies.")
@@ -91,8 +89,8 @@ def sweep_command(
         typer.Option(
             "--plot",
             metavar="FILE",
-            help="Draw --figure into FILE.png, FILE.svg or FILE.pdf: curves where one key varies, heat maps where two "
-            "do; an old file is replaced. Needs the extra plot (matplotlib).  [default: no figure]",
+            help="Draw --figure into FILE.svg or FILE.png: curves where one key varies, heat maps where two do; an old "
+            "file is replaced. PNG needs the extra plot (resvg-py).  [default: no figure]",
         ),
     ] = None,
     figure: Annotated[
@@ -176,7 +174,7 @@ def sweep_command(
     kept = None if output is None else partial_path(output)
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
-    file_format = None if plot is None else plot_format(plot)
+    plot_form_ = None if plot is None else plot_form(plot)
     from busplan.analysis.sweep.columns import circle_columns
     from busplan.analysis.sweep.grid import checked_grid, grid_models
     from busplan.analysis.sweep.seeds import without_seed
@@ -193,7 +191,6 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    drawn = figure or (_FIGURE_OF_GROUPS if loaded.group else _DEFAULT_FIGURE)
     _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=of_circle)
     run_sweep(
         SweepJob(
@@ -210,8 +207,8 @@ def sweep_command(
             sort_by=sort_by or None,
             ascending=order == "asc",
             plot=plot,
-            plot_format=file_format,
-            figure=drawn,
+            plot_form=plot_form_,
+            figure=figure,
             jobs=(jobs or available_processors()) if circle else None,
             force=force,
             cluster=cluster,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple, get_args
 
-from busplan.forms import Form, RowsForm
+from busplan.forms import Form, Picture, RowsForm
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
@@ -36,8 +36,9 @@ class SweepJob(NamedTuple):
     sort_by: str | None
     ascending: bool
     plot: Path | None
-    plot_format: str | None
-    figure: str
+    plot_form: Picture | None
+    figure: str | None
+    """Column of the picture; None for the default one."""
     jobs: int | None
     """Processes for circle tests, where there is no cluster; None without circle tests."""
     force: bool

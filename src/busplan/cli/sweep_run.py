@@ -11,7 +11,7 @@ from busplan.cli.progress import progress_bar
 from busplan.cli.sweep_job import TOP_FORMS
 from busplan.cli.sweep_sinks import sink_for
 from busplan.errors import WorkerLostError
-from busplan.files import new_file, partial_path
+from busplan.files import document_bytes, new_file, partial_path
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
@@ -77,12 +77,11 @@ def run_sweep(job: "SweepJob") -> None:
                 say(f"{parts.tests:,} of {all_tests:,} circle tests are in {parts.folder}: go on with --resume")
             signal = noted()
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
-        if drawing is not None and plot_file is not None and job.plot_format is not None:
-            plot_file.write(
-                drawing.draw(
-                    ", ".join(filter(None, (job.profile.name, job.changes.words))), file_format=job.plot_format
-                )
-            )
+        if drawing is not None and plot_file is not None and job.plot_form is not None:
+            from busplan.forms.raster import picture
+
+            svg = drawing.svg(", ".join(filter(None, (job.profile.name, job.changes.words))))
+            plot_file.write(document_bytes(picture(svg, job.plot_form)))
     for path in (job.output, job.plot):
         if path is not None:
             say(f"wrote {path}")
@@ -118,10 +117,11 @@ def _work(
 def _drawing(job: "SweepJob") -> "FigureData | None":
     if job.plot is None:
         return None
-    from busplan.drawings.sweep_plot import FigureData, require_drawable
+    from busplan.drawings.sweep_plot import FigureData, default_figure, require_drawable
 
-    require_drawable(job.grid)
-    return FigureData(job.profile, job.grid, figure=job.figure, timing_models=job.timing_models)
+    require_drawable(job.grid, option="--plot")
+    figure = job.figure or default_figure(job.profile)
+    return FigureData(job.profile, job.grid, figure=figure, timing_models=job.timing_models)
 
 
 def _require_few(job: "SweepJob") -> None:

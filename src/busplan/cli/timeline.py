@@ -18,19 +18,18 @@ from busplan.cli.options import (
     time_us,
     timing_model,
 )
-from busplan.cli.output import write_document
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
 from busplan.errors import BusplanError
-from busplan.forms import ENDINGS, TIMELINE_PICTURES, Form, TimelinePicture
+from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from busplan.analysis.timeline.schedule import Schedule
     from busplan.sections.profile import Profile
 
-TimelineForm = Literal[Form, TimelinePicture]
+TimelineForm = Literal[Form, Picture]
 
-_ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **TIMELINE_PICTURES})
+_ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **PICTURES})
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
@@ -115,10 +114,10 @@ def timeline_command(
         return zoom(schedule(plan, model=model), from_us=from_us, to_us=to_us, transaction=one)
 
     match chosen:
-        case "mermaid" | "svg" | "png":
+        case "svg" | "png":
             require_apart({"--output": output}, inputs=profile_files(profile))
             with naming(changes):
-                write_document(_picture(shown(), chosen, changes), output)
+                write_picture(_svg(shown(), changes), chosen, output)
         case _:
             with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
                 from busplan.answers.timeline import timeline_report
@@ -140,9 +139,9 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
     return match["kind"], int(match["node"])
 
 
-def _picture(shown: "Schedule", form: TimelinePicture, changes: KeyChanges) -> str | bytes:
+def _svg(shown: "Schedule", changes: KeyChanges) -> str:
     """The drawing as a file of its own."""
     from busplan.answers.timeline import headline
-    from busplan.drawings.pictures import timeline_picture
+    from busplan.drawings.timeline.svg import timeline_svg
 
-    return timeline_picture(shown, form, title=picture_title(headline(shown), changes))
+    return timeline_svg(shown, title=picture_title(headline(shown), changes))

@@ -1,1 +1,1 @@
-"""Drawings: what a chart shows, as SVG, in characters, in Mermaid, or by matplotlib."""
+"""Drawings: what a chart shows, as SVG and in characters."""

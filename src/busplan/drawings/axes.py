@@ -19,7 +19,7 @@ _HEIGHT: Final = 230
 _BELOW: Final = 44
 _MOST_LABELS: Final = 6
 """Most period labels: more do not fit on a phone."""
-_CSS: Final = ("first", "second")
+CURVES: Final = ("first", "second")
 """CSS classes of the curves, in the order of the timing models."""
 _WIDE: Final = 1000
 """Width of the curves' viewBox, which is stretched to the width of the drawing."""
@@ -68,13 +68,13 @@ class AxesDrawing(Drawing):
         _grid(root, plane)
         stretched = {"y": str(_TOP), "width": "100%", "height": str(_HEIGHT), "preserveAspectRatio": "none"}
         area = SubElement(root, "svg", {**stretched, "viewBox": f"0 0 {_WIDE} {_HEIGHT}", "overflow": "visible"})
-        for css, one in zip(_CSS, steps, strict=False):
+        for css, one in zip(CURVES, steps, strict=False):
             SubElement(area, "path", {"class": f"curve {css}", "d": _path(one, plane)})
         _figures(root, plane)
         _legend(root, steps)
         _own(root, plane, own_us, own_axes)
-        for css, one in zip(_CSS, steps, strict=False):
-            _mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
+        for css, one in zip(CURVES, steps, strict=False):
+            draw_mark(root, css, x=f"{plane.x(own_us):.5g}%", y=plane.y(one.max_axes(own_us)))
         return markup(root)
 
 
@@ -108,10 +108,10 @@ def _figures(root: Element, plane: _Plane) -> None:
 
 def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
     """Draw a piece of each curve with its name."""
-    for number, (css, one) in enumerate(zip(_CSS, steps, strict=False)):
+    for number, (css, one) in enumerate(zip(CURVES, steps, strict=False)):
         place = SubElement(root, "svg", {"x": str(110 * number), "overflow": "visible"})
         SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {css}"})
-        _mark(place, css, x="22", y=9)
+        draw_mark(place, css, x="22", y=9)
         text_at(place, one.timing_model, x="50", y=14)
 
 
@@ -155,8 +155,8 @@ def _own(root: Element, plane: _Plane, own_us: float, own_axes: int) -> None:
     text_at(box, plural(own_axes, "axis"), x=shift, y=y + 4, css="small halo", anchor=side)
 
 
-def _mark(root: Element, css: str, *, x: str, y: float) -> None:
-    """Draw a point of a curve: a square on the first, a diamond on the second."""
+def draw_mark(root: Element, css: str, *, x: str, y: float) -> None:
+    """Draw a point of a curve: a square on the first, a diamond on the second; `x` with its unit, `y` in px."""
     place = SubElement(root, "svg", {"x": x, "y": f"{y:.1f}", "overflow": "visible"})
-    turn = {} if css == _CSS[0] else {"transform": "rotate(45)"}
+    turn = {} if css == CURVES[0] else {"transform": "rotate(45)"}
     SubElement(place, "rect", {"x": "-4.5", "y": "-4.5", "width": "9", "height": "9", "class": f"mark {css}", **turn})

@@ -14,7 +14,8 @@ from busplan.forms.svg import drawing, markup, text_at
 from busplan.servo.path import Direction
 
 _WIDTH: Final = 470
-_HEIGHT: Final = 400
+HEIGHT: Final = 400
+"""Height of the drawing where it is not scaled, in px."""
 _NOMINAL: Final = 140
 """Drawn radius of the nominal circle."""
 _ARROW: Final = 0.62
@@ -33,23 +34,36 @@ class CircleDrawing(Drawing):
         Largest contour error that is allowed, where there is a limit [mm].
     direction
         Direction of rotation; the circle starts on the positive x axis.
+    scale
+        Scale of several circles that are compared; by default that of this one.
     """
 
     shape = "round"
 
-    def __init__(self, profile: ContourProfile, *, tolerance_mm: float | None, direction: Direction) -> None:
+    def __init__(
+        self,
+        profile: ContourProfile,
+        *,
+        tolerance_mm: float | None,
+        direction: Direction,
+        scale: Magnified | None = None,
+    ) -> None:
         self._profile = profile
         self._direction = direction
         largest_mm = max((abs(one) for one in (*profile.low_mm, *profile.high_mm) if one is not None), default=0.0)
-        self.scale = magnified(largest_mm, tolerance_mm=tolerance_mm)
+        self.scale = scale or magnified(largest_mm, tolerance_mm=tolerance_mm)
 
     def svg(self) -> str | None:
         """Draw the magnified circle; None if there is no error to show."""
-        scale = self.scale
-        if scale is None:
+        if self.scale is None:
             return None
         root = drawing("Circle with its contour error magnified", css="chart circle")
-        root.set("viewBox", f"{-_WIDTH // 2} {-_HEIGHT // 2} {_WIDTH} {_HEIGHT}")
+        self.draw(root, self.scale)
+        return markup(root)
+
+    def draw(self, root: Element, scale: Magnified) -> None:
+        """Draw the magnified circle into an SVG, whose coordinates are set."""
+        root.set("viewBox", f"{-_WIDTH // 2} {-HEIGHT // 2} {_WIDTH} {HEIGHT}")
         _cross(root)
         for error_mm in scale.rings_mm:
             _ring(root, scale.radius(error_mm), css="ring" if error_mm else "nominal")
@@ -60,7 +74,6 @@ class CircleDrawing(Drawing):
         SubElement(root, "circle", {"cx": f"{_NOMINAL}", "r": "4", "class": "point"})
         text_at(root, scale.ring_text, x="0", y=-6, css="centre", anchor="middle")
         text_at(root, "a ring", x="0", y=16, css="centre", anchor="middle")
-        return markup(root)
 
     def characters(self, width: int) -> list[Line] | None:
         """Draw the error over the angle; None if there is no error to show."""

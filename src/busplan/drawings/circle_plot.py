@@ -1,125 +1,205 @@
-"""The circle test as a matplotlib figure, as in ballbar reports. Needs the extra `plot`."""
+"""The circle test as one SVG: the magnified circle, the error over time, and the ranked error sources."""
 
-from io import BytesIO
-from textwrap import fill
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
+from xml.etree.ElementTree import Element, SubElement
 
-from busplan.errors import BusplanError
-from busplan.extras import require_matplotlib
-from busplan.forms.numbers import period
+import numpy as np
 
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.figure import Figure
+from busplan.analysis.circle.contour_profile import contour_profile
+from busplan.analysis.circle.roundness import CircleTest
+from busplan.drawings.bars import ROW, SignedBar, draw_bars, draw_zero
+from busplan.drawings.circle import HEIGHT, CircleDrawing
+from busplan.drawings.circle_rows import CircleRow, Curve, Scales, circle_rows, common_scales
+from busplan.drawings.frame import MARGIN_PERCENT, Frame, draw_frame, numbers
+from busplan.forms.numbers import decimals_of, period
+from busplan.forms.picture import styled
+from busplan.forms.svg import LINE, Scale, drawing, inside, markup, paragraph, text_at
 
-    from busplan.analysis.circle.roundness import CircleTest
-
-PLOT_FORMATS: Final = ("png", "svg", "pdf")
-_NAME_WIDTH: Final = 60
-"""Longest line of a name, in characters: even of wide ones it fits the figure."""
-_TITLE_WIDTH: Final = 110
-
-
-def circle_figure(test: "CircleTest", *, file_format: str, note: str = "") -> bytes:
-    """Draw the circle test into a file.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    file_format
-        One of `PLOT_FORMATS`.
-    note
-        What the title says besides the profile's name.
-
-    Returns
-    -------
-    bytes
-        Content of the file. The same test always gives the same bytes.
-
-    Raises
-    ------
-    BusplanError
-        matplotlib is not installed, or no period was simulated.
-    """
-    require_matplotlib("--plot")
-    from matplotlib import rc_context
-
-    buffer = BytesIO()
-    # A fixed salt makes the ids of an SVG reproducible.
-    with rc_context({"svg.hashsalt": "busplan"}):
-        draw_test(test, note=note).savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
-    return buffer.getvalue()
+_ERRORS: Final = 220
+"""Height of the error over time, in px."""
+_GAP: Final = 16
+_ROOM: Final = 0.08
+"""Empty room above and below the errors, as a share of their range."""
+_LETTER: Final = 9
+"""Width of a bold letter, about, in px."""
+_STYLE: Final = """\
+.chart .measured { stroke: var(--model-first); stroke-width: 1.4; }
+.chart .apart { stroke: var(--model-first); stroke-width: 1; stroke-opacity: .45; }
+.chart .during { fill: var(--model-first); fill-opacity: .08; }
+.chart .frame { fill: none; stroke: var(--plain); stroke-width: 1.4; stroke-dasharray: 4 3; }
+.chart .frame.passes { stroke: var(--good); stroke-dasharray: none; }
+.chart .frame.fails { fill: var(--bad); stroke: var(--bad); stroke-dasharray: none; }
+.chart .verdict { font-weight: 700; fill: var(--plain); }
+.chart .verdict.passes { fill: var(--good); }
+.chart .verdict.fails { fill: var(--paper); }
+"""
+_VERDICTS: Final = {True: ("PASSED", "passes"), False: ("FAILED", "fails"), None: ("NOT JUDGED", "")}
+"""Word of each verdict, and class of its frame: an outline, a filled box, a dashed outline."""
+_DIRECTIONS: Final = {"ccw": "counter-clockwise", "cw": "clockwise"}
 
 
-def metadata(file_format: str) -> dict[str, None]:
-    """Metadata without a date, so that the same test gives the same bytes."""
-    return {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(file_format, {})
+def circle_svg(test: CircleTest, *, note: str = "") -> str:
+    """Draw each simulated period on the same scales, one below the other.
 
-
-def draw_test(test: "CircleTest", *, note: str = "") -> "Figure":
-    """Draw a row for each simulated period: the magnified circle, the error over time, and error sources if ranked.
+    It fills the width of its container, from 320 px on.
 
     Parameters
     ----------
     test
-        The circle test.
+        The circle test, of which one period at least was simulated.
     note
         What the title says besides the profile's name.
-
-    Returns
-    -------
-    Figure
-        A figure of matplotlib. All rows have the same scales.
-
-    Raises
-    ------
-    BusplanError
-        No period was simulated.
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    from busplan.drawings.circle_panels import draw_errors, draw_ranking
-    from busplan.drawings.circle_polar import draw_circle
-    from busplan.drawings.circle_rows import circle_rows, common_scales
-
     rows = circle_rows(test)
-    if not rows:
-        raise BusplanError("--plot: nothing to draw, no period fits the bus")
     scales = common_scales(rows, test.profile.tolerance)
-    ranked = any(row.result.contributions for row in rows)
-    # A dollar sign in a name starts no formula.
-    with rc_context({"text.parse_math": False}):
-        figure = Figure(figsize=(15.5 if ranked else 11.0, 4.6 * len(rows) + 1.0), layout="constrained")
-        ratios = (1, 1.4, 0.8) if ranked else (1, 1.4)
-        panels = figure.subplots(len(rows), len(ratios), squeeze=False, width_ratios=ratios)
-        figure.suptitle(_title(test, note))
-        for (polar, over_time, *ranking), row in zip(panels, rows, strict=True):
-            draw_circle(polar, row, scales)
-            draw_errors(over_time, row, scales)
-            for axes in ranking:
-                draw_ranking(axes, row, rows, scales)
-        _legend(figure, columns=5 if ranked else 3)
-    return figure
+    root = drawing(f"Circle test of {test.profile.name}", css="chart circle-test")
+    body = inside(root, x_percent=MARGIN_PERCENT, width_percent=100 - 2 * MARGIN_PERCENT, y=0)
+    y = _title(body, test, note)
+    for row in rows:
+        y = _circle(body, row, scales, y=_head(body, row, scales, y=y + 2 * _GAP))
+        y = _errors(body, row, scales, y=y + _GAP)
+        y = _ranking(body, row, rows, scales, y=y)
+    root.set("height", str(_legend(body, rows, y=y + _GAP) + _GAP))
+    return styled(markup(root), css=_STYLE)
 
 
-def _title(test: "CircleTest", note: str) -> str:
+def _title(body: Element, test: CircleTest, note: str) -> int:
     """Name, note, grade of the servo values, and the periods that are not drawn."""
-    first = test.results[0]
-    servo = "ideal drive" if first.ideal_drive else f"servo values: {test.profile.servo.grades_text}"
+    servo = "ideal drive" if test.results[0].ideal_drive else f"servo values: {test.profile.servo.grades_text}"
     missing = [period(one.period_us) for one, run in zip(test.results, test.runs, strict=True) if run is None]
     without = f"not drawn, for the bus does not carry it: {', '.join(missing)}" if missing else ""
-    lines = (fill(line, _TITLE_WIDTH) for line in (note, f"circle test, {servo}", without) if line)
-    return "\n".join((fill(test.profile.name, _NAME_WIDTH), *lines))
+    y = paragraph(body, test.profile.name, y=8, css="head")
+    for line in filter(None, (note, f"circle test, {servo}", without)):
+        y = paragraph(body, line, y=y, css="small")
+    return y
 
 
-def _legend(figure: "Figure", *, columns: int) -> None:
-    """Explain each kind of line once, below all rows."""
-    kinds: dict[str, Artist] = {}
-    for axes in figure.axes:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            kinds.setdefault(label, handle)
-    figure.legend(
-        list(kinds.values()), list(kinds), loc="outside lower center", ncols=columns, frameon=False, fontsize=9
+def _head(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
+    """Write the setup, the verdict in a frame of its own, and what the circle shows."""
+    result = row.result
+    setup = f"{period(result.period_us)}, {result.feed_mm_per_min:g} mm/min, r {result.radius_mm:g} mm"
+    y = paragraph(body, setup, y=y, css="head") + 4
+    word, css = _VERDICTS[result.passed]
+    frame = {"x": "1", "y": str(y), "width": str(_LETTER * len(word) + 16), "height": str(LINE)}
+    SubElement(body, "rect", {**frame, "class": f"frame {css}".rstrip()})
+    text_at(body, word, x=str(9 + _LETTER * len(word) / 2), y=y + 15, css=f"verdict {css}".rstrip(), anchor="middle")
+    y += LINE + 6
+    deviation = measure_text(result.circular_deviation_mm, scales.tolerance.circular_deviation_mm, scales)
+    whole = "no G on a trapezoid" if result.path == "trapezoid" else f"G = {deviation}"
+    return paragraph(body, f"{_shown(row, scales)}; {whole}; {_DIRECTIONS[row.run.path.direction]}", y=y, css="small")
+
+
+def _shown(row: CircleRow, scales: Scales) -> str:
+    """What the circle shows, or why it is not drawn."""
+    if row.run.diverged:
+        return f"circle not drawn: the {'table left the circle' if row.result.stable else 'loop is unstable'}"
+    if scales.circle is None:
+        return "no contour error"
+    times = decimals_of(scales.circle.times(row.result.radius_mm), 0)
+    return f"{scales.circle.ring_text} a ring, {times} times magnified"
+
+
+def measure_text(value_mm: float | None, limit_mm: float | None, scales: Scales) -> str:
+    """Write a measure with its unit, and its tolerance where there is one."""
+    unit = scales.unit
+    value = "-" if value_mm is None else f"{decimals_of(value_mm * 1e3 * unit.per_um, 3)} {unit.name}"
+    return value if limit_mm is None else f"{value} (limit {unit.text(limit_mm * 1e3)})"
+
+
+def _circle(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
+    """Draw the circle of the page, on the scale of all periods."""
+    if row.run.diverged or scales.circle is None:
+        return y
+    y += _GAP
+    box = SubElement(body, "svg", {"class": "chart circle", "y": str(y), "width": "100%", "height": str(HEIGHT)})
+    shape = CircleDrawing(
+        contour_profile(row.run), tolerance_mm=None, direction=row.run.path.direction, scale=scales.circle
     )
+    shape.draw(box, scales.circle)
+    return y + HEIGHT
+
+
+def _errors(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
+    """Draw the contour error over time, with its mean and maximum above, and return the y below it."""
+    errors, unit, tolerance = scales.errors, scales.unit, scales.tolerance
+    result, limit_mm = row.result, tolerance.max_contour_error_mm
+    mean = measure_text(result.mean_contour_error_mm, tolerance.mean_contour_error_mm, scales)
+    largest = measure_text(result.max_contour_error_mm, limit_mm, scales)
+    y = paragraph(body, f"mean {mean}, max {largest}", y=y, css="head")
+    room_um = _ROOM * (errors.top_um - errors.bottom_um) or 1.0
+    label = ", ".join(filter(None, (f"contour error [{unit.name}]", errors.zero_outside)))
+    up = numbers(label, (errors.bottom_um - room_um) * unit.per_um, (errors.top_um + room_um) * unit.per_um)
+    frame = draw_frame(body, numbers("time [s]", 0.0, row.curves[-1].time_s[-1]), up, y=y, height=_ERRORS)
+    for curve in row.curves:
+        _curve(frame, curve, per_um=unit.per_um)
+    if not errors.zero_outside:
+        frame.line(y=0.0, css="zero")
+    for limit in () if limit_mm is None else (-limit_mm * 1e3 * unit.per_um, limit_mm * 1e3 * unit.per_um):
+        if up.low <= limit <= up.high:
+            frame.line(y=limit, css="tolerance")
+    return frame.bottom
+
+
+def _curve(frame: Frame, curve: Curve, *, per_um: float) -> None:
+    """Draw a part of the move: the measured one strong and on a shade, the rest pale."""
+    if curve.measured:
+        start, end = (frame.across.share(float(curve.time_s[end])) for end in (0, -1))
+        box = {"x": f"{100 * start:.5g}%", "width": f"{100 * (end - start):.5g}%", "y": str(frame.top)}
+        SubElement(frame.area, "rect", {**box, "height": str(frame.height), "class": "during"})
+    # Far outside, the place of a point does not matter; a huge one cannot be drawn.
+    spread = frame.up.high - frame.up.low
+    errors = np.clip(curve.error_um * per_um, frame.up.low - spread, frame.up.high + spread)
+    points = (frame.point(float(x), float(error)) for x, error in zip(curve.time_s, errors, strict=True))
+    css = "measured" if curve.measured else "apart"
+    SubElement(frame.plot, "path", {"class": f"curve {css}", "d": f"M{'L'.join(points)}"})
+
+
+def _ranking(body: Element, row: CircleRow, rows: Sequence[CircleRow], scales: Scales, *, y: int) -> int:
+    """Draw what each error source takes from the largest error, largest first, and return the y below it.
+
+    Periods whose table followed the circle share a scale, the others another one.
+    """
+    if not row.result.contributions:
+        return y
+    unit = scales.unit
+    y = (
+        paragraph(
+            body, f"Each error source removed in turn: taken from the largest error [{unit.name}]", y=y, css="head"
+        )
+        + 4
+    )
+    alike = [each for each in rows if each.run.diverged == row.run.diverged]
+    taken = [one.removed_mm * 1e3 * unit.per_um for each in alike for one in each.result.contributions or ()]
+    low, high = min(0.0, *taken), max(0.0, *taken)
+    scale = Scale(low, high if high > low else low + 1.0)
+    bars = []
+    for one in row.result.contributions:
+        value = one.removed_mm * 1e3 * unit.per_um
+        words = decimals_of(value, 3, signed=True)
+        bars.append(
+            SignedBar(one.source.replace("_", " "), value, words, unit.name, "takes" if value >= 0 else "hides")
+        )
+    bottom = y + ROW * len(bars)
+    draw_zero(body, scale, top=y, bottom=bottom)
+    draw_bars(body, bars, scale, y=y)
+    return scale.marks(SubElement(body, "g"), top=bottom, bottom=bottom)
+
+
+def _legend(body: Element, rows: Sequence[CircleRow], *, y: int) -> int:
+    """Explain each kind of line that is drawn once, and return the y below."""
+    drawn = {each.get("class") for each in body.iter()}
+    turn = rows[0].result.path != "trapezoid"
+    entries = {
+        "curve measured": "measured: one whole turn" if turn else "measured: arc at constant speed",
+        "curve apart": "the rest: lead-in and ramps" if turn else "the rest: ramps and settling",
+        "nominal": "nominal circle",
+        "tolerance": "tolerance of the largest contour error",
+    }
+    for css, words in entries.items():
+        if css not in drawn:
+            continue
+        SubElement(body, "line", {"x1": "0", "x2": "28", "y1": str(y + 11), "y2": str(y + 11), "class": css})
+        text_at(body, words, x="36", y=y + 15)
+        y += LINE
+    return y

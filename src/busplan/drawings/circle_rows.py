@@ -15,7 +15,7 @@ from busplan.servo.contour import contour_error
 
 Floats = NDArray[np.float64]
 
-_MAX_POINTS: Final = 8000
+_MAX_POINTS: Final = 2000
 """Most points of one curve: more would not be visible."""
 
 
@@ -23,7 +23,6 @@ class Curve(NamedTuple):
     """A part of the move. Of many points, the smallest and the largest error of each stretch are kept."""
 
     time_s: Floats
-    angle: Floats
     error_um: Floats
     measured: bool
 
@@ -99,9 +98,8 @@ def _curves(run: CircleRun) -> tuple[Curve, ...]:
     curves = []
     for first, end, measured in parts:
         kept = first + extremes(error_um[first:end], most=_MAX_POINTS)
-        angle = np.arctan2(run.y_mm[kept], run.x_mm[kept])
         time_s = (kept + 1).astype(np.float64) * (run.timing.step_us / 1e6)
-        curves.append(Curve(time_s, angle, error_um[kept], measured))
+        curves.append(Curve(time_s, error_um[kept], measured))
     return tuple(curves)
 
 

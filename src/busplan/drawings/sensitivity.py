@@ -1,40 +1,20 @@
 """What each small change does to the margin, as bars to the left and to the right of zero."""
 
 from collections.abc import Iterator
-from typing import Final, NamedTuple
-from xml.etree.ElementTree import Element, SubElement
+from typing import Final
+from xml.etree.ElementTree import SubElement
 
 from busplan.analysis.capacity.sensitivity import Sensitivity
+from busplan.drawings.bars import ROW, SignedBar, draw_bars, draw_zero
 from busplan.forms.blocks import Drawing
 from busplan.forms.lines import Line
 from busplan.forms.numbers import decimals_of
-from busplan.forms.svg import LINE, Scale, drawing, markup, text_at
+from busplan.forms.svg import Scale, drawing, markup
 
-_BAR: Final = 12
-_GAP: Final = 6
 _DECIMALS: Final = 3
 _NARROWEST: Final = 10
 """Least columns of the bars in characters."""
 _TAKES, _ADDS, _ZERO = "-", "+", "|"
-
-
-class _Bar(NamedTuple):
-    """A bar between zero and a change of the margin."""
-
-    change: str
-    us: float
-
-    @property
-    def start_us(self) -> float:
-        return min(self.us, 0.0)
-
-    @property
-    def end_us(self) -> float:
-        return max(self.us, 0.0)
-
-    @property
-    def words(self) -> str:
-        return decimals_of(self.us, _DECIMALS, signed=True)
 
 
 class SensitivityDrawing(Drawing):
@@ -48,7 +28,7 @@ class SensitivityDrawing(Drawing):
 
     def __init__(self, found: Sensitivity) -> None:
         self._bars = [
-            _Bar(one.change, one.margin_change_us) for one in found.effects if one.margin_change_us is not None
+            _bar(one.change, one.margin_change_us) for one in found.effects if one.margin_change_us is not None
         ]
         self._margin_us = found.now.margin_corrected_us
         self._least_us = min((one.start_us for one in self._bars), default=0.0)
@@ -70,16 +50,11 @@ class SensitivityDrawing(Drawing):
             return None
         root = drawing("What each small change does to the corrected margin", css="chart sensitivity")
         scale = Scale(self._least_us, self._most_us)
-        bottom = len(self._bars) * (LINE + _BAR + _GAP)
-        _line(root, scale.percent(0.0), bottom, css="zero")
+        bottom = len(self._bars) * ROW
+        draw_zero(root, scale, top=0, bottom=bottom)
         if self.shows_the_end:
-            _line(root, scale.percent(-self._margin_us), bottom, css="edge")
-        for number, one in enumerate(self._bars):
-            y = number * (LINE + _BAR + _GAP)
-            text_at(root, one.change, x="0", y=y + 15, css="halo")
-            text_at(root, f"{one.words} us", x="100%", y=y + 15, css="small halo", anchor="end")
-            css = "takes" if one.us < 0 else "hides"
-            scale.rect(root, one, y=y + LINE, height=_BAR, css=css, title=f"{one.change}, {one.words} us")
+            draw_zero(root, scale, top=0, bottom=bottom, at=-self._margin_us, css="edge")
+        draw_bars(root, self._bars, scale, y=0)
         root.set("height", str(scale.marks(SubElement(root, "g"), top=bottom, bottom=bottom)))
         return markup(root)
 
@@ -88,20 +63,21 @@ class SensitivityDrawing(Drawing):
         return None if self.is_empty else [Line(one, "drawn") for one in self._rows(width)]
 
     def _rows(self, width: int) -> Iterator[str]:
-        names = max(len(one.change) for one in self._bars)
+        names = max(len(one.label) for one in self._bars)
         figures = max(len(one.words) for one in self._bars)
         columns = max(_NARROWEST, width - names - figures - 5)
         left, right = _shared(columns, least=self._least_us, most=self._most_us)
         for one in self._bars:
-            size = _columns(one.us, self._least_us if one.us < 0 else self._most_us, left if one.us < 0 else right)
-            takes, adds = (_TAKES * size, "") if one.us < 0 else ("", _ADDS * size)
+            size = _columns(
+                one.value, self._least_us if one.value < 0 else self._most_us, left if one.value < 0 else right
+            )
+            takes, adds = (_TAKES * size, "") if one.value < 0 else ("", _ADDS * size)
             bar = f"{takes.rjust(left)}{_ZERO}{adds.ljust(right)}"
-            yield f"{one.change.ljust(names)}  {bar}  {one.words.rjust(figures)}"
+            yield f"{one.label.ljust(names)}  {bar}  {one.words.rjust(figures)}"
 
 
-def _line(root: Element, percent: float, bottom: int, *, css: str) -> None:
-    x = f"{percent:.5g}%"
-    SubElement(root, "line", {"x1": x, "x2": x, "y1": "0", "y2": str(bottom), "class": css})
+def _bar(change: str, us: float) -> SignedBar:
+    return SignedBar(change, us, decimals_of(us, _DECIMALS, signed=True), "us", "takes" if us < 0 else "hides")
 
 
 def _shared(columns: int, *, least: float, most: float) -> tuple[int, int]:

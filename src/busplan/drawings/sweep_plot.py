@@ -1,45 +1,52 @@
-"""A sweep as a matplotlib figure: curves over one key, heat maps over two. Needs the extra `plot`."""
+"""A figure of a sweep as a picture: curves over one key, heat maps over two."""
 
 from collections.abc import Sequence
-from io import BytesIO
-from textwrap import fill
+from typing import Final
 
 import numpy as np
 
 from busplan.analysis.network import bus_of
 from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Grid
-from busplan.drawings.circle_plot import metadata
+from busplan.drawings.sweep_panels import sweep_svg
 from busplan.drawings.sweep_scales import key_label, plot_scale, plotted_figure
-from busplan.drawings.sweep_words import Panel, Plotted, caption
+from busplan.drawings.sweep_words import Panel, Plotted
 from busplan.errors import BusplanError
-from busplan.extras import require_matplotlib
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
-MAX_DRAWN = 250_000
+MAX_DRAWN: Final = 250_000
 """Most points of a figure: more would not be visible."""
-_MAX_KEYS = 2
-_LINE_CHARACTERS = 100
-_MAP_INCHES = 6.4
+_MAX_KEYS: Final = 2
 
 
-def require_drawable(grid: Grid) -> None:
-    """Refuse a grid that cannot be drawn, before it is computed.
+def default_figure(profile: Profile) -> str:
+    """Column that is drawn if none is asked for; of groups, the most axes are no single number."""
+    return "margin_corrected_us" if profile.group else "safe_axes"
+
+
+def require_drawable(grid: Grid, *, option: str) -> None:
+    """Refuse a grid that cannot be drawn.
+
+    Parameters
+    ----------
+    grid
+        The grid.
+    option
+        What asks for the picture, for messages.
 
     Raises
     ------
     BusplanError
-        More than two keys vary, there are too many points, or matplotlib is not installed.
+        More than two keys vary, or there are too many points.
     """
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
     if not grid.axes:
-        raise BusplanError("--plot: draws figures over one or two keys, and none varies but the seed; vary another")
+        raise BusplanError(f"{option}: draws figures over one or two keys, and none varies but the seed; vary another")
     if len(varied) > _MAX_KEYS:
-        raise BusplanError(f"--plot: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
+        raise BusplanError(f"{option}: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
     if grid.points > MAX_DRAWN:
-        raise BusplanError(f"--plot: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
-    require_matplotlib("--plot")
+        raise BusplanError(f"{option}: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
 
 
 class FigureData:
@@ -71,32 +78,16 @@ class FigureData:
             unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
             self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
 
-    def draw(self, title: str, *, file_format: str) -> bytes:
-        """Draw the collected values, the timing models side by side; the same sweep gives the same bytes.
+    def svg(self, title: str) -> str:
+        """Draw the collected values; the same sweep gives the same SVG.
 
         Parameters
         ----------
         title
-            Name of the profile.
-        file_format
-            png, svg or pdf.
+            Name of the profile, and what was set.
         """
-        from matplotlib import rc_context
-        from matplotlib.figure import Figure
-
-        from busplan.drawings.sweep_panels import draw_curves, draw_maps
-
         plotted = self.plotted()
-        is_map = len(plotted.scales) == _MAX_KEYS
-        width = _MAP_INCHES * max(1, len(plotted.panels)) + 1.0 if is_map else 8.0
-        buffer = BytesIO()
-        with rc_context({"text.parse_math": False, "svg.hashsalt": "busplan"}):
-            figure = Figure(figsize=(width, 5.4), layout="constrained")
-            head = fill(f"{title}: {plotted.label}{self._fixed()}", _LINE_CHARACTERS)
-            figure.suptitle(f"{head}\n{fill(caption(plotted), int(13 * width))}", fontsize=11)
-            (draw_maps if is_map else draw_curves)(figure, plotted)
-            figure.savefig(buffer, format=file_format, dpi=120, metadata=metadata(file_format))
-        return buffer.getvalue()
+        return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
 
     def plotted(self) -> Plotted:
         """What is drawn, in words and in its unit."""

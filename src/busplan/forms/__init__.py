@@ -1,6 +1,6 @@
 """The blocks of an answer, and one module for each form that writes them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, Literal, assert_never
 
@@ -11,8 +11,7 @@ Form = Literal["table", "markdown", "html", "csv", "json"]
 RowsForm = Literal["csv", "json", "jsonl", "parquet"]
 """Forms with every row of a sweep, written during it."""
 Picture = Literal["svg", "png"]
-"""Forms of a picture that is a file of its own. A PNG needs the extra `plot` (matplotlib)."""
-TimelinePicture = Literal["mermaid", "svg", "png"]
+"""Forms of a picture that is a file of its own. A PNG needs the extra `plot` (resvg-py)."""
 ENDINGS: Final[Mapping[str, Form]] = MappingProxyType(
     {".txt": "table", ".md": "markdown", ".html": "html", ".csv": "csv", ".json": "json"}
 )
@@ -20,8 +19,20 @@ ROWS_ENDINGS: Final[Mapping[str, RowsForm]] = MappingProxyType(
     {".csv": "csv", ".json": "json", ".jsonl": "jsonl", ".parquet": "parquet"}
 )
 PICTURES: Final[Mapping[str, Picture]] = MappingProxyType({".svg": "svg", ".png": "png"})
-TIMELINE_PICTURES: Final[Mapping[str, TimelinePicture]] = MappingProxyType({".mmd": "mermaid", **PICTURES})
 """Form by file name extension."""
+
+
+def ending_expected(ending: str, known: Iterable[str], *, otherwise: str = "") -> str:
+    """Say which endings a file name may have, instead of another one.
+
+    Examples
+    --------
+    >>> ending_expected(".pdf", [".svg", ".png"])
+    'expected a name ending in .svg, .png; for a PDF write .svg: a browser prints it'
+    """
+    endings = list(known)
+    pdf = "; for a PDF write .svg: a browser prints it" if ending == ".pdf" and ".svg" in endings else ""
+    return f"expected a name ending in {', '.join(endings)}{otherwise}{pdf}"
 
 
 def render(report: "Report", form: Form) -> str:

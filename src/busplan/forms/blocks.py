@@ -167,7 +167,7 @@ class Drawing(ABC):
     """CSS of its SVG, included once in a page."""
     shape: ClassVar[Literal["wide", "round"]] = "wide"
     is_text_in_markdown: ClassVar[bool] = False
-    """If True, Markdown shows it in characters where it is no Mermaid diagram."""
+    """If True, Markdown shows it in characters."""
 
     @abstractmethod
     def svg(self) -> str | None:
@@ -175,10 +175,6 @@ class Drawing(ABC):
 
     def characters(self, width: int) -> list[Line] | None:  # noqa: ARG002 - optional
         """Draw it in characters, `width` columns wide."""
-        return None
-
-    def mermaid(self) -> str | None:
-        """Write it as a Mermaid diagram."""
         return None
 
 

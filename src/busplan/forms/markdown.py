@@ -91,12 +91,9 @@ def _lines(block: Block, *, level: int) -> Iterator[str]:
 
 
 def _chart(chart: Chart) -> Iterator[str]:
-    """A drawing as a diagram or in characters; where it is neither, what it shows in words."""
-    mermaid = chart.drawing.mermaid()
-    lines = chart.drawing.characters(_TEXT_WIDTH) if chart.drawing.is_text_in_markdown and mermaid is None else None
-    if mermaid is not None:
-        yield from (*_caption(chart.caption), "```mermaid", mermaid.rstrip("\n"), "```")
-    elif lines:
+    """A drawing in characters, or else what it shows in words."""
+    lines = chart.drawing.characters(_TEXT_WIDTH) if chart.drawing.is_text_in_markdown else None
+    if lines:
         yield from (*_caption(chart.caption), "```text", *plain_text(lines).splitlines(), "```")
     else:
         yield f"{_sentence(chart.caption).removesuffix('.')}."

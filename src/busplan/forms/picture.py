@@ -23,19 +23,27 @@ def first_picture(blocks: Sequence[Block]) -> str | None:
         None if no chart can be drawn.
     """
     for block in blocks:
+        found = None
         if isinstance(block, Chapter):
             found = first_picture(block.blocks)
-        else:
-            found = block.drawing.svg() if isinstance(block, Chart) else None
-            found = None if found is None else _styled(found)
+        elif isinstance(block, Chart) and (svg := block.drawing.svg()) is not None:
+            found = styled(svg, css=block.drawing.stylesheet)
         if found is not None:
             return found
     return None
 
 
-def _styled(svg: str) -> str:
-    """Add the style sheet of the page's charts to a drawing."""
+def styled(svg: str, *, css: str = "") -> str:
+    """Add the style sheet of the page's charts to a drawing of the class `chart`.
+
+    Parameters
+    ----------
+    svg
+        The drawing.
+    css
+        Rules of its own.
+    """
     chart = (files("busplan.forms") / "templates" / "chart.css").read_text(encoding="utf-8")
     light, dark = fills(".chart")
     head, body = svg.split(">", 1)
-    return f"{head}>\n<style>{chart}{_PAPER}{light}{DARK}{{{dark}}}</style>{body}"
+    return f"{head}>\n<style>{chart}{_PAPER}{css}{light}{DARK}{{{dark}}}</style>{body}"

@@ -19,7 +19,7 @@ class RoundStep(NamedTuple):
 class Tick(NamedTuple):
     """One tick mark of a scale."""
 
-    at_us: float
+    at: float
     label: str
 
 
@@ -51,13 +51,13 @@ def ring_step(largest: float) -> float:
     return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
 
 
-def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
+def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     """Tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
 
     Parameters
     ----------
-    from_us, to_us
-        The window [us].
+    low, high
+        The window, in any unit.
     most
         Largest number of marks, 1 or more.
 
@@ -69,9 +69,8 @@ def ticks(from_us: float, to_us: float, *, most: int) -> tuple[Tick, ...]:
     ['0.0', '0.1', '0.2', '0.3']
     """
     # A step longer than this gives at most `most` marks, wherever the window begins.
-    smallest_us = (to_us - from_us) / most * (1 + 1e-6)
-    step = next(one for one in round_steps(smallest_us) if one.size > smallest_us)
-    step_us = step.size
-    first, last = ceil(from_us / step_us - 1e-9), floor(to_us / step_us + 1e-9)
+    smallest = (high - low) / most * (1 + 1e-6)
+    step = next(one for one in round_steps(smallest) if one.size > smallest)
+    first, last = ceil(low / step.size - 1e-9), floor(high / step.size + 1e-9)
     decimals = max(0, -step.power)
-    return tuple(Tick(number * step_us, f"{number * step_us:.{decimals}f}") for number in range(first, last + 1))
+    return tuple(Tick(number * step.size, f"{number * step.size:.{decimals}f}") for number in range(first, last + 1))

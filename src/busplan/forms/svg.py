@@ -99,7 +99,7 @@ class Scale:
         if max((len(tick.label) for tick in marks), default=0) > _SHORT:
             marks = ticks(self._from_us, self._to_us, most=_TICKS // 2)
         for tick in marks:
-            at = self.percent(tick.at_us)
+            at = self.percent(tick.at)
             x = f"{at:.5g}%"
             SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(top), "y2": str(bottom + 4), "class": "rule"})
             anchor = "start" if at < 4 else "end" if at > 96 else "middle"  # noqa: PLR2004 - percent: the edges

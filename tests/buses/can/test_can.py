@@ -294,7 +294,7 @@ FORMS = {
     "capacity --sensitivity": ("table", "json", "csv"),
     "latency": ("table", "csv"),
     "plan": ("table", "json"),
-    "timeline": ("table", "mermaid", "svg"),
+    "timeline": ("table", "markdown", "svg"),
     "map": ("markdown", "svg"),
     "report": ("html", "markdown"),
     "check": ("text", "sarif"),

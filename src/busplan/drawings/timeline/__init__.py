@@ -1,1 +1,1 @@
-"""The timeline of a cycle in characters, as SVG, PNG and Mermaid."""
+"""The timeline of a cycle in characters and as SVG."""

@@ -163,7 +163,7 @@ class _Bar:
         """Labels of round times below their columns."""
         text = " " * self._columns
         for tick in ticks(self._from_us, self._to_us, most=max(2, self._columns // _TICK_COLUMNS)):
-            at = self._column(tick.at_us)
+            at = self._column(tick.at)
             if text[max(0, at - 1) :].strip():
                 continue
             text = f"{text[:at]}{tick.label}{text[at + len(tick.label) :]}"

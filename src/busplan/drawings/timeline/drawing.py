@@ -2,7 +2,6 @@
 
 from busplan.analysis.timeline.schedule import Schedule
 from busplan.drawings.timeline.characters import timeline_lines
-from busplan.drawings.timeline.mermaid import timeline_mermaid
 from busplan.drawings.timeline.svg import timeline_svg
 from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import Drawing
@@ -21,6 +20,7 @@ class TimelineDrawing(Drawing):
     """
 
     stylesheet = stylesheet()
+    is_text_in_markdown = True
 
     def __init__(self, plan: Schedule, *, title: str) -> None:
         self._plan, self._title = plan, title
@@ -32,7 +32,3 @@ class TimelineDrawing(Drawing):
     def characters(self, width: int) -> list[Line]:
         """Draw the whole period as a strip, and the window in lanes."""
         return timeline_lines(self._plan, width=width)
-
-    def mermaid(self) -> str:
-        """Write a gantt chart."""
-        return timeline_mermaid(self._plan, title=self._title)

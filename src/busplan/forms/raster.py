@@ -1,0 +1,55 @@
+"""An SVG as PNG, in its light colours and in the font that travels with the package. A PNG needs the extra `plot`."""
+
+import re
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from busplan.forms import Picture
+
+WIDTH: Final = 640
+"""Width that a PNG gives to a drawing as wide as its container, in px."""
+_ZOOM: Final = 2.0
+"""Pixels of the PNG for a px of the SVG."""
+_MOST_HEIGHT: Final = 16_000
+"""Most pixels down: of a higher drawing, a px is less than `_ZOOM` pixels."""
+_FONT: Final = '* {font-family:"DejaVu Sans Subset" !important}'
+_VARIABLE: Final = re.compile(r"(--[\w-]+):\s*([^;]+);")
+
+
+def png(svg: str) -> bytes:
+    """Convert a drawing of `busplan.forms.svg`; the same drawing gives the same bytes.
+
+    Characters that the font lacks are of a font of this computer, and a box where none has them.
+
+    Parameters
+    ----------
+    svg
+        A drawing as wide as its container, with its style sheet.
+    """
+    import resvg_py
+
+    height = re.search(r'\bheight="(\d+)"', svg)
+    zoom = min(_ZOOM, _MOST_HEIGHT / int(height[1])) if height else _ZOOM
+    with as_file(files("busplan.forms") / "fonts") as fonts:
+        return resvg_py.svg_to_bytes(
+            svg_string=_literal(svg).replace('width="100%"', f'width="{WIDTH}"', 1),
+            background="#ffffff",
+            zoom=zoom,
+            font_files=[str(fonts / "regular.ttf"), str(fonts / "bold.ttf")],
+            style_sheet=_FONT,
+        )
+
+
+def picture(svg: str, form: "Picture") -> str | bytes:
+    """Give a drawing as the content of a file."""
+    return svg if form == "svg" else png(svg)
+
+
+def _literal(svg: str) -> str:
+    """Replace CSS variables in the style sheet by their light values, the first ones: resvg does not know variables."""
+    before, start, rest = svg.partition("<style>")
+    sheet, end, behind = rest.partition("</style>")
+    values = dict(reversed(_VARIABLE.findall(sheet)))
+    sheet = re.sub(r"var\((--[\w-]+)\)", lambda match: values[match[1]], sheet)
+    return f"{before}{start}{sheet}{end}{behind}"
