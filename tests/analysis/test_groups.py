@@ -395,23 +395,35 @@ def test_a_plan_keeps_room_in_each_group() -> None:
 # --- each node's own way ----------------------------------------------------------------------------------
 
 
-def test_each_node_is_drawn_at_its_own_hops(make: Callable[..., Profile]) -> None:
-    profile = make(bus__nodes=4, bus__charge_hops="own")
+@pytest.mark.parametrize(
+    ("kind", "root", "steps"), [("request_data", None, 1), ("arbitration", None, 0), ("arbitration", "host", 1)]
+)
+def test_each_node_is_drawn_at_its_own_hops(
+    make: Callable[..., Profile], kind: str, root: str | None, steps: int
+) -> None:
+    """Arbitration goes to the root, which may lie at the end of the chain."""
+    profile = make(bus__nodes=4, bus__charge_hops="own", bus__root=root)
     hop_us = 0.023 + 14 / 98.304
     first_us: dict[int, float] = {}
     for event in cycle_of(profile, model="standard").events():
-        if event.kind == "arbitration" and event.transaction == "read" and event.node is not None:
+        if event.kind == kind and event.transaction == "read" and event.node is not None:
             first_us.setdefault(event.node, event.us)
     assert list(first_us) == [1, 2, 3, 4]
     steps_us = [first_us[node + 1] - first_us[node] for node in (1, 2, 3)]
-    assert steps_us == pytest.approx([hop_us] * 3, rel=1e-9)
+    assert steps_us == pytest.approx([steps * hop_us] * 3, rel=1e-9)
 
 
-def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(make: Callable[..., Profile]) -> None:
-    """Three nodes: 1 + 2 + 3 hops instead of 3 * 3, for the six parts of a read's and of a write's packets."""
+@pytest.mark.parametrize(("root", "parts"), [("host", 12), (None, 8)])
+def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(
+    make: Callable[..., Profile], root: str | None, parts: int
+) -> None:
+    """Three nodes: 1 + 2 + 3 hops instead of 3 * 3, for the six parts of a read's and of a write's packets.
+
+    Two of the six arbitrate, and do so over the own way only where the host is the root.
+    """
     own, farthest = (
         next(doubt for doubt in cycle_of(one, model="standard").doubts() if doubt.key == "bus.phy_delay_us")
-        for one in (make(bus__nodes=3, bus__charge_hops="own"), make(bus__nodes=3))
+        for one in (make(bus__nodes=3, bus__charge_hops="own", bus__root=root), make(bus__nodes=3))
     )
     each_us = float(PHY_DELAY_HALF_WIDTH_US) / 3**0.5
-    assert farthest.us - own.us == pytest.approx(12 * (9 - 6) * each_us, rel=1e-9)
+    assert farthest.us - own.us == pytest.approx(parts * (9 - 6) * each_us, rel=1e-9)

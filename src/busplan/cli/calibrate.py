@@ -73,8 +73,8 @@ def calibrate_command(
         bool,
         typer.Option(
             "--keep-outliers",
-            help="Fit the outliers, too, with the grade assumed. Otherwise the slow ones are in worst_extra_us, and "
-            "the fast ones left out, each named by its line.",
+            help="Fit the outliers, too, with the grade assumed. Otherwise slow ones are in worst_extra_us, and fast "
+            "ones are left out, each named by its line.",
         ),
     ] = False,
     changes: KeyChanges = NO_CHANGES,

@@ -6,8 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from busplan.analysis.circle.delays import loop_delays_us
+from busplan.analysis.evidence import bus_evidence
+from busplan.buses import kind_named
 from busplan.buses.ieee1394 import constants as ieee1394
 from busplan.elementwise import plain
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
 from busplan.sourced import Sourced
 
 
@@ -52,3 +57,27 @@ def test_every_number_names_its_source() -> None:
     assert all(number.source and number.meaning and number.unit and number.grade for number in numbers)
     # What no opened source confirms must be called so.
     assert {number for number in numbers if number.grade == "recalled"} == {1.63, 0.25}
+
+
+def test_published_machines_fit_their_periods() -> None:
+    found = [
+        one for each in bus_evidence(kind_named("ieee1394")) for one in each.comparisons if "axes of a" in one.section
+    ]
+    assert [(one.quantity, one.published) for one in found[::2]] == [("4 axes", 250), ("8 axes", 500)]
+    assert all(one.published is not None and 0 < one.computed < one.published for one in found)
+
+
+def test_a_command_that_is_executed_beside_the_bus_counts_as_it_is_executed() -> None:
+    bench = load("paper-two-node").profile
+    host = {"servo.loop": "host", "cycle.period_us": 1000.0, "servo.step_us": 100.0}
+
+    def delay_us(update: str, **changes: object) -> float:
+        own = {**host, "servo.update": update, **{key.replace("__", "."): one for key, one in changes.items()}}
+        return max(loop_delays_us(override(bench, own)))
+
+    assert delay_us("next_sync") == delay_us("next_sync", node__write_response="unified") == 1000
+    # A unified write is acknowledged at once, and the node takes 36.8 us for it then.
+    slower = delay_us("on_arrival", node__write_response="unified", node__execution__worst_extra_us=100.0)
+    assert slower - delay_us("on_arrival", node__write_response="unified") == pytest.approx(100 + 100, abs=1e-9)
+    extra: dict[str, object] = {"node__execution__worst_extra_us": 900.0}
+    assert delay_us("next_sync", node__read_response="concatenated", node__write_response="unified", **extra) == 2000

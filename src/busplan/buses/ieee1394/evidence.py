@@ -170,11 +170,13 @@ def _hub_block(kit: Network, published: Published) -> EvidenceSection:
     )
 
 
-def standard_sections(published: Published) -> tuple[EvidenceSection, ...]:
-    """Compare what is published of the standard, and measured elsewhere, with what the equations give.
+def standard_sections(base: Network, published: Published) -> tuple[EvidenceSection, ...]:
+    """Compare what is published of the standard, of machines, and measured elsewhere, with what the equations give.
 
     Parameters
     ----------
+    base
+        A network of one group of nodes.
     published
         The published figures.
 
@@ -182,7 +184,35 @@ def standard_sections(published: Published) -> tuple[EvidenceSection, ...]:
     ----------
     The sources of the data file.
     """
-    return (_delays(published), _gap_counts(published), _round_trip(published))
+    return (_delays(published), _gap_counts(published), _round_trip(published), _machines(base, published))
+
+
+def _machines(base: Network, published: Published) -> EvidenceSection:
+    title, given = "IEEE 1394: axes of a machine", published["machines"]
+    bus = base.profile.bus.model_copy(update={"speed": given["speed"], "gap_count": "optimal"})
+    profile, size = base.profile.model_copy(update={"bus": bus}), given["payload_bytes"]
+
+    def required_us(cycle: type[Ieee1394Cycle | BroadcastCycle], nodes: int) -> float:
+        (group,) = base.groups
+        group = group._replace(nodes=nodes, read_bytes=size, write_bytes=size)
+        group = group._replace(read_execution_us=0.0, write_execution_us=0.0, worst_extra_us=0.0)
+        return plain(cycle(base._replace(profile=profile, groups=(group,)), "standard").required_us)
+
+    schedules: dict[str, type[Ieee1394Cycle | BroadcastCycle]] = {
+        "reads and writes": Ieee1394Cycle,
+        "broadcast": BroadcastCycle,
+    }
+    return EvidenceSection(
+        title,
+        f"{given['source']}: axes with their period at {given['speed']}; neither payload nor transactions are said. "
+        f"Ours is the bus alone, {size} bytes each way (assumed), no execution, a chain: it is no test, but must fit.",
+        tuple(
+            Comparison(title, f"{axes} axes", "us", period_us, method, required_us(cycle, axes), given["grade"])
+            for axes, period_us in zip(given["axes"], given["period_us"], strict=True)
+            for method, cycle in schedules.items()
+        ),
+        "ieee1394",
+    )
 
 
 def _delays(published: Published) -> EvidenceSection:

@@ -324,7 +324,7 @@ gap_count = "optimal"      # assumed: the smallest safe one; the bus manager mus
         return (
             *bus_sections(networks["paper-two-node"], published["paper"]),
             *kit_sections(networks["dvrk"], published["dvrk"]),
-            *standard_sections(published["ieee1394"]),
+            *standard_sections(networks["paper-two-node"], published["ieee1394"]),
         )
 
 
