@@ -200,7 +200,6 @@ def capacity_records(result: Capacity) -> list[Record]:
     return [
         {
             **figures.by_key(),
-            "exceeded": list(figures.exceeded),
             **{f"group.{one.name}.{key}": getattr(one, key) for one in figures.groups for key in COUNTS},
         }
         for figures in result.results
@@ -210,7 +209,7 @@ def capacity_records(result: Capacity) -> list[Record]:
 def _results(result: Capacity) -> Iterator[Record]:
     """As the rows, with a list of groups where the profile has some."""
     for figures in result.results:
-        record: Record = {**figures.by_key(), "exceeded": list(figures.exceeded)}
+        record: Record = figures.by_key()
         yield {**record, "groups": [one._asdict() for one in figures.groups]} if figures.groups else record
 
 
@@ -234,6 +233,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         "timing_model": figures.timing_model,
         "verdict": figures.verdict,
         "fits": figures.fits,
+        "circle_refused_by": list(figures.circle_refused_by),
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),

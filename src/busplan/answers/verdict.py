@@ -7,6 +7,7 @@ from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
+from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import changeable
 from busplan.analysis.planning.freedoms import PERIOD
@@ -41,6 +42,7 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import listed, nouns, period_value
+from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -66,6 +68,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     """
     figures = verdict.deciding
     at = places.get("verdict", "")
+    yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
     yield _headline(verdict, profile, at=at)
     yield from not_in_it(profile)
     yield from evidence_sentence(bus_of(profile))
@@ -84,6 +87,17 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
         yield _advice(verdict, profile, places)
     yield from execution_sentence(profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
+
+
+def refused_circle(profile: Profile) -> Iterator[Sentence]:
+    """Say why the circle that a profile asks for cannot be run; nothing where it can.
+
+    It stands first in every answer with a verdict: a plan whose circle nobody can run is none.
+    """
+    causes = circle_refusals(profile)
+    if causes:
+        subject = ("The circle of ", Code(profile.name), " cannot be run at ", period_value(profile.cycle.period_us))
+        yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
@@ -138,7 +152,8 @@ def _place(at: str, key: str) -> str:
 
 
 def _headline(verdict: Verdict, profile: Profile, *, at: str) -> Sentence:
-    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), ": ")
+    alone = ", the bus alone: " if verdict.deciding.circle_refused_by else ": "
+    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), alone)
     parts = (*subject, *verdict_story(verdict.deciding, profile, at=at).parts)
     return Sentence(parts, state_of(verdict.all_well))
 

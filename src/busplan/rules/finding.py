@@ -82,7 +82,7 @@ class Subject:
         circle_steps: int | None = MOST_STEPS,
     ) -> None:
         self.profile = loaded.profile
-        self._circle_steps = circle_steps
+        self.circle_steps = circle_steps
         self.document = loaded.document
         self.origin = f" (with {changes.words})" if changes.words else ""
         """End of the messages: the changes, which the document does not show."""
@@ -121,7 +121,7 @@ class Subject:
 
     @cached_property
     def _cure(self) -> Mending:
-        circle = None if self._circle_steps is None else CircleCheck(most_steps=self._circle_steps, own=self.profile)
+        circle = None if self.circle_steps is None else CircleCheck(most_steps=self.circle_steps, own=self.profile)
         found = cure(self.profile, circle=circle)
         if found.changes is None:
             return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}")

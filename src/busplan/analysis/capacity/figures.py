@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 from busplan.analysis.capacity.certainty import VERDICTS, Certainty, VerdictWord, certainty, verdict_code
 from busplan.analysis.capacity.cycle import TIME, available_us, broken_limits, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
+from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
@@ -71,6 +72,8 @@ class CapacityFigures(NamedTuple):
     """Keys of the limits that are broken."""
     fits: bool
     """Whether required <= available and no limit is broken; the verdict is another question."""
+    circle_refused_by: tuple[str, ...]
+    """Keys for which the circle that the profile asks for cannot be run."""
     bias_us: float | None
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
@@ -102,7 +105,8 @@ class CapacityFigures(NamedTuple):
 
     def by_key(self) -> dict[str, Any]:
         """The figures of the document by key, in its order."""
-        return {figure.key: getattr(self, figure.key) for figure in kind_named(self.kind).capacity_figures}
+        values = ((figure.key, getattr(self, figure.key)) for figure in kind_named(self.kind).capacity_figures)
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in values}
 
 
 class Capacity(NamedTuple):
@@ -189,6 +193,7 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
         **counts,
         exceeded=exceeded,
         fits=not exceeded,
+        circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
         **(_certainty_figures(cycle, is_broken=bool(broken)) if decides else _UNDECIDED),
         groups=() if whole else groups,
         safe=bus.is_safe(network),

@@ -36,7 +36,8 @@ def skew_us(profile: Profile) -> float:
     if profile.servo.loop == "host" or bus_of(profile).acts_at_once(network_of(profile)):
         return 0.0
     first_us, last_us = _first_and_last_us(profile)
-    return last_us - first_us
+    # A cycle that does not fit is never simulated: the bus is what is wrong, not the delivery.
+    return last_us - first_us if last_us <= profile.cycle.period_us else 0.0
 
 
 def _first_and_last_us(profile: Profile) -> tuple[float, float]:

@@ -9,11 +9,19 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.buses.parts import Value
 from busplan.sections.profile import Profile
 
-State = Literal["fits", "circle fails", "circle not judged", "not shown to fit", "unsafe", "does not fit"]
+State = Literal[
+    "fits",
+    "circle fails",
+    "circle not judged",
+    "circle cannot be run",
+    "not shown to fit",
+    "unsafe",
+    "does not fit",
+]
 STATES: Final[tuple[State, ...]] = get_args(State)
 """In the order of reports."""
 CELL_FIGURES: Final = (
-    *("nodes", "axes", "verdict", "binding_term", "exceeded"),
+    *("nodes", "axes", "verdict", "binding_term", "exceeded", "circle_refused_by"),
     *("margin_corrected_us", "uncertainty_us"),
 )
 """Columns of a sweep that a cell is made of."""
@@ -37,13 +45,16 @@ class Cell(NamedTuple):
     axes: int
     state: State
     limited_by: tuple[str, ...]
-    """Limits that are broken; of a circle that fails, what it does not hold; none where it fits."""
+    """Limits that are broken; of a circle that fails, what it does not hold, and of one that cannot be run, the keys
+    that refuse it; none where it fits."""
     binding_term: str
     """The largest term of the cycle."""
     verdict: VerdictWord
     margin_corrected_us: float
     uncertainty_us: float
     is_safe: bool
+    circle_refused_by: tuple[str, ...] = ()
+    """Keys for which its circle cannot be run, whatever the state."""
     circle_passed: bool | None = None
     """None where no circle was run, or no tolerance judges it."""
 
@@ -82,7 +93,8 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
     unsafe = tuple(one.key for one in bus_of(setting.profile).limits if one.is_safety and one.is_broken(network))
     verdict = figures["verdict"]
     broken = tuple(key for key in figures["exceeded"] if key != TIME) or (TIME,)
-    state, limits = _judged(verdict, broken=broken, unsafe=unsafe)
+    refused = tuple(figures["circle_refused_by"])
+    state, limits = _judged(verdict, broken=broken, unsafe=unsafe, refused=refused)
     return Cell(
         x=x,
         y=y,
@@ -95,13 +107,18 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
         margin_corrected_us=figures["margin_corrected_us"],
         uncertainty_us=figures["uncertainty_us"],
         is_safe=not unsafe,
+        circle_refused_by=refused,
     )
 
 
-def _judged(verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...]) -> tuple[State, tuple[str, ...]]:
+def _judged(
+    verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...], refused: tuple[str, ...]
+) -> tuple[State, tuple[str, ...]]:
     """State and limits: what does not fit is never called unsafe, and what is unsafe never a fit."""
     if verdict == DOES_NOT_FIT:
         return verdict, broken
     if unsafe:
         return "unsafe", unsafe
-    return (verdict, ()) if verdict == FITS else (verdict, broken)
+    if verdict != FITS:
+        return verdict, broken
+    return ("circle cannot be run", refused) if refused else (verdict, ())

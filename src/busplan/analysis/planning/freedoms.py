@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.constraints import refused_step
+from busplan.analysis.planning.constraints import goes_with_step
 from busplan.analysis.planning.machine import (
     NODES_KEY,
     Changes,
@@ -206,7 +206,7 @@ def period_grid(profile: "Profile") -> NumberGrid:
     """Periods that are advised: those that the bus knows, or short ones; no circle refuses one for its step."""
     known = bus_of(profile).periods.us
     if known:
-        return ListedNumbers(tuple(one for one in known if not refused_step(profile, one)))
+        return ListedNumbers(tuple(one for one in known if goes_with_step(profile, one)))
     return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 

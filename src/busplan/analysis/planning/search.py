@@ -91,7 +91,7 @@ class Search:
         """Whether every constraint holds after some changes; the circle is asked last."""
         return (
             self._fits(changes)
-            and not refused_period(self._own, self.period_us(changes))
+            and not refused_period(self.profile(changes), self.period_us(changes))
             # What a limit needs of the slice was asked with the profile's own slice ratio.
             and keeps_limits(network_of(self.profile(changes)))
             and not self.circle_failures(changes)
@@ -209,7 +209,7 @@ class Search:
         worst = max(self.needs(furthest), key=lambda need: need.us)
         if not fits_in(worst.us, available_us=most_us):
             return worst._replace(why=worst.words(most_us))
-        refused = refused_period(self._own, self.period_us(furthest))
+        refused = refused_period(self.profile(furthest), self.period_us(furthest))
         if refused and all(one.cost != Cost.PERIOD for one in levels):
             return refused
         failures = self.circle_failures(furthest) if self._fits(furthest) else ()
