@@ -30,6 +30,7 @@ from unittest import mock
 
 import tomli_w
 
+import busplan
 from busplan.analysis.circle.setup import path_steps
 from busplan.buses import kind_names
 from busplan.cli import run
@@ -38,6 +39,7 @@ from busplan.errors import BusplanError
 from busplan.profile.schema import profile_schema
 from busplan.profile.starter import Machine, machine_text
 from busplan.profile.toml import decode, validate
+from busplan.sections.profile import Profile
 
 Data = dict[str, Any]
 Schema = Mapping[str, Any]
@@ -421,6 +423,98 @@ def no_number(text: str) -> float:
     raise ValueError(text)
 
 
+# --- one story ------------------------------------------------------------------------------------------------------
+
+TOLD: Final = (
+    *("verdict", "fits", "exceeded", "circle_refused_by", "margin_corrected_us", "uncertainty_us"),
+    *("required_us", "available_us", "safe_nodes", "safe_axes", "safe_limited_by"),
+)
+"""What every answer that tells it tells alike."""
+TELLERS: Final[Mapping[tuple[str, ...], Callable[[Any], Data]]] = {
+    ("capacity",): lambda said: said["verdicts"][0],
+    ("timeline",): lambda said: said if said["verdict"] is not None else {},
+    ("plan", "--no-circle"): lambda said: said["options"][0],
+    ("report", "--no-circle"): lambda said: said["profiles"][0]["answers"]["capacity"]["verdicts"][0],
+    ("map", "--x", "cycle.slice_ratio={ratio}", "--y", "limits.reserve={reserve}"): lambda said: said["design"],
+    ("sweep", "--vary", "cycle.slice_ratio={ratio}"): lambda said: deciding(said["rows"]),
+    ("compare", "--buses", "{kind}"): lambda said: said["buses"][0],
+    ("check", "--no-circle"): lambda said: said["files"][0],
+    ("diff", FILE, "--no-circle"): lambda said: said["a"],
+}
+"""Commands with a verdict, and where their documents tell it."""
+
+
+def deciding(rows: list[Data]) -> Data:
+    """The row of the timing model that decides."""
+    return next(row for row in rows if row["verdict"] is not None)
+
+
+def disagreements(profile: Profile) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Commands that do not tell of a profile what capacity tells, and what they tell."""
+    values = {"ratio": profile.cycle.slice_ratio, "reserve": profile.limits.reserve, "kind": profile.bus.kind}
+    said = {}
+    for (name, *options), find in TELLERS.items():
+        done = call(name, FILE, *(one.format(**values) for one in options), "--format", "json")
+        if not done.out:  # as a timeline of too many events
+            yield from ((done.arguments, one) for one in broken_promises(done, "json"))
+            if name == "capacity":
+                return
+            continue
+        said[name] = document = find(json.loads(done.out))
+        if name == "capacity":
+            own, results = document, deciding(json.loads(done.out)["results"])
+            yield from ((done.arguments, one) for one in others(document, {**results}, "its figures"))
+            own = {**results, **document}
+        elif name == "check":
+            codes = {one["code"] for one in document["findings"]}
+            if ("BP203" in codes) != bool(own["circle_refused_by"]):
+                yield done.arguments, f"{codes}, and the circle is refused by {own['circle_refused_by']}"
+            if own["verdict"] != "fits" and done.code == 0:
+                yield done.arguments, f"is content, and capacity says {own['verdict']}"
+        elif name == "plan" and document["passes"] and (own["verdict"] != "fits" or own["circle_refused_by"]):
+            yield done.arguments, f"passes, and capacity says {own['verdict']}, {own['circle_refused_by']}"
+        yield from ((done.arguments, one) for one in others(document, own, "capacity"))
+    rows = list(csv.DictReader(StringIO(call("capacity", FILE, "--format", "csv").out.decode(), newline="")))
+    row = next(one for one in rows if one["verdict"])
+    yield from (
+        (("capacity", FILE, "--format", "csv"), f"{key} {row[key]}, and JSON has {own[key]}")
+        for key in ("verdict", "safe_limited_by", "circle_refused_by")
+        if row[key] != (own[key] if isinstance(own[key], str) else " ".join(own[key] or ()))
+    )
+    text = call("capacity", FILE, "--format", "table", "--all").out.decode()
+    if (f": {own['verdict']}" not in text) or (
+        ("cannot be run" in text.split("\n")[0]) != bool(own["circle_refused_by"])
+    ):
+        yield ("capacity", FILE), f"says {text.splitlines()[:2]}, and JSON {own['verdict']}, {own['circle_refused_by']}"
+    answer = busplan.capacity(profile).verdicts[0].deciding
+    yield from (
+        (("Python",), f"{key} {getattr(answer, key)}, and JSON has {own[key]}")
+        for key in TOLD
+        if plain_data(getattr(answer, key)) != own[key]
+    )
+
+
+def plain_data(value: object) -> object:
+    """A value as JSON has it."""
+    return list(value) if isinstance(value, tuple) else value
+
+
+def others(one: Data, other: Data, name: str) -> Iterator[str]:
+    """What two answers tell otherwise."""
+    for key in TOLD:
+        # Groups have counts of their own, and only one of them may be counted.
+        is_told = key in one and key in other and not (key.startswith("safe_") and None in (one[key], other[key]))
+        if is_told and not alike(one[key], other[key]):
+            yield f"{key} {one[key]}, and {name} has {other[key]}"
+
+
+def alike(one: object, other: object) -> bool:
+    """Whether two values are the same, but for rounding."""
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-6)
+    return one == other
+
+
 # --- the run --------------------------------------------------------------------------------------------------------
 
 
@@ -432,14 +526,35 @@ class Failure(NamedTuple):
     profile: str
 
 
-def attack(rng: random.Random, kind: str, *, asked: list[tuple[Command, str]], counts: Counter[str]) -> list[Failure]:
-    """Write a profile into the working folder and ask of it; gives what is not held."""
+def attack(
+    rng: random.Random, kind: str, *, asked: list[tuple[Command, str]], counts: Counter[str], story: bool
+) -> list[Failure]:
+    """Write a profile into the working folder and ask of it; gives what is not held.
+
+    Parameters
+    ----------
+    rng
+        Source of all choices.
+    kind
+        Kind of bus.
+    asked
+        Commands and forms.
+    counts
+        Counts what is done.
+    story
+        Whether all commands with a verdict are to tell the same of it.
+    """
     data = Maker(rng, kind).profile()
     text = text_of(data)
     Path(FILE).write_text(text, encoding="utf-8")
     found = []
     counts[kind] += 1
-    counts["loads" if is_valid(data) else "refused"] += 1
+    loads = is_valid(data)
+    counts["loads" if loads else "refused"] += 1
+    if loads and story:
+        counts["stories"] += 1
+        own = validate(decode(text.encode(), name=FILE))
+        found += [Failure(arguments, message, text) for arguments, message in disagreements(own)]
     is_short = has_short_circle(text)
     for command, form in asked:
         if command.name == "circle-test" and not is_short:
@@ -466,7 +581,13 @@ def main() -> int:
         for number in range(options.profiles):
             # A number of its own for each profile, so that one can be made again alone.
             rng = random.Random(f"{options.seed} {number}")
-            for one in attack(rng, kinds[number % len(kinds)], asked=rng.sample(every, options.calls), counts=counts):
+            for one in attack(
+                rng,
+                kinds[number % len(kinds)],
+                asked=rng.sample(every, options.calls),
+                counts=counts,
+                story=number % 3 == 0,
+            ):
                 failures += 1
                 print(f"\n{options.seed} {number}: busplan {' '.join(one.arguments)}\n{one.message.strip()}")  # noqa: T201
                 key = (one.arguments[0], one.message[:60])

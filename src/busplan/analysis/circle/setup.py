@@ -12,7 +12,7 @@ from busplan.analysis.network import bus_of
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.measured_part import REST_MM, settling_time_us
-from busplan.servo.parameters import Axis, LoopTiming, Mechanics
+from busplan.servo.parameters import FINEST_ENCODER_MM, Axis, LoopTiming, Mechanics
 from busplan.servo.path import circle_path
 
 _REST_SHARE: Final = 1e-3
@@ -99,6 +99,6 @@ def path_settling_us(profile: Profile) -> float | None:
         y,
         timing=loop_timing(profile),
         feed_mm_per_min=profile.circle.feed_mm_per_min,
-        rest_mm=REST_MM if least_mm is None else _REST_SHARE * least_mm,
+        rest_mm=REST_MM if least_mm is None else max(_REST_SHARE * least_mm, FINEST_ENCODER_MM),
     )
     return inf if found is None else found

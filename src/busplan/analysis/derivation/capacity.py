@@ -74,8 +74,9 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         named |= _most(network, plain, model=model)
     else:
         each = (named["required_us"], named["available_us"])
+        others = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
         named |= {
-            key: found(None, _OF_GROUPS, each) for key in known if key not in named and getattr(plain, key) is None
+            key: found(None, _OF_GROUPS, each) for key in others if key not in named and getattr(plain, key) is None
         }
     named |= {
         key: found(None, "none for this network", (named["required_us"],))
