@@ -362,7 +362,7 @@ MORE: Final[Mapping[str, Callable[[random.Random], tuple[str, ...]]]] = {
 
 def arguments_of(rng: random.Random, command: Command, form: str, *, is_short: bool) -> tuple[str, ...]:
     """A command line on the profile; circles are asked for where the profile's own is short."""
-    found = [command.name, FILE, *NEEDED.get(command.name, lambda _: ())(rng), "--format", form]
+    found = [command.name, FILE, *(NEEDED[command.name](rng) if command.name in NEEDED else ()), "--format", form]
     if is_short and rng.random() < 0.3:
         found += CIRCLES.get(command.name, ())
     elif command.has_circle:

@@ -23,16 +23,17 @@ def _fuzz() -> ModuleType:
 
 
 fuzz = _fuzz()
-EVERY = [(command, form) for command in fuzz.commands() for form in command.forms]
+KINDS = kind_names()
 
 
-@pytest.mark.parametrize("kind", kind_names())
-def test_every_command_and_form_keeps_what_it_promises(
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_command_keeps_what_it_promises_and_all_tell_one_story(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    shares = 4
-    for share in range(shares):
-        asked = EVERY[share::shares]
-        failures = fuzz.attack(Random(f"{kind} {share}"), kind, asked=asked, counts=Counter())
-        assert not failures, failures
+    # Every kind asks every command, and all kinds together every form, but for png, whose library takes seconds.
+    every = {one: [form for form in one.forms if form != "png"] for one in fuzz.commands()}
+    first = KINDS.index(kind)
+    asked = [(one, form) for one, forms in every.items() for form in forms[first :: len(KINDS)] or forms[:1]]
+    failures = fuzz.attack(Random(1), kind, asked=asked, counts=Counter(), story=True)
+    assert not failures, failures

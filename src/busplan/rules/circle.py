@@ -107,8 +107,8 @@ RULES: Final = (
         "the circle test cannot be run",
         "The values of [servo], [circle] and [delivery] do not go together: the period is no multiple of the step, the "
         "drive cannot reach the feed, the circle is too short for its ramps or too long for memory, jitter and skew "
-        "exceed half the period, or the bus puts more than one period into a loop on the host. No circle is run to know "
-        "it, so that --no-circle reports it, too, and every other command says it first.",
+        "exceed half the period, or the bus puts more than one period into a loop on the host. No circle is run to "
+        "know it, so that --no-circle reports it, too, and every other command says it first.",
     ),
     Rule(
         "BP204",
