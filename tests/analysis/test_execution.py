@@ -201,7 +201,7 @@ def test_many_points_are_checked_on_the_executor_and_the_first_that_fails_is_nam
         busplan.sweep(
             "paper-4ms", vary={"cycle.period_us": range(1000, 2001)}, circle=True, force=True, executor=executor
         )
-    assert str(caught.value).startswith("at cycle.period_us = 1001: step_us")
+    assert str(caught.value).startswith("at cycle.period_us = 1001: servo.step_us")
     assert executor.order
 
 

@@ -44,8 +44,8 @@ CAPACITY_KEYS = (
     "nonperiodic_us", "cycle_starts_us", "cycle_arbitration_us", "cycle_data_us", "cycle_acknowledge_us",
     "cycle_hold_us", "cycle_execution_us", "cycle_worst_extra_us", "cycle_idle_us", "cycle_host_us", "retries_us",
     "binding_term", "utilisation", "margin_us", "nodes_eq11", "max_nodes", "max_axes", "limited_by", "min_period_us",
-    "min_slice_ratio", "exceeded", "fits", "bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us",
-    "safe_nodes", "safe_axes", "safe_limited_by", "safe_min_period_us", "not_shown", "verdict",
+    "min_slice_ratio", "exceeded", "fits", "circle_refused_by", "bias_us", "margin_corrected_us", "uncertainty_us",
+    "safe_required_us", "safe_nodes", "safe_axes", "safe_limited_by", "safe_min_period_us", "not_shown", "verdict",
 )  # fmt: skip
 OF_STANDARD = CAPACITY_KEYS[CAPACITY_KEYS.index("bias_us") :]
 """How sure the verdict is: figures of the model that decides, and of no other."""

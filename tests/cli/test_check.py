@@ -967,3 +967,13 @@ def test_the_action_installs_into_a_folder_of_its_own(folder: Path) -> None:
         "-I", "-m", "venv", str(temporary), "-I", "-m", "pip", "install", "--quiet", str(ROOT),
     ]  # fmt: skip
     assert (ROOT / "pyproject.toml").is_file()
+
+
+@pytest.mark.parametrize("content", [b"a = [\n", b"\xff\xfe", b"[bus]\n", b""])
+def test_a_file_that_is_no_profile_is_a_finding_and_one_that_is_not_there_is_none(
+    busplan: Busplan, tmp_path: Path, content: bytes
+) -> None:
+    # As linters have it: the repository is broken, not the gate. Every other command could not do its job.
+    (tmp_path / "a.toml").write_bytes(content)
+    assert [busplan(*line, cwd=tmp_path).returncode for line in (("check", "a.toml"), ("check", "b.toml"))] == [1, 2]
+    assert busplan("capacity", "a.toml", cwd=tmp_path).returncode == 2

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
+from busplan.analysis.circle.roundness import CircleTest, circle_test
 from busplan.analysis.circle.setup import path_steps
 from busplan.errors import PlacedError
-from busplan.profile.toml import decode
+from busplan.profile.toml import decode, override
 from busplan.rules.baseline import MODELS, read_baseline
 from busplan.rules.gate import FileResult, check_document, unreadable
 from busplan.rules.registry import all_rules
 from busplan.sections.profile import Profile
-from busplan.servo.checks import ParameterError, Refused
 
 EXAMPLES = Path(__file__).parent / "examples"
 INVALID = sorted(EXAMPLES.glob("*/invalid*.toml"))
@@ -150,7 +150,7 @@ def test_codes_are_stable() -> None:
         ("BP114", ["not shown to fit", "269.1 us of 275.0 us", "-0.7 +/- 4.3 us", "cycle.slice_ratio = 0.51"]),
         ("BP201", ["20.012 um", "1 um", "attack velocity_feedforward first"]),
         ("BP202", ["unstable", "lower servo.position_gain_per_s"]),
-        ("BP203", ["feed_mm_per_min", "choose at most"]),
+        ("BP203", ["feed_mm_per_min", "the feed must stay below it"]),
         ("BP301", ["bus.nodes: 3, was 2: corrected margin fell from 1806.3 to 1704.4 us"]),
     ],
 )
@@ -236,9 +236,9 @@ def test_a_check_runs_a_circle_of_ten_million_steps_and_none_longer(
     )
     ran = []
 
-    def simulated(profile: Profile) -> None:
+    def simulated(profile: Profile) -> CircleTest:
         ran.append(path_steps(profile))
-        raise ParameterError(Refused("radius_mm", radius_mm, "was to be run"))
+        return circle_test(override(profile, {"servo.step_us": 1000.0}))
 
     monkeypatch.setattr("busplan.analysis.circle.roundness.circle_test", simulated)
     found = {one.code for one in check_document(decode(text.encode(), name="x.toml")).findings}

@@ -8,13 +8,12 @@ from itertools import pairwise
 import pytest
 
 from busplan.answers.gate import FORMATS
-from busplan.errors import BusplanError, PlacedError
+from busplan.errors import PlacedError
 from busplan.profile.document import Document
 from busplan.profile.toml import MAX_FILE_BYTES, decode
 from busplan.rules.gate import FileResult, check_document, unreadable
 from busplan.rules.registry import all_rules, cycle_rules
 from busplan.rules.report import CheckReport
-from busplan.sections.profile import Profile
 
 Changed = Callable[..., str]
 Check = Callable[..., FileResult]
@@ -123,17 +122,6 @@ def test_a_margin_that_only_the_default_asks_for_stands_at_the_gain(clean: str, 
     assert "margin" in finding.message
     (said,) = check(little + "[tolerance]\nmin_gain_margin_db = 6\n").findings
     assert (said.key, said.line) == ("tolerance.min_gain_margin_db", 32)
-
-
-def test_a_circle_that_fails_for_another_reason_is_a_finding_too(
-    clean: str, check: Check, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(_profile: Profile) -> int:
-        raise BusplanError("no such circle")
-
-    monkeypatch.setattr("busplan.analysis.circle.setup.path_steps", refuse)
-    (finding,) = check(clean + "\n[servo]\nposition_gain_per_s = 50\n").findings
-    assert (finding.code, finding.key, finding.message) == ("BP203", "servo", "servo: no such circle")
 
 
 def test_a_cycle_that_does_not_fit_has_no_circle(changed: Changed, check: Check) -> None:

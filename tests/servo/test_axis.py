@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from busplan.errors import BusplanError
 from busplan.servo import axis as axis_module
-from busplan.servo.axis import MAX_STEPS, simulate_axis
+from busplan.servo.axis import simulate_axis
 from busplan.servo.delivery import Arrivals, arrivals
 from busplan.servo.parameters import Axis, Delivery, LoopTiming
 from busplan.servo.rows import KernelRows, kernel_rows
+from busplan.servo.runnable import MAX_STEPS
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from busplan.errors import BusplanError
-from busplan.servo.path import MAX_SETPOINTS, circle_path, circle_setpoints
+from busplan.servo.path import circle_path
+from busplan.servo.runnable import MAX_SETPOINTS, move_along
 
 
 @pytest.mark.parametrize(
@@ -115,7 +116,7 @@ def test_a_turn_at_constant_speed_follows_a_lead_in_of_whole_turns(
     ramp_mm = feed_mm_s * ramp_periods * period_us / 2e6
     assert way_mm[ramp_periods] - way_mm[0] == pytest.approx(ramp_mm, abs=1e-6)
     assert way_mm[-1] - way_mm[start] == pytest.approx(2 * math.pi * radius_mm + ramp_mm, abs=1e-6)
-    assert path.setpoints == circle_setpoints(radius_mm, ramp_periods=ramp_periods, **known)
+    assert path.setpoints == move_along(radius_mm, ramp_periods=ramp_periods, **known).setpoints
     # Not a turn more than is needed.
     needed_us = path.turn_us + settling_us + path.constant_from_us
     assert path.turn_from_us <= needed_us + period_us + rounding_us

@@ -8,6 +8,7 @@ from busplan.analysis.capacity.node_steps import NodeSteps, node_steps
 from busplan.analysis.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
+from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
 from busplan.analysis.derivation.explain import assumptions
 from busplan.analysis.derivation.origin import Input
@@ -45,7 +46,7 @@ class AllAnswers(NamedTuple):
     contour: ContourProfile | None
     """Contour error around the circle; None if the table did not follow it."""
     no_circle: tuple[str, ...]
-    """Why the circle test cannot be run; empty if it was not requested."""
+    """Why the circle test that the profile asks for cannot be run."""
     assumptions: tuple[Input, ...]
     """Inputs of the figures, the least well known first."""
 
@@ -72,9 +73,9 @@ def all_answers(profile: Profile, *, with_circle: bool = True, progress: Progres
     near_us = (own_us * factor for factor in _PERIOD_FACTORS if MIN_STEP_US <= own_us * factor <= MAX_TIME_US)
     periods_us = [one for one in near_us if one == own_us or bus_of(profile).periods.knows(one)]
     plan, no_schedule = _schedule(profile)
-    circle, contour, no_circle = (
-        _circle(profile, progress) if with_circle and profile.asks_for_circle else (None, None, ())
-    )
+    no_circle = tuple(cause.message for cause in circle_refusals(profile))
+    is_run = with_circle and profile.asks_for_circle and not no_circle
+    circle, contour = _circle(profile, progress) if is_run else (None, None)
     return AllAnswers(
         profile=profile,
         capacity=bus,
@@ -120,13 +121,8 @@ def _schedule(profile: Profile) -> tuple[Schedule | None, tuple[str, ...]]:
         return None, error.problems
 
 
-def _circle(
-    profile: Profile, progress: Progress | None
-) -> tuple[CircleTest | None, ContourProfile | None, tuple[str, ...]]:
-    try:
-        test = circle_test(profile, with_contributions=True, progress=progress)
-    except BusplanError as error:
-        return None, None, error.problems
+def _circle(profile: Profile, progress: Progress | None) -> tuple[CircleTest, ContourProfile | None]:
+    test = circle_test(profile, with_contributions=True, progress=progress)
     (run,) = test.runs
     # A simulation has half a million positions, and a page may have many profiles: keep only the condensed error.
-    return test._replace(runs=(None,)), drawn_profile(run), ()
+    return test._replace(runs=(None,)), drawn_profile(run)

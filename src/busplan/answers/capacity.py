@@ -233,6 +233,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         "timing_model": figures.timing_model,
         "verdict": figures.verdict,
         "fits": figures.fits,
+        "circle_refused_by": list(figures.circle_refused_by),
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),

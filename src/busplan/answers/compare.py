@@ -9,7 +9,7 @@ from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, Not
 from busplan.analysis.network import bus_of
 from busplan.answers.compare_document import compare_document, compare_records
 from busplan.answers.compare_notes import notes
-from busplan.answers.verdict import execution_sentence
+from busplan.answers.verdict import execution_sentence, refused_circle
 from busplan.buses import kind_named
 from busplan.buses.figure import SAFE_AXES, VERDICT, by_key
 from busplan.drawings.compare.drawing import KindsDrawing
@@ -76,6 +76,7 @@ def compare_report(found: KindComparison) -> Report:
 
 def _blocks(found: KindComparison) -> Iterator[Block]:
     """How many kinds carry the machine, their figures, the picture, and what each rests on."""
+    yield from refused_circle(found.profile)
     yield headline(found)
     yield from _best(found)
     yield from _remarks(found)
@@ -188,7 +189,9 @@ def _verdict(one: MachineOnKind) -> Words:
     figures = one.figures
     is_unsafe = not figures.safe and figures.verdict != DOES_NOT_FIT
     unsafe = f", unsafe {bus_of(one.profile).safety}" if is_unsafe else ""
-    return Words(f"{figures.verdict}{unsafe}", state_of(figures.verdict == FITS and figures.safe))
+    refused = ", circle cannot be run" if figures.circle_refused_by else ""
+    is_well = figures.verdict == FITS and figures.safe and not refused
+    return Words(f"{figures.verdict}{unsafe}{refused}", state_of(is_well))
 
 
 def _binds(one: MachineOnKind) -> str:

@@ -12,8 +12,8 @@ from busplan.elementwise import plain
 from busplan.forms.blocks import JsonDocument, Record
 
 _FIGURES = (
-    *("timing_model", "verdict", "safe", "exceeded", "not_shown", "available_us", "required_us", "bias_us"),
-    *("margin_corrected_us", "uncertainty_us", "binding_term"),
+    *("timing_model", "verdict", "safe", "exceeded", "not_shown", "circle_refused_by", "available_us", "required_us"),
+    *("bias_us", "margin_corrected_us", "uncertainty_us", "binding_term"),
 )
 _SAFE = ("safe_nodes", "safe_axes", "safe_limited_by")
 _MEASURES = ("mean_contour_error_mm", "max_contour_error_mm", "circular_deviation_mm")

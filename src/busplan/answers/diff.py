@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
+from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, Difference
 from busplan.answers.changes import change_document, change_table
 from busplan.answers.diff_headline import STATES, headline, named
 from busplan.answers.documents import document
-from busplan.answers.verdict import execution_grades, not_applicable
+from busplan.answers.verdict import execution_grades, not_applicable, refused_circle
 from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,
@@ -110,6 +111,7 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     yield headline(found)
     yield _sides(found, arguments)
     if not found.keys:
+        yield from refused_circle(found.a)
         return
     yield from _notes(found)
     yield change_table(found.keys[:_MOST_KEYS])
@@ -152,6 +154,11 @@ def _notes(found: Difference) -> Iterator[Sentence]:
     executions = (execution_grades(found.a), execution_grades(found.b))
     yield from _graded("execution time behind these figures is", *executions)
     if found.circles is None:
+        yield from (
+            joined(sentence(f"{side}:"), words)
+            for side, profile in zip("AB", (found.a, found.b), strict=True)
+            for words in refused_circle(profile)
+        )
         return
     for side, circle in zip("AB", found.circles, strict=True):
         if circle.problems:
@@ -187,6 +194,7 @@ def _side_document(argument: str, profile: Profile, circle: CircleSide | None) -
         "profile": profile.name,
         "timing_model": profile.bus.timing_model,
         "circle_problems": None if circle is None else list(circle.problems),
+        "circle_refused_by": [cause.name for cause in circle_refusals(profile)],
     }
 
 

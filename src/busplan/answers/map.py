@@ -8,6 +8,7 @@ from busplan.analysis.map.trade_off import TradeOff
 from busplan.analysis.network import bus_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.sweep.top import payload_sentences
+from busplan.answers.verdict import refused_circle
 from busplan.drawings.map.drawing import MapDrawing
 from busplan.drawings.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
 from busplan.forms.blocks import (
@@ -43,6 +44,7 @@ def map_report(found: TradeOff) -> Report:
 
 def _blocks(found: TradeOff) -> Iterator[Block]:
     """How much fits and whether this design does, the picture, and what limits each region."""
+    yield from refused_circle(found.profile)
     yield headline(found)
     yield from _remarks(found)
     yield map_chart(found)
@@ -75,8 +77,7 @@ def _remarks(found: TradeOff) -> Iterator[Sentence]:
         number = count_value(len(missing))
         yield sentence(f"{{}} {nouns(len(missing), 'setting')} cannot exist, as {missing[0].reason}.", number)
     if any(cell.state == "circle not judged" for cell in found.cells):
-        reason = found.not_judged or "no contour tolerance is asked for"
-        yield Sentence((f"Not every circle is judged: {reason}.",), "warns")
+        yield Sentence(("Not every circle is judged: no contour tolerance is asked for.",), "warns")
     yield from payload_sentences(found.profile, (found.x.key, found.y.key))
 
 
@@ -142,5 +143,6 @@ def _record(found: TradeOff, cell: Cell) -> Record:
         "margin_corrected_us": cell.margin_corrected_us,
         "uncertainty_us": cell.uncertainty_us,
         **({} if safety is None else {safety.key: cell.is_safe}),
+        "circle_refused_by": list(cell.circle_refused_by),
         "circle_passed": cell.circle_passed,
     }

@@ -172,6 +172,7 @@ def _record(plan: Plan, option: Option) -> Record:
         "timing_model": one.timing_model,
         "verdict": one.verdict,
         "fits": one.fits,
+        "circle_refused_by": list(one.circle_refused_by),
         "fits_other_model": all(other.fits for other in others) if others else None,
         "margin_us": one.margin_us,
         "margin_other_model_us": min((other.margin_us for other in others), default=None),

@@ -9,7 +9,7 @@ from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, Total, totals
 from busplan.answers.capacity import safety_record
 from busplan.answers.documents import document
-from busplan.answers.verdict import story, warnings
+from busplan.answers.verdict import refused_circle, story, warnings
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
 from busplan.buses.parts import IDLE
 from busplan.drawings.timeline.drawing import TimelineDrawing
@@ -56,6 +56,7 @@ def timeline_report(plan: Schedule) -> Report:
 
 def _blocks(plan: Schedule) -> Iterator[Block]:
     """Whether the cycle fits, the cycle to scale, and the total of each kind of event."""
+    yield from refused_circle(plan.profile)
     yield headline(plan)
     yield from (Sentence((words,), "warns") for words in _warnings(plan))
     yield margins_sentence(plan)
@@ -171,6 +172,7 @@ def _facts(plan: Schedule) -> JsonDocument:
         exceeded=list(figures.exceeded),
         not_shown=None if figures.not_shown is None else list(figures.not_shown),
         fits=figures.fits,
+        circle_refused_by=list(figures.circle_refused_by),
         verdict=figures.verdict,
         **safety_record(figures, plan.profile),
         warnings=_warnings(plan),

@@ -7,9 +7,9 @@ from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, limits_behin
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
+from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import UNTESTED_CIRCLE, changeable
-from busplan.analysis.planning.constraints import refused_step
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import (
@@ -43,6 +43,7 @@ from busplan.forms.blocks import (
     state_of,
 )
 from busplan.forms.numbers import listed, nouns, period_value
+from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     """
     figures = verdict.deciding
     at = places.get("verdict", "")
+    yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
     yield _headline(verdict, profile, at=at)
-    yield from _no_circle(verdict, profile)
     yield from not_in_it(profile)
     yield from evidence_sentence(bus_of(profile))
     yield from _other_models(verdict, profile, places)
@@ -86,6 +87,17 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
         yield _advice(verdict, profile, places)
     yield from execution_sentence(profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
+
+
+def refused_circle(profile: Profile) -> Iterator[Sentence]:
+    """Say why the circle that a profile asks for cannot be run; nothing where it can.
+
+    It stands first in every answer with a verdict: a plan whose circle nobody can run is none.
+    """
+    causes = circle_refusals(profile)
+    if causes:
+        subject = ("The circle of ", Code(profile.name), " cannot be run at ", period_value(profile.cycle.period_us))
+        yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
@@ -140,16 +152,10 @@ def _place(at: str, key: str) -> str:
 
 
 def _headline(verdict: Verdict, profile: Profile, *, at: str) -> Sentence:
-    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), ": ")
+    alone = ", the bus alone: " if verdict.deciding.circle_refused_by else ": "
+    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), alone)
     parts = (*subject, *verdict_story(verdict.deciding, profile, at=at).parts)
     return Sentence(parts, state_of(verdict.all_well))
-
-
-def _no_circle(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
-    """Say why no circle can be simulated at the period, where the step alone is the cause."""
-    why = refused_step(profile, verdict.period_us)
-    if why:
-        yield Sentence((f"Its circle cannot be simulated: {why}.",), "fails")
 
 
 def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> Sentence:

@@ -35,8 +35,6 @@ class MapAnswer(Answer):
         A row for each value of `y`, in it one for each value of `x`: a `Cell`, or a `NotDrawn` with the reason.
     with_circle
         Whether the circle of every setting that fits was tested.
-    not_judged
-        Why a circle could not be run somewhere; empty if each could.
     """
 
     profile: Profile
@@ -44,7 +42,6 @@ class MapAnswer(Answer):
     y: Direction
     rows: tuple[tuple[Cell | NotDrawn, ...], ...]
     with_circle: bool
-    not_judged: str
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -69,7 +66,7 @@ class MapAnswer(Answer):
 
     @property
     def _found(self) -> TradeOff:
-        return TradeOff(self.profile, self.x, self.y, self.rows, self.with_circle, self.not_judged)
+        return TradeOff(self.profile, self.x, self.y, self.rows, self.with_circle)
 
 
 @renamed(with_circle="circle")

@@ -215,6 +215,13 @@ FITS: Final = Figure(
     sort="truth",
     better="more",
 )
+CIRCLE_REFUSED_BY: Final = Figure(
+    "circle_refused_by",
+    "refused",
+    "profile",
+    "keys for which the circle that the profile asks for cannot be run",
+    sort="words",
+)
 _CERTAINTY: Final = "JCGM 100"
 BIAS: Final = Figure("bias_us", "bias", "residual", "what the bus takes beyond the timing model, on the mean", "bias")
 MARGIN_CORRECTED: Final = Figure(
@@ -346,6 +353,6 @@ def capacity_figures(
         *terms,
         *(BINDING_TERM, UTILISATION, MARGIN),
         *counted,
-        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS),
+        *(MAX_NODES, MAX_AXES, LIMITED_BY, MIN_PERIOD, MIN_SLICE_RATIO, EXCEEDED, FITS, CIRCLE_REFUSED_BY),
         *CERTAINTY,
     )

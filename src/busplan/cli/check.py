@@ -107,8 +107,9 @@ def check_command(
     """Fail a build when a profile no longer fits its bus or its circle.
 
     Each finding has a line: `path:line:column: CODE severity: message`. `busplan rule CODE` explains it. A comment
-    `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. Exits 0 when clean, 1 with
-    findings at or above --fail-on, 2 when it could not do the job; one broken file does not stop the others.
+    `# busplan: ignore[CODE] reason` on its line, or alone on the line above, suppresses it. A file that is
+    no TOML or no profile is a finding, too. Exits 0 when clean, 1 with findings at or above --fail-on, 2 when it could
+    not do the job, as with a file that is not there; one such file does not stop the others.
 
     Example: busplan check paper-1ms paper-4ms --format github
     """

@@ -4,60 +4,45 @@ They share one run of the test, only for profiles with a section for it.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import product
 from typing import Final
 
-from busplan.analysis.circle.check import MOST_STEPS
-from busplan.analysis.planning.constraints import refused_step
+from busplan.analysis.circle.refusal import STEP, circle_refusals
 from busplan.buses.rule import Mending, Rule, RuleProblem
-from busplan.errors import BusplanError
 from busplan.rules.finding import Subject
+from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import ParameterError
+from busplan.servo.checks import Refused
 
-_NAMED: Final = ("circle", "servo", "delivery", "cycle", "bus")
 _NOT_RUN: Final = ("BP203", "BP204")
 
 
-def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterator[tuple[str, RuleProblem]]:
+def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     """Run the circle test of a profile, and yield the code of each broken rule with its problem.
 
-    A cycle that does not fit breaks another rule, and has no circle.
+    A circle that cannot be run is said whether or not it was to be run. A cycle that does not fit breaks another rule,
+    and has no circle.
 
     Parameters
     ----------
     subject
-        The profile.
-    most_steps
-        Most simulated steps of each axis: a longer circle is not run.
+        The profile, and the most simulated steps of each axis: a longer circle is not run.
     """
+    profile, most_steps = subject.profile, subject.circle_steps
+    refused = circle_refusals(profile)
+    yield from (("BP203", _refused(one, subject)) for one in refused)
+    if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
+        return
     from busplan.analysis.circle.failures import STABILITY
     from busplan.analysis.circle.roundness import circle_test, to_attack
     from busplan.analysis.circle.setup import path_steps
 
-    if not subject.profile.asks_for_circle or not subject.deciding.fits:
+    steps = path_steps(profile)
+    if steps > most_steps:
+        words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
+        yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
-    try:
-        steps = path_steps(subject.profile)
-        if steps > most_steps:
-            key = _key_of("radius_mm", profile=subject.profile)
-            yield "BP204", RuleProblem(key, f"the circle takes {steps:,} steps, more than {most_steps:,}: not run")
-            return
-        result = circle_test(subject.profile).results[0]
-    except ParameterError as error:
-        for refused in error.refused:
-            key = _key_of(refused.name, *refused.beside, profile=subject.profile)
-            # A key that is the parameter says its name already.
-            is_said = key.rpartition(".")[2] == refused.name.rpartition(".")[2]
-            message = f"{refused.value}: {refused.right}" if is_said else refused.message
-            words, _, way_out = message.partition("; ")
-            is_step = refused_step(subject.profile, subject.profile.cycle.period_us)
-            yield "BP203", RuleProblem(key, words, *(subject.cure() if is_step else Mending(way_out)))
-        return
-    except BusplanError as error:
-        yield from (("BP203", RuleProblem(_key_of(profile=subject.profile), words)) for words in error.problems)
-        return
+    result = circle_test(profile).results[0]
     # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
     failures = [one for one in result.failures if not one.is_of_bus]
     first = to_attack(result)
@@ -65,30 +50,39 @@ def circle_problems(subject: Subject, *, most_steps: int = MOST_STEPS) -> Iterat
     for failure in failures:
         stability = failure.name in STABILITY
         # A finding needs a key in the file: a default limit has none.
-        said = failure.name in subject.profile.tolerance.model_fields_set
+        said = failure.name in profile.tolerance.model_fields_set
         key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
-        gain = subject.profile.servo.position_gain_per_s
+        gain = profile.servo.position_gain_per_s
         way_out = "lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
         if failure.name in CONTOUR_MEASURES and failure.value is not None:
             way_out = attack
         yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
 
 
-def _key_of(*names: str, profile: Profile) -> str:
-    """Key of the first of some parameters that the profile says, or the nearest section."""
-    for name, section in product(names, _NAMED):
-        last = name.removeprefix(f"{section}.")
-        if last in getattr(profile, section).model_fields_set:
-            return f"{section}.{last}"
+def _refused(cause: Refused, subject: Subject) -> RuleProblem:
+    """Why a circle cannot be run, at a key of the file."""
+    key = _key_in_file(cause.name, *cause.beside, profile=subject.profile)
+    # A key that is the cause says its name already.
+    words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
+    return RuleProblem(key, words, *(subject.cure() if cause.name == STEP else Mending(way_out)))
+
+
+def _key_in_file(*keys: str, profile: Profile) -> str:
+    """The first of some keys that the profile sets, or the nearest section."""
+    for key in keys:
+        section, _, name = key.rpartition(".")
+        if name in value_at(profile, section).model_fields_set:
+            return key
     return "servo" if "servo" in profile.model_fields_set else "circle"
 
 
 def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
-    """Codes of the rules that were checked: none without a test, one alone if it says why the test was not run."""
-    if subject.profile.asks_for_circle and not subject.deciding.fits:
-        return set()
+    """Codes of the rules that were checked: without a test, the one alone that says why it was not or cannot be run."""
     not_run = {code for code, _ in problems if code in _NOT_RUN}
-    return not_run or {rule.code for rule in RULES}
+    if not_run:
+        return not_run
+    is_run = subject.circle_steps is not None and (subject.deciding.fits or not subject.profile.asks_for_circle)
+    return {rule.code for rule in RULES} if is_run else {"BP203"}
 
 
 RULES: Final = (
@@ -114,9 +108,10 @@ RULES: Final = (
         "circle-impossible",
         "error",
         "the circle test cannot be run",
-        "The values of [servo] and [circle] do not go together: the period is no multiple of the step, the drive "
-        "cannot reach the feed, the circle is too short for its ramps, or the bus puts more than one period into a "
-        "loop on the host.",
+        "The values of [servo], [circle] and [delivery] do not go together: the period is no multiple of the step, the "
+        "drive cannot reach the feed, the circle is too short for its ramps or too long for memory, jitter and skew "
+        "exceed half the period, or the bus puts more than one period into a loop on the host. No circle is run to "
+        "know it, so that --no-circle reports it, too, and every other command says it first.",
     ),
     Rule(
         "BP204",

@@ -82,7 +82,7 @@ class Subject:
         circle_steps: int | None = MOST_STEPS,
     ) -> None:
         self.profile = loaded.profile
-        self._circle_steps = circle_steps
+        self.circle_steps = circle_steps
         self.document = loaded.document
         self.origin = f" (with {changes.words})" if changes.words else ""
         """End of the messages: the changes, which the document does not show."""
@@ -126,7 +126,7 @@ class Subject:
 
     @cached_property
     def _cure(self) -> Mending:
-        found = cure(self.profile, circle_steps=self._circle_steps)
+        found = cure(self.profile, circle_steps=self.circle_steps)
         if found.changes is None:
             return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}")
         lines = tuple(f"{key} = {short_text(value)}" for key, value in found.changes.items())

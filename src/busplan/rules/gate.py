@@ -152,10 +152,9 @@ def check_document(
     own = cycle_rules(profile.bus.kind)
     found = list(_findings(subject, own))
     ran = {rule.code for rule in own}
-    if with_circle:
-        problems = list(circle.circle_problems(subject, most_steps=circle_steps))
-        found += [_placed(subject, all_rules()[code], problem) for code, problem in problems]
-        ran |= circle.answered(subject, problems)
+    problems = list(circle.circle_problems(subject))
+    found += [_placed(subject, all_rules()[code], problem) for code, problem in problems]
+    ran |= circle.answered(subject, problems)
     if baseline is not None:
         lost = regression(subject, baseline)
         found += [_placed(subject, BASELINE, problem) for problem in lost]

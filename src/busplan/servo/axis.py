@@ -6,24 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from busplan.progress import Progress
-from busplan.servo.checks import Refused, refuse
+from busplan.servo.checks import refuse
 from busplan.servo.delivery import Arrivals
 from busplan.servo.engine import Engine, compiled_kernel
 from busplan.servo.kernel import ROUND, Constants, run_rows
 from busplan.servo.parameters import Axis, LoopTiming
 from busplan.servo.rows import KernelRows, kernel_rows, stored_steps, stored_targets_mm
+from busplan.servo.runnable import unfit_steps
 
 if TYPE_CHECKING:
     from collections.abc import MutableSequence
 
 Floats = NDArray[np.float64]
 
-MAX_STEPS = 50_000_000
-"""Positions of two axes take 800 MB."""
-
 _US_PER_S = 1e6
-_LARGEST_COUNT = 2.0**51
-"""Largest number that `busplan.servo.kernel.ROUND` rounds exactly."""
 
 _CHUNK_STEPS = {False: 30_000, True: 250_000}
 """Steps between two progress reports: about 40 ms in plain Python, about 6 ms compiled."""
@@ -211,15 +207,5 @@ def checked_steps(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming) -> in
     4
     """
     cycles = len(setpoints_mm) - 1
-    steps = cycles * timing.steps_per_period
-    if steps > MAX_STEPS:
-        right = f"the move takes {steps} steps, more than {MAX_STEPS}; choose a longer step or a shorter move"
-        refuse(Refused("step_us", timing.step_us, right, ("feed_mm_per_min", "radius_mm")))
-    travel_mm = float(np.abs(setpoints_mm).max()) + axis.max_velocity_mm_s * cycles * timing.period_us / _US_PER_S
-    if travel_mm > _LARGEST_COUNT * axis.encoder_resolution_mm > 0:
-        right = (
-            f"too fine for {travel_mm:.3g} mm of travel; "
-            f"choose at least {travel_mm / _LARGEST_COUNT:.3g} mm, or 0 (ideal)"
-        )
-        refuse(Refused("encoder_resolution_mm", axis.encoder_resolution_mm, right))
-    return steps
+    refuse(*unfit_steps(cycles, reach_mm=float(np.abs(setpoints_mm).max()), axis=axis, timing=timing))
+    return cycles * timing.steps_per_period

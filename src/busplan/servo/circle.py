@@ -1,6 +1,5 @@
 """Simulate and measure a circle test."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,6 +17,7 @@ from busplan.servo.measured_part import measured_part
 from busplan.servo.mechanics import move_to_table
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
 from busplan.servo.path import CirclePath
+from busplan.servo.runnable import out_of_reach
 
 Floats = NDArray[np.float64]
 
@@ -259,30 +259,8 @@ def check_circle(
         right = f"the set-points of the path come every {path.period_us} us"
         refused.append(Refused("period_us", timing.period_us, right))
     for name, axis in (("x", x), ("y", y)):
-        refused.extend(_out_of_reach(path, name=name, axis=axis))
+        refused.extend(out_of_reach(axis, name=name, feed_mm_per_min=path.feed_mm_per_min))
     refuse(*refused)
     check_delivery(delivery, period_us=timing.period_us)
     checked_steps(path.x_mm, axis=x, timing=timing)
     checked_steps(path.y_mm, axis=y, timing=timing)
-
-
-def _out_of_reach(path: CirclePath, *, name: str, axis: Axis) -> Iterator[Refused]:
-    """Refuse a drive that cannot reach the feed in both directions."""
-    highest_mm_s, offset_mm_s = axis.highest_command_mm_s, abs(axis.drive_offset_mm_s)
-    levels = f" and dac_bits = {axis.dac_bits}" if axis.dac_bits else ""
-    if offset_mm_s >= highest_mm_s:
-        yield Refused(
-            "drive_offset_mm_s",
-            axis.drive_offset_mm_s,
-            f"axis {name} commands at most {highest_mm_s:g} mm/s with "
-            f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the offset must stay below it",
-            ("max_velocity_mm_s",),
-        )
-    elif path.feed_mm_s >= highest_mm_s - offset_mm_s:
-        yield Refused(
-            "feed_mm_per_min",
-            path.feed_mm_per_min,
-            f"axis {name} reaches {(highest_mm_s - offset_mm_s) * 60:g} mm/min with "
-            f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the feed must stay below it",
-            ("max_velocity_mm_s", "drive_offset_mm_s"),
-        )

@@ -11,8 +11,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.servo.checks import Refused, refuse
+from busplan.servo.checks import refuse
 from busplan.servo.parameters import Delivery, OnLoss
+from busplan.servo.runnable import unfit_delivery
 
 AxisName = Literal["x", "y"]
 Floats = NDArray[np.float64]
@@ -107,10 +108,7 @@ def check_delivery(delivery: Delivery, *, period_us: float) -> None:
     --------
     >>> check_delivery(Delivery(jitter_us=400.0, skew_us=100.0), period_us=1000.0)
     """
-    if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
-        both = f"{delivery.jitter_us} and skew_us = {delivery.skew_us}"
-        right = f"together they must not exceed half the period, {period_us / 2:g} us"
-        refuse(Refused("jitter_us", both, right, ("skew_us", "period_us")))
+    refuse(*unfit_delivery(delivery, period_us=period_us))
 
 
 def arrival_offsets_us(delivery: Delivery, *, name: AxisName, cycles: int, period_us: float) -> Floats:

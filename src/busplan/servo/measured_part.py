@@ -6,12 +6,12 @@ from typing import NamedTuple
 from busplan.servo.margins import LoopMargins, loop_margins
 from busplan.servo.parameters import Axis, LoopTiming
 from busplan.servo.path import CirclePath
+from busplan.servo.runnable import LONGEST_SETTLING_US
 
 _SETTLING_SHARE = 0.2
 """Largest share of a trapezoid's constant speed that the measures leave out for settling."""
 REST_MM = 1e-4
 """What may be left of the lag where nothing says how round the circle must be."""
-LONGEST_SETTLING_US = 60e6
 _ROUNDING_STEPS = 1e-9
 _S_PER_MIN = 60.0
 

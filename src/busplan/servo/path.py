@@ -7,23 +7,19 @@ ramp down.
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.servo.checks import Refused, negative, not_one_of, not_positive, refuse
+from busplan.servo.checks import negative, not_one_of, not_positive, refuse
+from busplan.servo.runnable import move_along, unfit_move
 
 Direction = Literal["ccw", "cw"]
 Floats = NDArray[np.float64]
 
-MAX_SETPOINTS = 10_000_000
-"""Most set-points of a move, 2.8 h at 1 ms; more is a typing error."""
-
 _US_PER_S = 1e6
 _S_PER_MIN = 60.0
-_ROUNDING_PERIODS = 1e-9
-"""Tolerance in periods, so that rounding does not add a period to a move."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,24 +78,6 @@ class CirclePath:
         return 2 * math.pi * self.radius_mm / self.feed_mm_s * _US_PER_S
 
 
-class _Move(NamedTuple):
-    """A move along the circle, without its set-points."""
-
-    start_mm: float
-    """Place of the start along the circle, 0 at (r, 0)."""
-    length_mm: float
-    ramp_s: float
-    turn_from_s: float | None
-
-    def duration_s(self, feed_mm_s: float) -> float:
-        """Duration of the move [s]: each ramp covers half the distance at full feed."""
-        return self.length_mm / feed_mm_s + self.ramp_s
-
-    def setpoints(self, feed_mm_s: float, period_s: float) -> int:
-        """Number of periods of the move, the last one begun [1]."""
-        return math.ceil(self.duration_s(feed_mm_s) / period_s - _ROUNDING_PERIODS)
-
-
 def circle_path(
     radius_mm: float,
     *,
@@ -137,7 +115,7 @@ def circle_path(
     ------
     BusplanError
         A value is out of range, a trapezoid is so short that the feed is never reached, or the move takes more than
-        `MAX_SETPOINTS` periods.
+        `runnable.MAX_SETPOINTS` periods.
 
     Notes
     -----
@@ -168,17 +146,15 @@ def circle_path(
         *not_one_of("ccw", "cw", direction=direction),
     )
     period_s, feed_mm_s = period_us / _US_PER_S, feed_mm_per_min / _S_PER_MIN
-    move = _move(radius_mm, feed_mm_s, period_s, ramp_periods, settling_us)
-    setpoints = move.setpoints(feed_mm_s, period_s)
-    if move.length_mm < feed_mm_s * move.ramp_s:
-        refuse(_too_short(radius_mm, feed_mm_per_min=feed_mm_per_min, ramp_s=move.ramp_s))
-    if setpoints > MAX_SETPOINTS:
-        right = (
-            f"the circle takes {setpoints:.3g} periods of {period_us:g} us, more than {MAX_SETPOINTS}; "
-            f"choose a faster feed, a smaller radius or a longer period"
-        )
-        refuse(Refused("feed_mm_per_min", feed_mm_per_min, right, ("radius_mm", "period_us")))
-    time_s = np.arange(setpoints + 1, dtype=np.float64) * period_s
+    move = move_along(
+        radius_mm,
+        feed_mm_per_min=feed_mm_per_min,
+        period_us=period_us,
+        ramp_periods=ramp_periods,
+        settling_us=settling_us,
+    )
+    refuse(*unfit_move(move, radius_mm=radius_mm))
+    time_s = np.arange(move.setpoints + 1, dtype=np.float64) * period_s
     way_mm = _trapezoid(time_s, feed_mm_s=feed_mm_s, ramp_s=move.ramp_s, length_mm=move.length_mm)
     angle = (move.start_mm + way_mm) / radius_mm
     return CirclePath(
@@ -188,52 +164,11 @@ def circle_path(
         x_mm=radius_mm * np.cos(angle),
         y_mm=radius_mm * np.sin(angle) * (1 if direction == "ccw" else -1),
         constant_from_us=move.ramp_s * _US_PER_S,
-        constant_until_us=(move.duration_s(feed_mm_s) - move.ramp_s) * _US_PER_S,
+        constant_until_us=(move.duration_s - move.ramp_s) * _US_PER_S,
         turn_from_us=None if move.turn_from_s is None else move.turn_from_s * _US_PER_S,
         settling_us=settling_us,
         direction=direction,
     )
-
-
-def circle_setpoints(
-    radius_mm: float,
-    *,
-    feed_mm_per_min: float,
-    period_us: float,
-    ramp_periods: int = 100,
-    settling_us: float | None = None,
-) -> int:
-    """Count the set-points of `circle_path` without computing them.
-
-    Parameters
-    ----------
-    radius_mm, feed_mm_per_min, period_us, ramp_periods, settling_us
-        As for `circle_path`, in range.
-
-    Returns
-    -------
-    int
-        Number of periods that the move takes [1].
-
-    Examples
-    --------
-    >>> circle_setpoints(320.0, feed_mm_per_min=2500.0, period_us=4000.0)
-    12164
-    """
-    period_s, feed_mm_s = period_us / _US_PER_S, feed_mm_per_min / _S_PER_MIN
-    return _move(radius_mm, feed_mm_s, period_s, ramp_periods, settling_us).setpoints(feed_mm_s, period_s)
-
-
-def _move(radius_mm: float, feed_mm_s: float, period_s: float, ramp_periods: int, settling_us: float | None) -> _Move:
-    circle_mm, ramp_s = 2 * math.pi * radius_mm, ramp_periods * period_s
-    if settling_us is None:
-        return _Move(0.0, circle_mm, ramp_s, None)
-    turn_s = circle_mm / feed_mm_s
-    turns = max(1, math.ceil((settling_us / _US_PER_S + ramp_s / 2) / turn_s))
-    lead_in = math.ceil((turns * turn_s + ramp_s / 2) / period_s - _ROUNDING_PERIODS)
-    turn_from_s = lead_in * period_s
-    before_mm = feed_mm_s * (turn_from_s - ramp_s / 2)
-    return _Move(-before_mm, before_mm + circle_mm + feed_mm_s * ramp_s / 2, ramp_s, turn_from_s)
 
 
 def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: float) -> Floats:
@@ -250,16 +185,3 @@ def _trapezoid(time_s: Floats, *, feed_mm_s: float, ramp_s: float, length_mm: fl
 def _speeding_up(time_s: Floats, *, feed_mm_s: float, ramp_s: float) -> Floats:
     ramp_mm = feed_mm_s * time_s**2 / (2 * ramp_s)
     return np.where(time_s < ramp_s, ramp_mm, feed_mm_s * (time_s - ramp_s / 2))
-
-
-def _too_short(radius_mm: float, *, feed_mm_per_min: float, ramp_s: float) -> Refused:
-    length_mm = 2 * math.pi * radius_mm
-    reachable = length_mm / ramp_s * _S_PER_MIN
-    smallest_mm = feed_mm_per_min / _S_PER_MIN * ramp_s / (2 * math.pi)
-    return Refused(
-        "feed_mm_per_min",
-        feed_mm_per_min,
-        f"never reached on a circle of radius_mm = {radius_mm} with ramps of {ramp_s:g} s; "
-        f"choose at most {reachable:.6g} mm/min, at least {smallest_mm:.6g} mm, or shorter ramps",
-        ("radius_mm", "ramp_periods", "period_us"),
-    )

@@ -15,6 +15,7 @@ from busplan.analysis.capacity.certainty import (
 )
 from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
+from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses import kind_named
@@ -79,6 +80,8 @@ class CapacityFigures(NamedTuple):
     """Keys of the limits that are broken."""
     fits: bool
     """Whether required <= available and no limit is broken; the verdict is another question."""
+    circle_refused_by: tuple[str, ...]
+    """Keys for which the circle that the profile asks for cannot be run."""
     bias_us: float | None
     """This and the figures below exist for the timing model that decides."""
     margin_corrected_us: float | None
@@ -202,6 +205,7 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
         **counts,
         exceeded=exceeded,
         fits=not exceeded,
+        circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
         **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
         groups=() if whole else groups,
         safe=bus.is_safe(network),

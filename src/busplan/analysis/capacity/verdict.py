@@ -33,8 +33,8 @@ class Verdict(NamedTuple):
 
     @property
     def all_well(self) -> bool:
-        """Whether the cycle is shown to fit and the bus is set safely."""
-        return self.deciding.verdict == FITS and self.deciding.safe
+        """Whether the cycle is shown to fit, the bus is set safely, and nothing keeps the circle from being run."""
+        return self.deciding.verdict == FITS and self.deciding.safe and not self.deciding.circle_refused_by
 
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:

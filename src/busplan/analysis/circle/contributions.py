@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 from busplan.servo.circle import CircleRun
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import MAX_SETPOINTS, CirclePath, circle_path
+from busplan.servo.path import CirclePath, circle_path
+from busplan.servo.runnable import MAX_SETPOINTS
 
 
 class Setup(NamedTuple):

@@ -13,7 +13,7 @@ from busplan.elementwise import existing
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
-from busplan.servo.measured_part import LONGEST_SETTLING_US
+from busplan.servo.runnable import LONGEST_SETTLING_US
 
 MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
 """Least margins of the loop by key, with their unit; they have defaults, so that they are always asked for."""

@@ -17,6 +17,7 @@ from busplan.analysis.circle.failures import (
     circle_failures,
     tightest_margins,
 )
+from busplan.analysis.circle.refusal import require_circle
 from busplan.analysis.circle.setup import bus, loop_timing, path_setpoints, setup
 from busplan.profile.toml import at_periods
 from busplan.progress import Progress
@@ -164,8 +165,7 @@ def circle_test(
     Raises
     ------
     BusplanError
-        The period is no multiple of the step, the drive cannot reach the feed, or the circle is too short for its
-        ramps.
+        A circle that cannot be run: the period is no multiple of the step, say, or the drive cannot reach the feed.
 
     References
     ----------
@@ -177,7 +177,7 @@ def circle_test(
     # needs no path.
     capacities = [bus(variant) for variant in variants]
     setups = [
-        setup(variant) if capacity.fits else loop_timing(variant)
+        setup(variant) if capacity.fits else _timing(variant)
         for variant, capacity in zip(variants, capacities, strict=True)
     ]
     simulated = [one for one in setups if isinstance(one, Setup)]
@@ -190,6 +190,12 @@ def circle_test(
         for variant, capacity, one, without in zip(variants, capacities, setups, ranked, strict=True)
     ]
     return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
+
+
+def _timing(profile: Profile) -> LoopTiming:
+    """Timing of a circle that could be run, on a bus that does not carry it."""
+    require_circle(profile)
+    return loop_timing(profile)
 
 
 class _Counter:

@@ -2,21 +2,18 @@
 
 from dataclasses import replace
 from math import inf
-from typing import Any, Final
+from typing import Final
 
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
-from busplan.analysis.circle.delays import loop_delays_us, skew_us
+from busplan.analysis.circle.delays import loop_delays_us
+from busplan.analysis.circle.refusal import AXIS_NAMES, axis_of, delivery_of, move_of, parameters_in, require_circle
 from busplan.analysis.network import bus_of
-from busplan.sections.base import Section, value_at
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
-from busplan.servo.checks import ParameterError, Refused, parameters
-from busplan.servo.circle import check_circle
-from busplan.servo.delivery import check_delivery
 from busplan.servo.measured_part import REST_MM, settling_time_us
-from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics
-from busplan.servo.path import circle_path, circle_setpoints
+from busplan.servo.parameters import FINEST_ENCODER_MM, Axis, LoopTiming, Mechanics
+from busplan.servo.path import circle_path
 
 _REST_SHARE: Final = 1e-3
 """What settling may leave of the smallest contour tolerance."""
@@ -35,11 +32,10 @@ def setup(profile: Profile) -> Setup:
     BusplanError
         As `circle_test`.
     """
-    circle, delivery, mechanics = profile.circle, profile.delivery, profile.mechanics
-    (x, y), timing = loop_axes(profile), loop_timing(profile)
-    settling_us = path_settling_us(profile)
-    delivered = Delivery(**_parameters_in(delivery, Delivery))
-    one = Setup(
+    require_circle(profile)
+    circle, settling_us = profile.circle, path_settling_us(profile)
+    x, y = loop_axes(profile)
+    return Setup(
         path=circle_path(
             circle.radius_mm,
             feed_mm_per_min=circle.feed_mm_per_min,
@@ -50,77 +46,28 @@ def setup(profile: Profile) -> Setup:
         ),
         x=x,
         y=y,
-        timing=timing,
-        delivery=_without_clock(delivered, profile),
-        mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
+        timing=loop_timing(profile),
+        delivery=delivery_of(profile),
+        mechanics=Mechanics(**parameters_in(profile.mechanics, Mechanics)),
         settled=settling_us != inf,
     )
-    check_circle(one.path, x=one.x, y=one.y, timing=one.timing, delivery=one.delivery)
-    return one
-
-
-def _without_clock(delivery: Delivery, profile: Profile) -> Delivery:
-    """The delivery with what axes without a common clock take their set-points apart.
-
-    Raises
-    ------
-    BusplanError
-        That is too long for the period, and what the profile delivers is not.
-    """
-    apart_us, period_us = skew_us(profile), profile.cycle.period_us
-    if not apart_us:
-        return delivery
-    check_delivery(delivery, period_us=period_us)
-    found = replace(delivery, skew_us=delivery.skew_us + apart_us)
-    try:
-        check_delivery(found, period_us=period_us)
-    except ParameterError:
-        right = (
-            f"the last axis then takes its set-points {apart_us:g} us behind the first, which the circle test knows up "
-            f"to half the period, {period_us / 2:g} us, with jitter and skew; set it true if the drives have a clock"
-        )
-        raise ParameterError(Refused(bus_of(profile).clock_key, "false", right)) from None
-    return found
 
 
 def loop_timing(profile: Profile) -> LoopTiming:
-    """Timing of a profile's position loops.
-
-    Raises
-    ------
-    BusplanError
-        The period is no multiple of the step.
-    """
+    """Timing of a profile's position loops, in a circle that can be run."""
     servo = profile.servo
-    try:
-        return LoopTiming(
-            period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
-        )
-    except ParameterError as error:
-        if "step_us" in servo.model_fields_set:
-            raise
-        default = (one._replace(right=f"{one.right}; it is the default of servo.step_us") for one in error.refused)
-        raise ParameterError(*default) from None
+    return LoopTiming(
+        period_us=profile.cycle.period_us, step_us=servo.step_us, loop=servo.loop, interpolation=servo.interpolation
+    )
 
 
 def loop_axes(profile: Profile) -> tuple[Axis, Axis]:
-    """Both axes of a profile with the delays of their loops.
-
-    Raises
-    ------
-    BusplanError
-        The bus puts more than a period into a loop on the host.
-    """
-    x_us, y_us = loop_delays_us(profile)
-    period_us = profile.cycle.period_us
-    if max(x_us, y_us) > period_us:
-        why = f"the bus puts {max(x_us, y_us):g} us into a loop over it, and the circle test knows one period"
-        key = bus_of(profile).loop_key
-        less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
-        right = f'{why}, {period_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
-        raise ParameterError(Refused("servo.loop", '"host"', right))
-    servo = profile.servo
-    return Axis(**servo.axis_keys("x"), delay_us=x_us), Axis(**servo.axis_keys("y"), delay_us=y_us)
+    """Both axes of a profile with the delays of their loops, in a circle that can be run."""
+    x, y = (
+        replace(axis_of(profile, name), delay_us=delay_us)
+        for name, delay_us in zip(AXIS_NAMES, loop_delays_us(profile), strict=True)
+    )
+    return x, y
 
 
 def path_steps(profile: Profile) -> int:
@@ -128,23 +75,16 @@ def path_steps(profile: Profile) -> int:
 
     Raises
     ------
-    BusplanError
-        The period is no multiple of the step.
+    ParameterError
+        The circle cannot be run.
     """
-    timing = loop_timing(profile)
-    return path_setpoints(profile) * timing.steps_per_period
+    require_circle(profile)
+    return path_setpoints(profile) * loop_timing(profile).steps_per_period
 
 
 def path_setpoints(profile: Profile) -> int:
-    """Count the set-points of a profile's circle [1]."""
-    circle, settling_us = profile.circle, path_settling_us(profile)
-    return circle_setpoints(
-        circle.radius_mm,
-        feed_mm_per_min=circle.feed_mm_per_min,
-        period_us=profile.cycle.period_us,
-        ramp_periods=circle.ramp_periods,
-        settling_us=0.0 if settling_us == inf else settling_us,
-    )
+    """Count the set-points of a profile's circle, which can be run [1]."""
+    return move_of(profile, path_settling_us(profile)).setpoints
 
 
 def path_settling_us(profile: Profile) -> float | None:
@@ -159,11 +99,6 @@ def path_settling_us(profile: Profile) -> float | None:
         y,
         timing=loop_timing(profile),
         feed_mm_per_min=profile.circle.feed_mm_per_min,
-        rest_mm=REST_MM if least_mm is None else _REST_SHARE * least_mm,
+        rest_mm=REST_MM if least_mm is None else max(_REST_SHARE * least_mm, FINEST_ENCODER_MM),
     )
     return inf if found is None else found
-
-
-def _parameters_in(section: Section, of: type) -> dict[str, Any]:
-    """The parameters of the servo core in a section, to which a kind of bus may have added keys."""
-    return section.model_dump(include={one.name for one in parameters(of)})

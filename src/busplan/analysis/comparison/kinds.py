@@ -8,10 +8,10 @@ from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.capacity.node_limit import safe_nodes
 from busplan.analysis.capacity.verdict import after_reset
+from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.comparison.circle_tests import circle_tests
 from busplan.analysis.comparison.difference import ComputeCircleFigures
 from busplan.analysis.network import varied_nodes
-from busplan.analysis.planning.constraints import STEP
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.analysis.planning.smallest_period import SmallestPeriod, smallest_period
 from busplan.buses import kind_named, kind_names

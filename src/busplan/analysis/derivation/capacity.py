@@ -15,6 +15,7 @@ from busplan.analysis.capacity.figures import (
     numeric_figures,
 )
 from busplan.analysis.capacity.verdict import verdicts
+from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.derivation.formulas import against
 from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import chosen, if_finite, remembered
@@ -73,8 +74,9 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
         named |= _most(network, plain, model=model)
     else:
         each = (named["required_us"], named["available_us"])
+        others = known.keys() if model == bus.deciding_model else known.keys() - by_key(CERTAINTY).keys()
         named |= {
-            key: found(None, _OF_GROUPS, each) for key in known if key not in named and getattr(plain, key) is None
+            key: found(None, _OF_GROUPS, each) for key in others if key not in named and getattr(plain, key) is None
         }
     named |= {
         key: found(None, "none for this network", (named["required_us"],))
@@ -84,6 +86,11 @@ def capacity_figures(profile: Profile, *, model: str) -> dict[str, Traced]:
     if model == bus.deciding_model:
         named |= _certainty(profile, cycle, plain)
     named |= _words(named, plain, cycle.terms, _limits(bus, network))
+    named["circle_refused_by"] = found(
+        list(plain.circle_refused_by),
+        "what of the period, the servo, the circle and the delivery does not go together",
+        (named["period_us"], traced(profile, STEP)),
+    )
     for key, number in named.items():
         number.named(key, known[key].symbol)
     return named

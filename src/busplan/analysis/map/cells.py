@@ -10,11 +10,19 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.buses.parts import Value
 from busplan.sections.profile import Profile
 
-State = Literal["fits", "circle fails", "circle not judged", "not shown to fit", "unsafe", "does not fit"]
+State = Literal[
+    "fits",
+    "circle fails",
+    "circle not judged",
+    "circle cannot be run",
+    "not shown to fit",
+    "unsafe",
+    "does not fit",
+]
 STATES: Final[tuple[State, ...]] = get_args(State)
 """In the order of reports."""
 CELL_FIGURES: Final = (
-    *("nodes", "axes", "verdict", "binding_term", "exceeded", "not_shown"),
+    *("nodes", "axes", "verdict", "binding_term", "exceeded", "not_shown", "circle_refused_by"),
     *("margin_corrected_us", "uncertainty_us"),
 )
 """Columns of a sweep that a cell is made of."""
@@ -38,7 +46,8 @@ class Cell(NamedTuple):
     axes: int
     state: State
     limited_by: tuple[str, ...]
-    """Limits that are broken; of a circle that fails, what it does not hold; none where it fits."""
+    """Limits that are broken; of a circle that fails, what it does not hold, and of one that cannot be run, the keys
+    that refuse it; none where it fits."""
     binding_term: str
     """The largest term of the cycle."""
     verdict: VerdictWord
@@ -46,6 +55,8 @@ class Cell(NamedTuple):
     uncertainty_us: float | None
     """None where nothing is known of it."""
     is_safe: bool
+    circle_refused_by: tuple[str, ...] = ()
+    """Keys for which its circle cannot be run, whatever the state."""
     circle_passed: bool | None = None
     """None where no circle was run, or no tolerance judges it."""
 
@@ -85,7 +96,8 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
     verdict = figures["verdict"]
     keys = figures["not_shown" if verdict == NOT_SHOWN else "exceeded"]
     broken = tuple(key for key in keys if key != TIME) or (TIME,)
-    state, limits = _judged(verdict, broken=broken, unsafe=unsafe)
+    refused = tuple(figures["circle_refused_by"])
+    state, limits = _judged(verdict, broken=broken, unsafe=unsafe, refused=refused)
     return Cell(
         x=x,
         y=y,
@@ -98,13 +110,18 @@ def cell_of(setting: MapPoint, figures: Mapping[str, Any], *, x: Value, y: Value
         margin_corrected_us=figures["margin_corrected_us"],
         uncertainty_us=None if isnan(figures["uncertainty_us"]) else figures["uncertainty_us"],
         is_safe=not unsafe,
+        circle_refused_by=refused,
     )
 
 
-def _judged(verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...]) -> tuple[State, tuple[str, ...]]:
+def _judged(
+    verdict: VerdictWord, *, broken: tuple[str, ...], unsafe: tuple[str, ...], refused: tuple[str, ...]
+) -> tuple[State, tuple[str, ...]]:
     """State and limits: what does not fit is never called unsafe, and what is unsafe never a fit."""
     if verdict == DOES_NOT_FIT:
         return verdict, broken
     if unsafe:
         return "unsafe", unsafe
-    return (verdict, ()) if verdict == FITS else (verdict, broken)
+    if verdict != FITS:
+        return verdict, broken
+    return ("circle cannot be run", refused) if refused else (verdict, ())

@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Final, NamedTuple, Protocol, TypeVar
 
 from busplan.analysis.circle.estimate import NOTHING, announce, estimate
+from busplan.analysis.circle.refusal import refusals
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import setup
 from busplan.analysis.map.cells import Cell, MapPoint
-from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -40,14 +40,6 @@ class _Judgement(NamedTuple):
     failures: tuple[str, ...]
 
 
-class _Judged(NamedTuple):
-    """Circle tests of a map."""
-
-    cells: dict[Place, Cell]
-    reasons: dict[Place, str]
-    """Why a cell that fits has no circle test."""
-
-
 def _judge(task: _Task) -> _Judgement:
     (result,) = circle_test(override(task.profile, task.changes), explain=False).results
     return _Judgement(result.passed, tuple(failure.name for failure in result.failures))
@@ -59,7 +51,7 @@ def judged(
     *,
     mapper: Mapper,
     progress: Progress | None,
-) -> _Judged:
+) -> dict[Place, Cell]:
     """Run the circle tests of cells that fit, after saying what many of them cost.
 
     Parameters
@@ -75,19 +67,18 @@ def judged(
 
     Returns
     -------
-    _Judged
+    dict
         The same cells, with what their circle says.
     """
     cost, runs = NOTHING, dict[Place, _Task]()
     cells = {place: cell for place, (cell, _) in fitting.items()}
-    reasons: dict[Place, str] = {}
     for place, (cell, setting) in fitting.items():
-        try:
-            cost = cost.then(estimate((), [setup(setting.profile)]))
-        except BusplanError as error:
-            cells[place] = cell._replace(state="circle not judged")
-            reasons[place] = error.problems[0]
+        # A profile that asks for no circle has none to be refused until now.
+        refused = tuple(cause.name for cause in refusals(setting.profile))
+        if refused:
+            cells[place] = cell._replace(state="circle cannot be run", limited_by=refused, circle_refused_by=refused)
         else:
+            cost = cost.then(estimate((), [setup(setting.profile)]))
             runs[place] = _Task(profile, dict(setting.changes))
     announce(cost)
     places = list(runs)
@@ -97,7 +88,7 @@ def judged(
             cells[place] = _with_circle(cells[place], found)
         if progress is not None:
             progress(start + len(part), len(places))
-    return _Judged(cells, reasons)
+    return cells
 
 
 def _with_circle(cell: Cell, found: _Judgement) -> Cell:

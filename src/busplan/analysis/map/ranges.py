@@ -4,11 +4,9 @@ from math import ceil, floor, log10
 from typing import Final
 
 from busplan.analysis.capacity.node_steps import NodeSteps, node_steps, telling_periods
-from busplan.analysis.circle.setup import loop_timing
+from busplan.analysis.circle.refusal import step_refusals
 from busplan.analysis.map.direction import AXES, PERIOD, Direction, own_value
 from busplan.analysis.network import bus_of, varied_nodes
-from busplan.errors import BusplanError
-from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT, MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 
@@ -30,7 +28,7 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     profile
         The network.
     with_circle
-        If True, take only periods whose circle can be simulated, and the profile's own.
+        Whether circles are run, though the profile may not ask for one.
     """
     varied = varied_nodes(profile)
     steps = node_steps(profile, model=bus_of(profile).deciding_model, group=varied.name)
@@ -45,8 +43,10 @@ def default_direction(key: str, profile: Profile, *, with_circle: bool) -> Direc
     least_us, most_us = max(from_us, MIN_STEP_US), min(to_us, MAX_TIME_US)
     known = [one for one in bus_of(profile).periods.us if least_us <= one <= most_us]
     periods_us = _thinned(known) if known else _round_numbers(least_us, most_us)
-    drawn = (one for one in periods_us if not with_circle or _can_turn(profile, one))
-    return Direction(PERIOD, tuple(sorted({*drawn, own_us})))
+    if with_circle or profile.asks_for_circle:
+        # Periods whose circle can be run; all, where the step goes with none.
+        periods_us = [one for one in periods_us if not any(step_refusals(profile, one))] or periods_us
+    return Direction(PERIOD, tuple(sorted({*periods_us, own_us})))
 
 
 def _nodes(steps: NodeSteps, to_us: float) -> tuple[int, ...]:
@@ -71,12 +71,3 @@ def _round_numbers(least: float, most: float) -> list[float]:
 def _thinned(numbers: list[float]) -> list[float]:
     """As many of some numbers as are drawn, evenly."""
     return numbers[:: ceil(len(numbers) / _MOST) or 1]
-
-
-def _can_turn(profile: Profile, period_us: float) -> bool:
-    """Whether a period is one that the circle can be simulated at."""
-    try:
-        loop_timing(override(profile, {PERIOD: period_us}))
-    except BusplanError:
-        return False
-    return True

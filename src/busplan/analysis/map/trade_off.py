@@ -31,8 +31,6 @@ class TradeOff(NamedTuple):
     rows: tuple[tuple[Cell | NotDrawn, ...], ...]
     """A row for each value of `y`, a cell for each value of `x`."""
     with_circle: bool
-    not_judged: str
-    """Why a circle could not be run somewhere; empty if each could."""
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -139,16 +137,13 @@ def trade_off(
         (row, column): cell_of(found[row, column], figures, x=x.values[column], y=y.values[row])
         for (row, column), figures in _swept(profile, found)
     }
-    reasons: list[str] = []
     if with_circle:
         fitting = {place: (cell, found[place]) for place, cell in cells.items() if cell.state == "fits"}
         if len(fitting) > MOST_CIRCLES:
             raise BusplanError(
                 f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES:,} circle tests; give fewer values"
             )
-        tested = judged(profile, fitting, mapper=mapper, progress=progress)
-        cells |= tested.cells
-        reasons += tested.reasons.values()
+        cells |= judged(profile, fitting, mapper=mapper, progress=progress)
     rows = tuple(
         tuple(
             cells[row, column] if (row, column) in cells else NotDrawn(one_x, one_y, str(settings[row, column]))
@@ -156,7 +151,7 @@ def trade_off(
         )
         for row, one_y in enumerate(y.values)
     )
-    return TradeOff(profile, x, y, rows, with_circle, reasons[0] if reasons else "")
+    return TradeOff(profile, x, y, rows, with_circle)
 
 
 def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:

@@ -6,15 +6,14 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.circle.refusal import circle_refusals, step_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
 from busplan.elementwise import plain
 from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
-from busplan.servo.checks import no_multiple
 
-STEP: Final = "servo.step_us"
 CIRCLE: Final = "circle"
 _MOST_SLICE_US: Final = 1e12
 """Longer than any slice of a profile: it keeps quotients finite."""
@@ -96,7 +95,7 @@ def needs(profile: Profile) -> list[Need]:
 
 
 def refused_period(profile: Profile) -> Need | None:
-    """Why a period is none of the bus, or does not go with the step of the circle that the profile asks for, if so.
+    """Why a period is none of the bus, or why the circle that a profile asks for cannot be run, if so.
 
     Parameters
     ----------
@@ -107,12 +106,12 @@ def refused_period(profile: Profile) -> Need | None:
     broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
     if broken is not None:
         return Need(inf, broken.key, broken.words(network))
-    why = refused_step(profile, profile.cycle.period_us)
-    return Need(inf, STEP, why) if why else None
+    causes = circle_refusals(profile)
+    return Need(inf, causes[0].name, causes[0].message) if causes else None
 
 
-def refused_step(profile: Profile, period_us: float) -> str:
-    """Why a period does not go with the step of the circle that a profile asks for; empty where it does.
+def goes_with_step(profile: Profile, period_us: float) -> bool:
+    """Whether a period goes with the step of the circle that a profile asks for, if it does.
 
     Parameters
     ----------
@@ -121,7 +120,4 @@ def refused_step(profile: Profile, period_us: float) -> str:
     period_us
         Communication period [us].
     """
-    if not profile.asks_for_circle:
-        return ""
-    found = no_multiple(period_us=period_us, step_us=profile.servo.step_us)
-    return "; ".join(f"servo.{one.message}" for one in found)
+    return not profile.asks_for_circle or not any(step_refusals(profile, period_us))

@@ -8,8 +8,9 @@ from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import fits_in
+from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.constraints import STEP, refused_step
+from busplan.analysis.planning.constraints import goes_with_step
 from busplan.analysis.planning.machine import (
     NODES_KEY,
     Changes,
@@ -69,7 +70,7 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
     )
     found = (
         *own,
-        *((_STEP_OF_CIRCLE,) if refused_step(profile, profile.cycle.period_us) else ()),
+        *(() if goes_with_step(profile, profile.cycle.period_us) else (_STEP_OF_CIRCLE,)),
         Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
         Freedom("payload", "payload", Cost.PAYLOAD, payload_keys(profile), _payloads),
         Freedom("period", "period", Cost.PERIOD, (PERIOD,), _periods),
@@ -135,7 +136,7 @@ def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Fr
 def _dividing_steps(search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
     """The longest step, up to the own one, that divides the period, where that one does not."""
     profile = search.profile(changes)
-    if refused_step(profile, search.period_us(changes)):
+    if not goes_with_step(profile, search.period_us(changes)):
         one = {STEP: dividing_step_us(search.period_us(changes), most_us=profile.servo.step_us)}
         if search.allows({**changes, **one}):
             yield one
@@ -236,7 +237,7 @@ def period_grid(profile: "Profile") -> NumberGrid:
     """Periods that are advised: those that the bus knows, or short ones; no circle refuses one for its step."""
     known = bus_of(profile).periods.us
     if known:
-        return ListedNumbers(tuple(one for one in known if not refused_step(profile, one)))
+        return ListedNumbers(tuple(one for one in known if goes_with_step(profile, one)))
     return ShortNumbers(profile.servo.step_us if profile.asks_for_circle else PERIOD_STEP_US, PERIOD_DIGITS)
 
 

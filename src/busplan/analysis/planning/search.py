@@ -7,8 +7,9 @@ from math import inf
 from typing import Final
 
 from busplan.analysis.capacity.cycle import fits_in
+from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.network import network_of
-from busplan.analysis.planning.constraints import CIRCLE, STEP, Need, keeps_limits, needs, refused_period
+from busplan.analysis.planning.constraints import CIRCLE, Need, keeps_limits, needs, refused_period
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
 from busplan.analysis.planning.machine import Changes
 from busplan.analysis.planning.short_numbers import MOST_RATIO

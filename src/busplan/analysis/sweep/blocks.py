@@ -21,15 +21,16 @@ from busplan.analysis.capacity.certainty import (
 from busplan.analysis.capacity.cycle import TIME, fits_in, limits_with_time
 from busplan.analysis.capacity.figures import COUNTS, certainty_numbers, numeric_figures
 from busplan.analysis.capacity.node_limit import most_nodes
+from busplan.analysis.circle.refusal import loop_refusals, run_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.sweep.grid import Array, Chunk, Grid
 from busplan.buses.cycle import BusCycle
-from busplan.buses.figure import CERTAINTY, Sort
+from busplan.buses.figure import CERTAINTY, CIRCLE_REFUSED_BY, FITS, Sort
 from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
-from busplan.sections.profile import Profile
+from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays fit into the processor's cache."""
@@ -132,10 +133,14 @@ def sweep(
     Paper, equations (1)-(11).
     """
     for chunk in grid.chunks(chunk_points):
+        found = {model: _figures(profile, chunk.values, model) for model in timing_models}
+        decides = bus_of(profile).deciding_model
+        own = found[decides] if decides in found else _figures(profile, chunk.values, decides)
+        refused = {CIRCLE_REFUSED_BY.key: _refused(profile, chunk, own[FITS.key].values)}
         yield SweepBlock(
             chunk,
             {key: _varied(values) for key, values in chunk.values.items()},
-            tuple(_figures(profile, chunk.values, model) for model in timing_models),
+            tuple({**figures, **refused} for figures in found.values()),
         )
 
 
@@ -156,7 +161,7 @@ def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[
                 _figures(profile, {**values, key: np.take(own, [index], axis=number)}, model)
                 for index in range(own.size)
             ]
-            return {name: _joined([part[name] for part in parts], axis=number) for name in figure_names(profile)}
+            return {name: _joined([part[name] for part in parts], axis=number) for name in parts[0]}
     return _columns(_at(profile, values), model, axes=len(values))
 
 
@@ -192,9 +197,51 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     }
     sorts = {figure.key: figure.sort for figure in bus.capacity_figures}
     found = {
-        key: words[key] if key in words else _number(numbers[key], sorts[key]) for key in figure_names(network.profile)
+        key: words[key] if key in words else _number(numbers[key], sorts[key])
+        for key in figure_names(network.profile)
+        if key != CIRCLE_REFUSED_BY.key
     }
     return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
+
+
+def _refused(profile: Profile, chunk: Chunk, fits: Array) -> Column:
+    """Keys for which the circle of each point cannot be run.
+
+    They are asked point by point, but only over the keys that they rest on: the period and those of the circle, all
+    where the bus is in the loop or in the skew.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    chunk
+        The points.
+    fits
+        Where the cycle fits the bus: elsewhere there is no circle to be run.
+    """
+    is_apart = profile.servo.loop == "node" and bus_of(profile).acts_at_once(network_of(profile))
+    has_words = any(own.dtype == object for own in chunk.values.values())
+    read = [
+        (number, key)
+        for number, key in enumerate(chunk.values)
+        if has_words or not is_apart or key.partition(".")[0] in CIRCLE_SECTIONS or key == "cycle.period_us"
+    ]
+    shape = [1] * len(chunk.shape)
+    for number, _ in read:
+        shape[number] = chunk.shape[number]
+    known: dict[tuple[str, ...], int] = {}
+    always, where_it_fits = np.zeros(shape, np.intp), np.zeros(shape, np.intp)
+    for where in np.ndindex(*shape):
+        at = profile
+        for number, key in read:
+            at = with_unchecked(at, key, chunk.values[key].ravel().tolist()[where[number]])
+        of_loop = loop_refusals(at) if at.asks_for_circle else ()
+        causes = (*of_loop, *run_refusals(at, of_loop)) if at.asks_for_circle else ()
+        always[where], where_it_fits[where] = (
+            known.setdefault(tuple(cause.name for cause in each), len(known)) for each in (of_loop, causes)
+        )
+    codes = always if np.array_equal(always, where_it_fits) else np.where(fits, where_it_fits, always)
+    return Column(codes.astype(np.min_scalar_type(len(known))), tuple(map(list, known)))
 
 
 _NO_WORD: Final = Column(np.zeros((), np.uint8), (None,))

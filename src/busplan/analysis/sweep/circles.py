@@ -9,8 +9,9 @@ import numpy as np
 
 from busplan.analysis.circle.estimate import NOTHING, Estimate, estimate
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
+from busplan.analysis.circle.refusal import require_circle
 from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.circle.setup import bus, loop_timing, setup
+from busplan.analysis.circle.setup import bus, setup
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
@@ -113,8 +114,7 @@ def check_chunk(chunk: CircleChunk) -> Estimate:
     Raises
     ------
     BusplanError
-        The first such point and the reason: its period is no multiple of the step, the drive cannot reach the feed,
-        or the circle is too short for its ramps.
+        The first such point and the reason.
     """
     cost = NOTHING
     for changes in chunk.points:
@@ -123,7 +123,7 @@ def check_chunk(chunk: CircleChunk) -> Estimate:
             if bus(variant).fits:
                 cost = cost.then(estimate((), [setup(variant)]))
             else:  # it has an answer, but no circle
-                loop_timing(variant)
+                require_circle(variant)
         except BusplanError as error:
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
             raise BusplanError(*(f"at {point}: {problem}" for problem in error.problems)) from None

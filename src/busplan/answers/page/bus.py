@@ -48,6 +48,7 @@ from busplan.forms.blocks import (
     attribute_value,
     count_value,
     sentence,
+    state_of,
 )
 from busplan.forms.numbers import nouns, period_value
 
@@ -72,7 +73,7 @@ def bus_question(answer: AllAnswers, sources: Sources) -> Question:
     )
     question = Question(
         "Does the cycle fit its period?",
-        Words(word, "passes" if verdict.all_well else "fails"),
+        Words(word, state_of(verdict.deciding.verdict == FITS and verdict.deciding.safe)),
         tuple(verdict_sentences(verdict, answer.profile, places=places)),
         Facts(facts),
         "/verdicts/0/text",

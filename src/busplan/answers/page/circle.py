@@ -23,7 +23,7 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
     if result is None:
         return Question(
             _QUESTION,
-            Words("NOT RUN", "fails" if answer.no_circle else "neutral"),
+            Words("CANNOT BE RUN", "fails") if answer.no_circle else Words("NOT RUN", "neutral"),
             tuple(Sentence((why,)) for why in _why_not(answer)),
             Facts(()),
         )

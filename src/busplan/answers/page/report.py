@@ -136,6 +136,8 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
     questions = (bus_question(answer, found), circle_question(answer, found))
+    if answer.no_circle:
+        questions = questions[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
     yield Chapter(Sentence(("Verdict",)), (*_assumed(answer.assumptions), *questions, *lines), "verdict")
     yield models_part(answer, found)
@@ -229,7 +231,8 @@ def _compared(subject: _Subject) -> tuple[Cell, ...]:
 def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
     result = subject.answer.circle_figures
     if result is None:
-        return MISSING, MISSING, MISSING, "not run"
+        refused = Words("cannot be run", "fails") if subject.answer.no_circle else "not run"
+        return MISSING, MISSING, MISSING, refused
     figures = tuple(attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0") for key in _MEASURES)
     verdict = verdict_words(result)
     return *subject.sources["circle"].gives(figures), Words(verdict.text.lower(), verdict.state)

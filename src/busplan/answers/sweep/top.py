@@ -14,7 +14,7 @@ from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.columns import column_figures
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.answers.sweep.seeds import SeedTally
-from busplan.buses.figure import TIMING_MODEL, Figure
+from busplan.buses.figure import CIRCLE_REFUSED_BY, TIMING_MODEL, Figure
 from busplan.forms.blocks import (
     Code,
     JsonDocument,
@@ -97,6 +97,8 @@ class Tally:
         self._models = timing_models
         self._fits = [0] * len(timing_models)
         self._unsafe = 0
+        self._refused = 0
+        self._refused_by: dict[str, None] = {}
         self._passed: list[int] | None = None
         self._unjudged = 0
         self._seeds = None if seeds is None else SeedTally(seeds)
@@ -114,6 +116,11 @@ class Tally:
             decides = model == self.bus.deciding_model
             flags = np.equal(figures["verdict"].values, VERDICTS.index(FITS)) if decides else figures["fits"].values
             self._fits[number] += _share(flags, points)
+        refused = block.models[0][CIRCLE_REFUSED_BY.key]
+        for code, keys in enumerate(refused.words or ()):
+            if isinstance(keys, list) and keys:
+                self._refused += _share(np.equal(refused.values, code), points)
+                self._refused_by |= dict.fromkeys(keys)
         safety = self.bus.safety_figure
         if safety is not None:
             # Settings of the bus are the same under every model.
@@ -129,6 +136,9 @@ class Tally:
 
     def sentences(self) -> Iterator[Sentence]:
         """Summary of the counts."""
+        if self._refused:
+            words = f"The circle cannot be run at {{}} {nouns(self._refused, 'point')}: {', '.join(self._refused_by)}."
+            yield sentence(words, count_value(self._refused, grouped=True), state="fails")
         whole = count_value(self.expected, "points", at="/points", grouped=True)
         found = whole if self.points == self.expected else count_value(self.points, grouped=True)
         cut = Sentence(()) if self.points == self.expected else sentence(" of {} (interrupted)", whole)
