@@ -6,7 +6,8 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 
 from abc import ABC, abstractmethod
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import repeat
 from math import ceil, floor, inf, sqrt
 from typing import TYPE_CHECKING, Final, TypeAlias
 
@@ -394,8 +395,19 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
         return function(*numbers)
     import numpy as np
 
-    points = np.broadcast(*map(np.asarray, numbers))
-    return np.array([function(*(one.item() for one in point)) for point in points], dtype=float).reshape(points.shape)
+    # Plain numbers are repeated, and arrays read as they are asked for: neither their number nor their size is bounded.
+    shape = np.broadcast_shapes(*(np.shape(one) for one in numbers))
+    points = zip(*(_points(one, shape) for one in numbers), strict=False)
+    return np.array([function(*point) for point in points], dtype=float).reshape(shape)
+
+
+def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[float]:
+    """A number at each point of a shape; a plain one without end."""
+    if isinstance(number, _PLAIN):
+        return repeat(number)
+    import numpy as np
+
+    return (one.item() for one in np.broadcast_to(number, shape).flat)
 
 
 def _between(places: Sequence[float], values: Sequence[float], place: float) -> float:

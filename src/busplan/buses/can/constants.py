@@ -51,5 +51,19 @@ SATURATED: Final = Sourced(
     source="chosen: a load so near 1 has a busy period without use",
     meaning="load from which on no response time is computed",
 )
+MOST_STEPS: Final = Sourced(
+    2000,
+    unit="1",
+    grade="assumed",
+    source="chosen: a bus below a load of 0.9 takes some ten",
+    meaning="steps of a busy period from which on no response time is computed",
+)
+EXPECTED_STUFFING: Final = Sourced(
+    0.4,
+    unit="1",
+    grade="calibrated",
+    source="python-can's logs of hardware, a log at 500 kbit/s, a saturated sender: within 3 %",
+    meaning="share of the possible stuff bits that frames have",
+)
 
 CONSTANTS: Final = constants(globals())
