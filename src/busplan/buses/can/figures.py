@@ -29,15 +29,27 @@ TERMS: Final = (
         letter="W",
     ),
     Figure("cycle_feedback_us", "feedback", _DAVIS, "PDOs from all nodes", "feedback", ink="in", letter="F"),
+    Figure(
+        "cycle_host_us", "host", "profile", "the host's own time behind the last feedback", "host", ink="idle", letter="H"
+    ),
     Figure("cycle_command_us", "command", _DAVIS, "PDOs to all nodes", "command", ink="out", letter="C"),
     Figure(
-        "cycle_messages_us",
-        "messages",
+        "cycle_blocking_us",
+        "3 B",
         _DAVIS,
-        "other messages that arrive while the cycle lasts",
-        "messages",
+        "frames of lower priorities, one before SYNC, one before the last feedback and one before the commands",
+        "blocking",
+        ink="gap",
+        letter="B",
+    ),
+    Figure(
+        "cycle_interference_us",
+        "I",
+        _DAVIS,
+        "other messages of higher priorities than the last PDO that arrive while the cycle lasts",
+        "interference",
         ink="contention",
-        letter="M",
+        letter="I",
     ),
     NONPERIODIC,
 )

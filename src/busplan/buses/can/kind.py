@@ -11,6 +11,7 @@ from busplan.buses.can.constants import (
     FRAME_BYTES,
     MAX_LOAD,
     MOST_PDOS,
+    PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
 )
 from busplan.buses.can.cycle import NONE, WORST, CanCycle
@@ -66,7 +67,9 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
         EventKind("wait", "wait for nodes", "profile", "=", "work"),
         EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
         EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
-        EventKind("message", "other message", _DAVIS, "m", "contention"),
+        EventKind("host", "host", "profile", "h", "idle"),
+        EventKind("blocking", "message of a lower priority", _DAVIS, "b", "gap"),
+        EventKind("message", "message of a higher priority", _DAVIS, "m", "contention"),
         EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
     )
     stretch_kinds = (
@@ -75,12 +78,15 @@ bit_rate_kbit_s = 1000     # assumed: the cable decides, 1000 for less than 40 m
     )
     constants: ClassVar[Mapping[str, Sourced]] = CONSTANTS
     key_sources: ClassVar[Mapping[str, Sourced]] = {
+        "bus.pipeline_cycles": PIPELINE_CYCLES,
         "bus.sync_identifier": SYNC_IDENTIFIER,
         "limits.max_load": MAX_LOAD,
     }
     key_symbols: ClassVar[Mapping[str, str]] = {
         "bus.bit_rate_kbit_s": "f",
         "bus.identifier_bits": "id_bits",
+        "bus.host_us": "host",
+        "bus.pipeline_cycles": "n",
         "node.execution.worst_extra_us": "T_extra",
         "message.payload_bytes": "s",
         "message.period_us": "T",
