@@ -9,11 +9,9 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import repeat
 from math import ceil, floor, inf, sqrt
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from numpy.typing import NDArray
 
     Number: TypeAlias = "float | NDArray[Any] | SpecialNumber"
@@ -396,8 +394,9 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
     import numpy as np
 
     # Plain numbers are repeated, and arrays read as they are asked for: neither their number nor their size is bounded.
-    shape = np.broadcast_shapes(*(np.shape(one) for one in numbers))
-    points = zip(*(_points(one, shape) for one in numbers), strict=False)
+    given: tuple[Any, ...] = numbers
+    shape = np.broadcast_shapes(*map(np.shape, given))
+    points = zip(*(_points(one, shape) for one in given), strict=False)
     return np.array([function(*point) for point in points], dtype=float).reshape(shape)
 
 

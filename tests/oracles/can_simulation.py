@@ -1,14 +1,14 @@
 """An event simulation of a CAN bus with a SYNC cycle, as an oracle: it imports nothing of busplan.
 
-Every sender queues its frames; whenever the bus is free, the queued frame with the smallest identifier goes, and nothing
-interrupts it. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind SYNC, the
-host queues all commands some time behind the last feedback, and a node executes its command some time behind its last
-frame. Other messages are queued whenever the caller says. Times are whole numbers of any unit.
+Every sender queues its frames; whenever the bus is free, the queued frame with the smallest identifier goes, and
+nothing interrupts it. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind
+SYNC, the host queues all commands some time behind the last feedback, and a node executes its command some time behind
+its last frame. Other messages are queued whenever the caller says. Times are whole numbers of any unit.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 
 class Frame(NamedTuple):
@@ -76,63 +76,100 @@ def simulate(
     late_us
         A frame that is queued so long behind the start of another still takes part in its arbitration.
     """
-    count = len(host_us)
-    queue: list[tuple[int, int, tuple[int, ...]]] = []  # when, identifier, whose
-
-    def put(when_us: int, frame: Frame, *owner: int) -> None:
-        heappush(queue, (when_us, frame.identifier, owner))
-
-    frames = {sync.identifier: sync}
-    for node in nodes:
-        frames |= {one.identifier: one for one in (*node.feedback, *node.command)}
-    frames |= {one.frame.identifier: one.frame for one in messages}
-    for cycle in range(count):
-        put(cycle * period_us, sync, SYNC, cycle)
-    for number, message in enumerate(messages):
-        for instance, when_us in enumerate(message.queued_us):
-            put(when_us, message.frame, MESSAGE, number, instance)
-
-    syncs, commands = [0] * count, [0] * count
-    feedback = [[0] * len(nodes) for _ in range(count)]
-    ends = [0] * count
-    missing = [sum(len(one.feedback) for one in nodes)] * count
-    unsent = [[len(one.command) for one in nodes] for _ in range(count)]
-    responses: list[list[int]] = [[] for _ in messages]
-    pending: list[tuple[int, tuple[int, ...]]] = []
-    now_us = 0
-    while queue or pending:
-        if not pending:
-            now_us = max(now_us, queue[0][0])
-        while queue and queue[0][0] <= now_us + late_us:
-            _, identifier, owner = heappop(queue)
-            heappush(pending, (identifier, owner))
-        identifier, (sort, *whose) = heappop(pending)
-        now_us += frames[identifier].us
-        if sort == MESSAGE:
-            number, instance = whose
-            responses[number].append(now_us - messages[number].due_us[instance])
-            continue
-        cycle = whose[0]
-        if sort == SYNC:
-            syncs[cycle] = now_us - cycle * period_us
-            for number, node in enumerate(nodes):
-                ready_us = now_us + node.read_us[cycle]
-                feedback[cycle][number] = ready_us - cycle * period_us
-                for frame in node.feedback:
-                    put(ready_us, frame, FEEDBACK, cycle, number)
-        elif sort == FEEDBACK:
-            missing[cycle] -= 1
-            if not missing[cycle]:
-                commands[cycle] = now_us + host_us[cycle] - cycle * period_us
-                for number, node in enumerate(nodes):
-                    for frame in node.command:
-                        put(now_us + host_us[cycle], frame, COMMAND, cycle, number)
-        else:
-            number = whose[1]
-            unsent[cycle][number] -= 1
-            if not unsent[cycle][number]:
-                ends[cycle] = max(ends[cycle], now_us + nodes[number].write_us[cycle] - cycle * period_us)
-    return Run(tuple(ends), tuple(syncs), tuple(map(tuple, feedback)), tuple(commands), tuple(map(tuple, responses)))
+    bus = _Bus(sync, nodes, messages, period_us, host_us)
+    bus.run(late_us)
+    return Run(
+        tuple(bus.ends),
+        tuple(bus.syncs),
+        tuple(map(tuple, bus.feedback)),
+        tuple(bus.commands),
+        tuple(map(tuple, bus.responses)),
+    )
 
 
 SYNC, FEEDBACK, COMMAND, MESSAGE = range(4)
+
+
+class _Bus:
+    """A bus while it runs; what it has measured counts from the start of each cycle."""
+
+    def __init__(
+        self,
+        sync: Frame,
+        nodes: Sequence[SimulatedNode],
+        messages: Sequence[SimulatedMessage],
+        period_us: int,
+        host_us: Sequence[int],
+    ) -> None:
+        self.nodes, self.messages, self.period_us, self.host_us = nodes, messages, period_us, host_us
+        cycles = len(host_us)
+        self.syncs, self.commands, self.ends = [0] * cycles, [0] * cycles, [0] * cycles
+        self.feedback = [[0] * len(nodes) for _ in range(cycles)]
+        self.responses: list[list[int]] = [[] for _ in messages]
+        self.missing = [sum(len(node.feedback) for node in nodes)] * cycles
+        """Feedback frames that have not arrived, of each cycle."""
+        self.unsent = [[len(node.command) for node in nodes] for _ in range(cycles)]
+        """Command frames that have not arrived, of each cycle and node."""
+        self.queue: list[tuple[int, int, int, tuple[int, ...]]] = []
+        """When each frame is queued, its identifier, its time, and whose it is."""
+        for cycle in range(cycles):
+            self.put(cycle * period_us, sync, SYNC, cycle)
+        for number, message in enumerate(messages):
+            for instance, when_us in enumerate(message.queued_us):
+                self.put(when_us, message.frame, MESSAGE, number, instance)
+
+    def put(self, when_us: int, frame: Frame, *owner: int) -> None:
+        """Queue a frame."""
+        heappush(self.queue, (when_us, frame.identifier, frame.us, owner))
+
+    def run(self, late_us: int) -> None:
+        """Send every frame: whenever the bus is free, that of the smallest identifier."""
+        pending: list[tuple[int, int, tuple[int, ...]]] = []
+        now_us = 0
+        while self.queue or pending:
+            if not pending:
+                now_us = max(now_us, self.queue[0][0])
+            while self.queue and self.queue[0][0] <= now_us + late_us:
+                heappush(pending, heappop(self.queue)[1:])
+            _, us, (sort, *whose) = heappop(pending)
+            now_us += us
+            _ARRIVED[sort](self, now_us, *whose)
+
+    def sync_arrived(self, now_us: int, cycle: int) -> None:
+        """Every node begins to execute."""
+        self.syncs[cycle] = now_us - cycle * self.period_us
+        for number, node in enumerate(self.nodes):
+            ready_us = now_us + node.read_us[cycle]
+            self.feedback[cycle][number] = ready_us - cycle * self.period_us
+            for frame in node.feedback:
+                self.put(ready_us, frame, FEEDBACK, cycle, number)
+
+    def feedback_arrived(self, now_us: int, cycle: int, _number: int) -> None:
+        """Behind the last feedback the host begins to compute."""
+        self.missing[cycle] -= 1
+        if self.missing[cycle]:
+            return
+        ready_us = now_us + self.host_us[cycle]
+        self.commands[cycle] = ready_us - cycle * self.period_us
+        for number, node in enumerate(self.nodes):
+            for frame in node.command:
+                self.put(ready_us, frame, COMMAND, cycle, number)
+
+    def command_arrived(self, now_us: int, cycle: int, number: int) -> None:
+        """Behind its last frame the node executes its command."""
+        self.unsent[cycle][number] -= 1
+        if not self.unsent[cycle][number]:
+            end_us = now_us + self.nodes[number].write_us[cycle] - cycle * self.period_us
+            self.ends[cycle] = max(self.ends[cycle], end_us)
+
+    def message_arrived(self, now_us: int, number: int, instance: int) -> None:
+        """Its response ends."""
+        self.responses[number].append(now_us - self.messages[number].due_us[instance])
+
+
+_ARRIVED: Final[tuple[Callable[..., None], ...]] = (
+    _Bus.sync_arrived,
+    _Bus.feedback_arrived,
+    _Bus.command_arrived,
+    _Bus.message_arrived,
+)

@@ -108,7 +108,7 @@ def _over(result: LatencyResult, profile: Profile) -> list[str]:
 
 
 def latency_records(result: LatencyResult) -> list[Record]:
-    """One flat row for each transaction and its phases; all have a group where one has, None for what belongs to none."""
+    """One flat row for each transaction and its phases; all have a group where one has, None for what has none."""
     has_groups = any(transaction.group for transaction in result.transactions)
     return [_record(transaction, has_groups=has_groups) for transaction in result.transactions]
 

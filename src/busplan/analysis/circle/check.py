@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.analysis.circle.delays import loop_delays_us, skew_us
+from busplan.analysis.circle.delays import jitter_us, loop_delays_us, skew_us
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -43,7 +43,7 @@ class CircleCheck:
         self._progress = progress
         self._expected = expected
         self._most_steps = most_steps
-        self._known: dict[tuple[float, tuple[float, float], float], tuple[str, ...]] = {}
+        self._known: dict[tuple[float, tuple[float, float], float, float], tuple[str, ...]] = {}
         self._always: tuple[str, ...] = ()
         """Failures that no period mends."""
         self._own = own
@@ -88,6 +88,6 @@ class CircleCheck:
             self._progress(tests * _PARTS + done * _PARTS // total, max(self._expected, tests + 1) * _PARTS)
 
 
-def _key(profile: Profile) -> tuple[float, tuple[float, float], float]:
+def _key(profile: Profile) -> tuple[float, tuple[float, float], float, float]:
     """What a circle rests on: the cycle itself matters only inside a loop on the host, or without a common clock."""
-    return profile.cycle.period_us, loop_delays_us(profile), skew_us(profile)
+    return profile.cycle.period_us, loop_delays_us(profile), skew_us(profile), jitter_us(profile)

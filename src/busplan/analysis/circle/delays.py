@@ -2,6 +2,7 @@
 
 from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.network import bus_of, network_of
+from busplan.elementwise import plain
 from busplan.sections.profile import Profile
 
 
@@ -37,6 +38,16 @@ def skew_us(profile: Profile) -> float:
         return 0.0
     first_us, last_us = _first_and_last_us(profile)
     return last_us - first_us
+
+
+def jitter_us(profile: Profile) -> float:
+    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us].
+
+    A cycle that does not fit is never simulated: its jitter must not stop the report that says so, and is cut.
+    """
+    delivery, network = profile.delivery, network_of(profile)
+    most_us = max(profile.cycle.period_us / 2 - delivery.jitter_us - abs(delivery.skew_us), 0.0)
+    return float(delivery.jitter_us + min(plain(bus_of(profile).sync_jitter_us(network)), most_us))
 
 
 def _first_and_last_us(profile: Profile) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.contributions import Setup
-from busplan.analysis.circle.delays import loop_delays_us, skew_us
+from busplan.analysis.circle.delays import jitter_us, loop_delays_us, skew_us
 from busplan.analysis.network import bus_of
 from busplan.sections.base import Section
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -48,7 +48,10 @@ def setup(profile: Profile) -> Setup:
         x=x,
         y=y,
         timing=timing,
-        delivery=Delivery(**_parameters_in(delivery, Delivery) | {"skew_us": delivery.skew_us + skew_us(profile)}),
+        delivery=Delivery(
+            **_parameters_in(delivery, Delivery)
+            | {"jitter_us": jitter_us(profile), "skew_us": delivery.skew_us + skew_us(profile)}
+        ),
         mechanics=Mechanics(**_parameters_in(mechanics, Mechanics)),
         settled=settling_us != inf,
     )

@@ -5,7 +5,7 @@ from math import inf
 from typing import Final
 
 from busplan.analysis.capacity.cycle import fits_in
-from busplan.analysis.network import network_of
+from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import CIRCLE, Need, keeps_limits, needs, refused_period
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
 from busplan.analysis.planning.machine import Changes
@@ -101,12 +101,12 @@ class Search:
         """What the circle does not hold after some changes that fit the bus; nothing where it is not run."""
         if self._circle is None:
             return ()
-        servo, period_us = self._own.servo, self.period_us(changes)
-        if servo.loop == "host" and servo.update == "on_arrival":
-            return self._circle(self.profile(changes))
+        servo, period_us, after = self._own.servo, self.period_us(changes), self.profile(changes)
+        if (servo.loop == "host" and servo.update == "on_arrival") or bus_of(after).sync_jitter_us(network_of(after)):
+            return self._circle(after)
         # The loop knows nothing of the bus but its period.
         if period_us not in self._circles:
-            self._circles[period_us] = self._circle(self.profile(changes))
+            self._circles[period_us] = self._circle(after)
         return self._circles[period_us]
 
     # --- what a network needs, and what its slice gives it --------------------------------------------------

@@ -6,7 +6,7 @@ from itertools import islice
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.constants import EXPECTED_STUFFING, SATURATED
+from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.response import Response
 from busplan.buses.can.streams import (
@@ -14,12 +14,11 @@ from busplan.buses.can.streams import (
     frame_sizes,
     is_higher,
     last_identifier,
-    load_before,
     response,
     streams,
     waits,
 )
-from busplan.buses.can.traffic import NAMES, SYNC, Message, Pdos, Traffic, traffic_of, without_times
+from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of, without_times
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Group, Network
 from busplan.elementwise import Number, choose, larger, named, plain, pointwise, rounded_up, total
@@ -98,7 +97,8 @@ class CanCycle(BusCycle):
     @cached_property
     def _on_bus_us(self) -> Number:
         """From SYNC to the end of the last command, but for other messages [us]."""
-        return total(self._own.values()) - self._wait_us("write")
+        waits_us = {"cycle_wait_us": self._wait_us("read")}
+        return total((self._own | waits_us).values())
 
     def _waits_us(self, extra_us: Number = 0.0) -> tuple[Number, Number]:
         """Blocking by frames of lower priorities, and interference by those of higher ones [us].
@@ -210,7 +210,12 @@ class CanCycle(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
-        return {"bit_rate_kbit_s": self.traffic.bit_rate_kbit_s, "bus_load": self.load}
+        least, most = (CanCycle(self.network, model).load for model in (NONE, WORST))
+        return {
+            "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s,
+            "bus_load": self.load,
+            "expected_load": least + EXPECTED_STUFFING * (most - least),
+        }
 
     @cached_property
     def load(self) -> Number:
@@ -236,9 +241,28 @@ class CanCycle(BusCycle):
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
         pdos = ((one.name, one.group) for one in self.traffic.pdos)
         names = ((SYNC, ""), *pdos, *((one.name, "") for one in self.traffic.messages))
-        return tuple(
-            BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names)
-        )
+        found = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
+        return (*found, BusLatency(LOOP, None, self._loop()))
+
+    def _loop(self) -> dict[str, Number]:
+        """Parts of the way from SYNC to the last executed command that rests on it."""
+        blocking_us, interference_us = self._waits_us()
+        parts_us = {
+            "jitter_us": 0.0,
+            "blocking_us": blocking_us,
+            "interference_us": interference_us,
+            "backlog_us": 0.0,
+            "frame_us": self._in_cycle_us,
+            "execution_us": self._own["cycle_wait_us"] + self.traffic.host_us,
+            "pipeline_us": self.network.profile.bus.pipeline_cycles * self.network.period_us,
+        }
+        return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
+
+    @cached_property
+    def sync_spread_us(self) -> Number:
+        """How much later than without other messages SYNC may end, B + I [us]; infinite where it has no end."""
+        phases = self._phases(0, SYNC)
+        return named(phases["blocking_us"] + phases["interference_us"], "sync_spread_us", "B + I")
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message."""
@@ -260,15 +284,22 @@ class CanCycle(BusCycle):
             "interference_us": named(interference_us, "interference_us", "I"),
             "backlog_us": named(backlog_us, "backlog_us", "q (C - T)"),
             "frame_us": named(frame_us_, "frame_us", "C"),
+            "execution_us": 0.0,
+            "pipeline_us": 0.0,
         }
-        return {
-            "identifier": found("last", f"identifier of {name}"),
-            "data_bytes": found("data_bytes", f"data of {name}"),
-            "instance": instance,
-            **parts_us,
-            "worst_response_us": total(parts_us.values()),
-            "deadline_us": found("deadline_us", f"deadline of {name}"),
-        }
+        return _numbered(
+            parts_us,
+            identifier=found("last", f"identifier of {name}"),
+            data_bytes=found("data_bytes", f"data of {name}"),
+            instance=instance,
+            deadline_us=found("deadline_us", f"deadline of {name}"),
+        )
+
+
+def _numbered(parts_us: Mapping[str, Number], **others: Number) -> dict[str, Number]:
+    """The figures of a latency with the sum of its parts."""
+    deadline_us = others.pop("deadline_us")
+    return {**others, **parts_us, "worst_response_us": total(parts_us.values()), "deadline_us": deadline_us}
 
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:

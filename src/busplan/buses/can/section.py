@@ -16,7 +16,7 @@ from busplan.buses.can.constants import (
     IdentifierBits,
 )
 from busplan.buses.can.cycle import WORST, TimingModelName
-from busplan.buses.can.traffic import NAMES, SYNC
+from busplan.buses.can.traffic import LOOP, NAMES, SYNC
 from busplan.elementwise import Number
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, NodeSection, PayloadSection
@@ -48,8 +48,9 @@ class CanBus(BusSection):
     )
     pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
         default=int(PIPELINE_CYCLES),
-        description="Cycles from the one that brings feedback to the one that takes the command computed from it; 0: the "
-        "host computes between the last feedback and the first command of a cycle. Of latency, and of a loop on the host",
+        description="Cycles from the one that brings feedback to the one that takes the command computed from it; 0: "
+        "the host computes between the last feedback and the first command of a cycle. Of latency, and of a loop on "
+        "the host",
         examples=[1],
     )
     host_us: TimeUs = Field(
@@ -72,7 +73,6 @@ class CanBus(BusSection):
         "by worst-stuffing",
         examples=[WORST],
     )
-
 
     @property
     def host_doubt_us(self) -> Number:
@@ -171,7 +171,7 @@ class CanProfile(Profile):
         problems += (
             Problem("is what the frames of the cycle are called", key=f"message.{place}.name", kind="inconsistent")
             for place, name in enumerate(names)
-            if name in (SYNC, *NAMES.values())
+            if name in (SYNC, LOOP, *NAMES.values())
         )
         if problems:
             raise refused(*problems)

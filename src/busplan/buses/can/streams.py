@@ -236,9 +236,7 @@ def deadline_share(own: Stream, each: Sequence[Stream], traffic: Traffic) -> flo
     """Response time over deadline, or a bound of it that is no more than 1; infinite without a response time [1]."""
     starts, around = _starts(own, each, traffic, is_stuffed=True), _around(own, each, traffic)
     if load_before(own, each) < SATURATED:
-        bound_us = max(
-            response_bound_us(own.sender(1), one.higher, first_us=one.first_us, **around) for one in starts
-        )
+        bound_us = max(response_bound_us(own.sender(1), one.higher, first_us=one.first_us, **around) for one in starts)
         if bound_us <= own.deadline_us:
             return bound_us / own.deadline_us
     found = response(own, each, traffic, is_stuffed=True)
@@ -258,9 +256,9 @@ def _around(own: Stream, each: Sequence[Stream], traffic: Traffic) -> dict[str, 
 def _starts(own: Stream, each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> list[Start]:
     """Where the busy period of a stream may begin.
 
-    SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each once
-    a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all that
-    follows it sooner than a period later.
+    SYNC comes once a period, and feedback and commands behind it. So a busy period that begins with SYNC meets each
+    once a period. One that begins with late feedback, or with late commands, meets these, and the next SYNC with all
+    that follows it sooner than a period later.
     """
     others = [*senders_before(own, each)]
     if own.identifiers > 1:

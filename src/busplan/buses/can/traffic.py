@@ -14,6 +14,8 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 FOLLOWS: Final = -1
 """In the place of an identifier: the one behind those of the group before."""
 SYNC: Final = "SYNC"
+LOOP: Final = "loop"
+"""What the way from SYNC to the executed commands is called."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
 """What a node's read payload and its write payload are called on CAN."""
 _FIRST: Final = {"read": FEEDBACK_IDENTIFIER, "write": COMMAND_IDENTIFIER}
@@ -105,7 +107,11 @@ def traffic_of(network: Network) -> Traffic:
     """What a network sends."""
     senders = [
         _Senders(
-            *(one.name, one.said, one.nodes, one.axes, {"read": one.read_bytes, "write": one.write_bytes}),
+            one.name,
+            one.said,
+            one.nodes,
+            one.axes,
+            {"read": one.read_bytes, "write": one.write_bytes},
             one.read_execution_us + one.worst_extra_us,
         )
         for one in network.groups
@@ -117,7 +123,11 @@ def traffic_of_profile(profile: Any) -> Traffic:
     """What the network of a profile sends, for who has no network."""
     senders = [
         _Senders(
-            *(one.name, one, one.nodes, one.node.axes, {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS}),
+            one.name,
+            one,
+            one.nodes,
+            one.node.axes,
+            {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS},
             one.node.execution.execution_us(one.bytes_of("read")) + one.node.execution.worst_extra_us,
         )
         for one in profile.alike_nodes
