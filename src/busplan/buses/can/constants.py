@@ -84,7 +84,7 @@ EXPECTED_STUFFING: Final = Sourced(
     0.4,
     unit="1",
     grade="calibrated",
-    source="python-can's logs of hardware, a log at 500 kbit/s, a saturated sender: within 3 %",
+    source="bits that hardware counted (python-can's logs), and the load of a log at 500 kbit/s: within 4 %",
     meaning="share of the possible stuff bits that frames have",
 )
 
