@@ -6,13 +6,12 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 
 from abc import ABC, abstractmethod
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import repeat
 from math import ceil, floor, inf, isinf, sqrt
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from numpy.typing import NDArray
 
     Number: TypeAlias = "float | NDArray[Any] | SpecialNumber"
@@ -421,8 +420,20 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
         return function(*numbers)
     import numpy as np
 
-    points = np.broadcast(*map(np.asarray, numbers))
-    return np.array([function(*(one.item() for one in point)) for point in points], dtype=float).reshape(points.shape)
+    # Plain numbers are repeated, and arrays read as they are asked for: neither their number nor their size is bounded.
+    given: tuple[Any, ...] = numbers
+    shape = np.broadcast_shapes(*map(np.shape, given))
+    points = zip(*(_points(one, shape) for one in given), strict=False)
+    return np.array([function(*point) for point in points], dtype=float).reshape(shape)
+
+
+def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[float]:
+    """A number at each point of a shape; a plain one without end."""
+    if isinstance(number, _PLAIN):
+        return repeat(number)
+    import numpy as np
+
+    return (one.item() for one in np.broadcast_to(number, shape).flat)
 
 
 def _between(places: Sequence[float], values: Sequence[float], place: float) -> float:

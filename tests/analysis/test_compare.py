@@ -37,6 +37,8 @@ BOTH = ("ieee1394", "can")
 CABLES = ("cable_length_m", "cable_m")
 """Length of a cable, by the names of two kinds."""
 GANTRY = load("gantry-24").profile
+INPUTS = override(GANTRY, {"group.io.read_bytes": 40})
+"""Without axes, no PDO of its own takes bytes from it."""
 
 
 def decided(profile: Profile) -> object:
@@ -185,7 +187,7 @@ def test_the_smallest_period_of_a_limit_is_exact() -> None:
 
 
 def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
-    (can,) = compare(GANTRY, kinds=["can"]).compared
+    (can,) = compare(INPUTS, kinds=["can"]).compared
     assert can.smallest == (None, "a PDO of 40 bytes is over the 32 bytes of four frames (a smaller payload would do)")
     unsafe = smallest_period(override(load("paper-4ms").profile, {"bus.gap_count": 5, "bus.nodes": 8}))
     assert unsafe.us is None
@@ -195,6 +197,17 @@ def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
     known = override(load("sercos3-servo-8").profile, {"cycle.nonperiodic_us": 1e5})
     assert smallest_period(known) == (None, "it would be over 65 ms")
     assert smallest_period(load("sercos3-servo-8").profile).us == 250
+
+
+def test_a_machine_has_the_settings_of_the_bus_that_it_needs() -> None:
+    (can,) = compare(GANTRY, kinds=["can"]).compared
+    tried = {one.key: one.value for one in can.assumed if one.source == "setting"}
+    assert tried == {"group.drives.pdo_per": "axis", "group.tool.pdo_per": "axis"}
+    # Each axis has a PDO of 8 bytes each way, of 9 from the head; inputs and outputs have one each way.
+    frames_us = 55 + (2 * 20 + 4 + 2) * 135 + 4 * (135 + 65)
+    assert can.smallest.us == pytest.approx(frames_us / 0.8)
+    (paper,) = compare(load("paper-1ms").profile, kinds=["can"]).compared
+    assert not [one for one in paper.assumed if one.source == "setting"]
 
 
 @pytest.mark.parametrize("name", ["can-servo-8", "gantry-24", "dvrk"])
@@ -246,7 +259,7 @@ def test_a_circle_that_cannot_be_run_says_why() -> None:
     assert one.circle is not None
     assert one.circle.figures is None
     assert one.circle.problems
-    (none,) = compare(GANTRY, kinds=["can"], with_circle=True).compared
+    (none,) = compare(INPUTS, kinds=["can"], with_circle=True).compared
     assert none.circle is None
 
 

@@ -75,7 +75,7 @@ def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for() -> No
     assert {key for key in record if key not in shown} == {
         *("steps", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
         *("centre_offset_mm", "constant_speed_deg", "failures", "settled", "ideal_drive"),
-        *("update", "delay_us", "delay_x_us", "delay_y_us"),
+        *("update", "delay_us", "delay_x_us", "delay_y_us", "jitter_us"),
     }
     host = circle_of(*SMALL.items(), ("servo.loop", "host"))
     assert {value.key for value in values_in(circle_table(host.results))} == shown | {"update", "delay_us"}

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profile
-from busplan.analysis.circle.figures import CIRCLE_BY_KEY
+from busplan.analysis.circle.figures import CIRCLE_BY_KEY, JITTER
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest
 from busplan.answers.circle_verdict import circle_sentences, failure_words, servo_sentence, setup_values, source_words
 from busplan.answers.documents import document, with_profile
@@ -35,7 +35,7 @@ _SHOWN: Final = (
     *("mean_contour_error_mm", "max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"),
     *("circular_deviation_mm", "radius_deviation_mm", "phase_margin_deg", "gain_margin_db", "crossover_hz"),
     *("path", "radius_mm", "feed_mm_per_min", "period_us", "step_us", "duration_s", "setpoints", "loop"),
-    *("update", "delay_us"),
+    *("update", "delay_us", "jitter_us"),
     *("stable", "passed"),
 )
 """Figures of the table, in order."""
@@ -124,7 +124,8 @@ def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
         Owner(TableColumn(period(result.period_us)), result, f"/results/{start + number}")
         for number, result in enumerate(results)
     ]
-    hidden = () if any(result.loop == "host" for result in results) else _OF_HOST
+    of_host = () if any(result.loop == "host" for result in results) else _OF_HOST
+    hidden = of_host if any(result.jitter_us for result in results) else (*of_host, JITTER.key)
     rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN if key not in hidden)
     return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
 

@@ -108,16 +108,17 @@ def _over(result: LatencyResult, profile: Profile) -> list[str]:
 
 
 def latency_records(result: LatencyResult) -> list[Record]:
-    """One flat row for each transaction and its phases."""
-    return [_record(transaction) for transaction in result.transactions]
+    """One flat row for each transaction and its phases; all have a group where one has, None for what has none."""
+    has_groups = any(transaction.group for transaction in result.transactions)
+    return [_record(transaction, has_groups=has_groups) for transaction in result.transactions]
 
 
-def _record(transaction: Transaction) -> Record:
+def _record(transaction: Transaction, *, has_groups: bool) -> Record:
     record = transaction._asdict()
     phases = record.pop("phases")
-    if not transaction.group:
-        del record["group"]
-    return {**record, **phases}
+    group = record.pop("group")
+    named = {"timing_model": record.pop("timing_model"), "transaction": record.pop("transaction")}
+    return {**named, **({"group": group or None} if has_groups else {}), **record, **phases}
 
 
 def latency_document(result: LatencyResult) -> JsonDocument:

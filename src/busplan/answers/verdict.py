@@ -177,7 +177,7 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
     said = sentence(f"{{}}{{}}{why}.", _figure(VERDICT, figures, at=at)._replace(state=state), Words(safe, state))
     if limits and figures.verdict == DOES_NOT_FIT:
         return said  # whatever the time is
-    found = [said, _margin(figures, at=at)]
+    found = [said, _margin(figures, bus_of(profile), at=at)]
     largest = next(iter(uncertainty_parts(figures)), None)
     if largest is not None and largest["share"]:
         place = f"{at}/uncertainty_parts/0/share" if at else ""
@@ -203,7 +203,7 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
     ]
 
 
-def _margin(figures: CapacityFigures, *, at: str) -> Sentence:
+def _margin(figures: CapacityFigures, bus: "Bus", *, at: str) -> Sentence:
     """The margin of {}, as far as it is known."""
     of = _figure(AVAILABLE, figures, at=at)
     margin = _figure(MARGIN_CORRECTED, figures, at=at)
@@ -211,7 +211,7 @@ def _margin(figures: CapacityFigures, *, at: str) -> Sentence:
     if figures.bias_us is not None:
         bias = _figure(BIAS, figures, at=at)
         return sentence("Margin {} +/- {} of {}, less a bias of {}.", margin, uncertainty, of, bias)
-    unknown = "how far the bus is from this timing model is not known, so no bias"
+    unknown = f"{bus.model_error}, so no bias"
     if figures.uncertainty_us is not None:
         return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
     return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)

@@ -116,6 +116,8 @@ class Bus(ABC):
     """Data files, in busplan/data, with figures of it that others have published or measured."""
     evidence_profiles: ClassVar[tuple[str, ...]] = ()
     """Shipped profiles that these figures are compared on."""
+    model_error: ClassVar[str] = "how far the bus is from this timing model is not known"
+    """What is known of the model that decides, where no bias of it is."""
 
     @abstractmethod
     def profile_model(self) -> "type[Profile]":
@@ -225,6 +227,10 @@ class Bus(ABC):
     def acts_at_once(self, network: Network) -> bool:  # noqa: ARG002 - most have a synchronous packet
         """Whether the nodes take their set-points at one time; otherwise each does when it has its own."""
         return True
+
+    def sync_jitter_us(self, network: Network) -> Number:  # noqa: ARG002 - most have none
+        """Jitter of the synchronous packet that its own traffic makes, either way of its mean [us]."""
+        return 0.0
 
     def shortest_period_us(self, network: Network, needed_us: Number) -> Number:
         """The shortest period that gives a cycle its time, of those that the bus knows; infinite where none does [us].

@@ -113,7 +113,7 @@ def init_command(
     if source is None:
         kind = bus or _KIND
         machine, taken = _machine(kind, nodes=nodes, axes=axes, period=period, bytes_per_axis=bytes_per_axis, host=host)
-        text = machine_text(machine, kind=kind, name=path.stem, file=shown)
+        text = _with_settings(machine_text(machine, kind=kind, name=path.stem, file=shown), name=shown)
     else:
         given = [option for option, value in asked.items() if value is not None]
         if given:
@@ -122,6 +122,23 @@ def init_command(
     write_file(path, text.encode(), overwrite=force)
     defaults = [f"not given, so taken: {' '.join(taken)}"] if taken else []
     say(*defaults, f"wrote {path}", *_verdict(text), f"next: busplan capacity {shown}")
+
+
+def _with_settings(text: str, *, name: str) -> str:
+    """The same profile with a setting of the bus that its machine needs."""
+    from busplan.analysis.planning.settings import needed_settings
+    from busplan.profile.edit import edited_file
+    from busplan.profile.toml import decode, validate
+    from busplan.profile.write import value_text
+
+    needed = needed_settings(validate(decode(text.encode(), name=name)))
+    if not needed:
+        return text
+    text = edited_file(text.encode(), needed, name=name).decode()
+    for key, value in needed.items():
+        line = f"{key.rpartition('.')[2]} = {value_text(value)}"
+        text = text.replace(f"{line}\n", f"{line:26} # assumed: without it no period carries the machine\n")
+    return text
 
 
 def _machine(

@@ -26,8 +26,8 @@ class AssumedKey(NamedTuple):
 
     key: str
     value: Any
-    source: Literal["new profile", "default"]
-    """Where its value comes from: what `init` writes, or the default of the kind."""
+    source: Literal["new profile", "default", "setting"]
+    """Where its value comes from: what `init` writes, the default of the kind, or a setting that the machine needs."""
 
 
 class Conversion(NamedTuple):

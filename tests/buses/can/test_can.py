@@ -52,13 +52,15 @@ def terms(one: Profile, model: str = "worst-stuffing") -> dict[str, float]:
 def test_its_cycle_is_that_by_hand() -> None:
     pdo_in, pdo_out, alarm = (135 + 75) * BIT_US, 115 * BIT_US, 75 * BIT_US
     others = 55 * BIT_US + (50 + 46) + 3 * (pdo_in + pdo_out)
-    assert others == 2156  # within 2000 us less the jitter two alarms arrive, and one more meanwhile
+    assert others == 2156  # within 2000 us less the jitter two alarms arrive, and go before all PDOs
     assert terms(profile()) == {
         "sync": 110,
         "wait": 96,
         "feedback": 3 * pdo_in,
+        "host": 0,
         "command": 3 * pdo_out,
-        "messages": 2 * alarm,
+        "blocking": 0,
+        "interference": 2 * alarm,
         "nonperiodic": 0,
     }
     assert terms(profile(), "no-stuffing")["feedback"] == 3 * (47 + 64 + 47 + 16) * BIT_US
@@ -178,12 +180,12 @@ def test_what_it_breaks_does_not_fit(changes: dict[str, Any], exceeded: tuple[st
 
 def test_responses_are_those_by_hand_and_their_parts_add_up() -> None:
     found = {one.transaction: one for one in busplan.latency(profile(), timing_model=["worst-stuffing"]).transactions}
-    assert list(found) == ["SYNC", "feedback", "command", "alarm"]
+    assert list(found) == ["SYNC", "feedback", "command", "alarm", "loop"]
     # The alarm waits for one full frame and SYNC; the last command for everything, but the second feedback frames.
     assert found["alarm"].worst_response_us == 100 + 270 + 110 + 150
     assert found["command"].worst_response_us == 150 + 110 + 3 * 270 + 2 * 230 + 230 + 150
     for one in found.values():
-        parts = ("jitter_us", "blocking_us", "interference_us", "backlog_us", "frame_us")
+        parts = ("jitter_us", "blocking_us", "interference_us", "backlog_us", "frame_us", "execution_us", "pipeline_us")
         assert one.worst_response_us == sum(getattr(one, key) for key in parts)
 
 
@@ -199,24 +201,29 @@ def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None
         "message.alarm.period_us": float(data.draw(st.integers(700, 3000))),
         "cycle.period_us": float(data.draw(st.integers(4000, 9000))),
     }
-    each = streams(traffic_of_profile(override(profile(), changes)), is_stuffed=True)
+    traffic = traffic_of_profile(override(profile(), changes))
+    each = streams(traffic, is_stuffed=True)
     sent = {
         identifier: Sender(one.frame_us, one.period_us, one.jitter_us)
         for one in each
         for identifier in range(one.first, one.last + 1)
     }
     for own in each:
+        # No PDO of a cycle that fits blocks the next SYNC.
+        alarm = changes["message.alarm.identifier"]
+        blocking = sent if own.name != "SYNC" else {alarm: sent[alarm]}
         alone = [
             worst_response(
                 sent[identifier],
                 [one for other, one in sent.items() if other < identifier],
-                blocking_us=max((one.frames_us for other, one in sent.items() if other > identifier), default=0.0),
+                blocking_us=max((one.frames_us for other, one in blocking.items() if other > identifier), default=0.0),
                 bit_us=BIT_US,
             )
             for identifier in range(own.first, own.last + 1)
         ]
-        found = response(own, each, bit_rate_kbit_s=500)
-        assert found == alone[-1]
+        found = response(own, each, traffic, is_stuffed=True)
+        # A message may also meet a late cycle, and the next one soon behind it.
+        assert found == alone[-1] or (own.is_message and (found is None or (alone[-1] and found.us > alone[-1].us)))
         assert found is None or all(one is not None and one.us <= found.us for one in alone)
 
 
@@ -228,16 +235,16 @@ def test_a_full_bus_says_that_there_is_no_response_time(run: Run, tmp_path: Path
     assert "alarm has no worst-case response time." in done.stdout
     document = json.loads(run("latency", path.name, "--format", "json", cwd=tmp_path).stdout)
     by_name = {(one["timing_model"], one["transaction"]): one["worst_response_us"] for one in document["transactions"]}
-    assert by_name["worst-stuffing", "SYNC"] == 110 + 270
+    assert by_name["worst-stuffing", "SYNC"] == 110 + 150  # blocked by a message alone
     assert by_name["worst-stuffing", "alarm"] is None
     for form in ("table", "json", "csv"):
         explained = run("explain", path.name, "latency.worst_response_us", "--format", form, cwd=tmp_path)
         assert (explained.returncode, "inf" in explained.stdout) == (0, False)
 
 
-def test_its_verdict_says_that_no_residual_is_known(run: Run) -> None:
+def test_its_verdict_says_by_how_much_the_model_errs_to_the_safe_side(run: Run) -> None:
     said = run("capacity", "can-servo-8").stdout
-    assert "how far the bus is from this timing model is not known, so no bias is in it" in said
+    assert "this timing model takes 8 to 15% more than frames that were measured, so no bias is in it" in said
 
 
 def test_a_cure_of_the_load_is_a_longer_period(run: Run, tmp_path: Path) -> None:
@@ -251,14 +258,16 @@ def test_a_cure_of_the_load_is_a_longer_period(run: Run, tmp_path: Path) -> None
 
 
 def test_the_circle_has_its_set_points_from_sync() -> None:
-    host = override(load("can-servo-8").profile, {"servo.loop": "host"})
+    host = override(load("can-servo-8").profile, {"servo.loop": "host", "bus.pipeline_cycles": 0})
     at_sync, on_arrival = (
         loop_delays_us(override(host, {"servo.update": update})) for update in ("next_sync", "on_arrival")
     )
-    # The first and the last command arrive behind SYNC, the wait for feedback and nine, or sixteen, frames; each is
-    # executed then.
+    # The first and the last command are executed behind SYNC, the wait for feedback, nine, or sixteen, frames, and
+    # three others, of which two have 8 bytes.
     assert at_sync == (4000, 4000)
-    assert on_arrival == (55 + 200 + 9 * 135 + 200, 55 + 200 + 16 * 135 + 200)
+    assert on_arrival == tuple(55 + 200 + frames * 135 + (135 + 135 + 65) + 200 for frames in (9, 16))
+    next_cycle = {"bus.pipeline_cycles": 1, "servo.update": "on_arrival"}
+    assert loop_delays_us(override(host, next_cycle)) == tuple(us + 4000 for us in on_arrival)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.analysis.circle.delays import loop_delays_us, skew_us
+from busplan.analysis.circle.delays import jitter_us, loop_delays_us, skew_us
 from busplan.errors import BusplanError
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
@@ -65,8 +65,9 @@ class CircleCheck:
 
 
 def rests_on(profile: Profile) -> tuple[float, ...]:
-    """What of bus and cycle a circle rests on: the period, its steps, delays in a loop on the host, and skew [us]."""
-    return profile.cycle.period_us, profile.servo.step_us, *loop_delays_us(profile), skew_us(profile)
+    """What of bus and cycle a circle rests on: the period, its steps, delays in a loop on the host, skew and jitter."""
+    own = profile.cycle.period_us, profile.servo.step_us
+    return *own, *loop_delays_us(profile), skew_us(profile), jitter_us(profile)
 
 
 def failures_within(profile: Profile, *, most_steps: int) -> tuple[str, ...] | None:

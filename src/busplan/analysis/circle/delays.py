@@ -43,6 +43,11 @@ def skew_us(profile: Profile) -> float:
     return last_us - first_us
 
 
+def jitter_us(profile: Profile) -> float:
+    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
+    return float(profile.delivery.jitter_us + plain(bus_of(profile).sync_jitter_us(network_of(profile))))
+
+
 def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
     """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
     network = cycle.network

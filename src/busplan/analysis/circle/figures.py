@@ -8,6 +8,13 @@ from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 _CYCLE: Final = by(time_slice_us, required_time_slice_us)
 _ISO: Final = "ISO 230-4"
 
+JITTER: Final = Figure(
+    "jitter_us",
+    "J",
+    "profile",
+    "jitter of the synchronous packet, either way of its mean: delivery.jitter_us and what the bus adds",
+    "jitter of the packet",
+)
 CIRCLE_FIGURES: Final = (
     PERIOD,
     Figure("feed_mm_per_min", "F", "profile", "speed along the circle", "feed", decimals=None),
@@ -38,6 +45,7 @@ CIRCLE_FIGURES: Final = (
     Figure("delay_us", "T_d", "III-C", "bus delay inside the loop, the longer one of both axes", "delay in the loop"),
     Figure("delay_x_us", "T_dx", "III-C", "bus delay inside the loop of x"),
     Figure("delay_y_us", "T_dy", "III-C", "bus delay inside the loop of y"),
+    JITTER,
     Figure("timing_model", "model", "profile", "timing model that decides whether the bus fits"),
     Figure("bus_fits", "fits", _CYCLE, "whether required <= available, and no limit is broken"),
     VERDICT,

@@ -8,7 +8,7 @@ from math import inf
 from typing import Any, Final, Literal
 
 from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
-from busplan.analysis.circle.delays import loop_delays_us, skew_us
+from busplan.analysis.circle.delays import jitter_us, loop_delays_us, skew_us
 from busplan.analysis.network import bus_of, network_of
 from busplan.sections.base import Section, value_at
 from busplan.sections.profile import Profile
@@ -139,18 +139,20 @@ def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
 
 
 def _out_of_order(profile: Profile) -> Iterator[Refused]:
-    """Refuse set-points that would change their order: by the key of the clock, where only its lack does that."""
+    """Refuse set-points that would change their order: by what the bus adds, where only that does it."""
     period_us = profile.cycle.period_us
     own = Delivery(**parameters_in(profile.delivery, Delivery))
     if any(unfit_delivery(own, period_us=period_us)):
         yield from (_at_key(cause, profile) for cause in unfit_delivery(own, period_us=period_us))
     elif any(unfit_delivery(delivery_of(profile), period_us=period_us)):
-        right = (
-            f"the last axis then takes its set-points {skew_us(profile):g} us behind the first, which the circle test "
-            f"knows up to half the period, {period_us / 2:g} us, with jitter and skew; set it true if the drives have "
-            "a clock"
-        )
-        yield Refused(bus_of(profile).clock_key, "false", right)
+        known = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
+        if apart_us := skew_us(profile):
+            right = f"the last axis then takes its set-points {apart_us:g} us behind the first, {known}"
+            yield Refused(bus_of(profile).clock_key, "false", f"{right}; set it true if the drives have a clock")
+        else:
+            added_us = jitter_us(profile) - own.jitter_us
+            right = f"the bus adds {added_us:g} us of jitter either way, {known}; a longer period has room"
+            yield Refused("cycle.period_us", period_us, right)
 
 
 def _move(profile: Profile, axes: Sequence[Axis]) -> Iterator[Refused]:
@@ -199,10 +201,10 @@ def axis_of(profile: Profile, name: AxisName) -> Axis:
 
 
 def delivery_of(profile: Profile) -> Delivery:
-    """How set-points arrive, with what the bus adds where no clock is common to the nodes."""
+    """How set-points arrive, with the skew and the jitter that the bus adds."""
     own = profile.delivery
-    both_us = max(-LARGEST, min(own.skew_us + skew_us(profile), LARGEST))
-    return Delivery(**parameters_in(own, Delivery) | {"skew_us": both_us})
+    late = {"skew_us": own.skew_us + skew_us(profile), "jitter_us": jitter_us(profile)}
+    return Delivery(**parameters_in(own, Delivery) | {key: max(-LARGEST, min(us, LARGEST)) for key, us in late.items()})
 
 
 def move_of(profile: Profile, settling_us: float | None) -> Move:

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.circle.contributions import Contribution, Setup, contributions, sources
-from busplan.analysis.circle.delays import loop_delays_us
+from busplan.analysis.circle.delays import jitter_us, loop_delays_us
 from busplan.analysis.circle.estimate import announce, estimate
 from busplan.analysis.circle.failures import (
     Failure,
@@ -49,6 +49,8 @@ class CircleFigures(NamedTuple):
     """Bus delay inside the loop, the longer one of both axes; 0 for a loop on the node."""
     delay_x_us: float
     delay_y_us: float
+    jitter_us: float
+    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds."""
     timing_model: str
     """Timing model that decided whether the bus fits."""
     bus_fits: bool
@@ -281,6 +283,7 @@ def _figures(
         delay_us=max(delay_x_us, delay_y_us),
         delay_x_us=delay_x_us,
         delay_y_us=delay_y_us,
+        jitter_us=jitter_us(profile),
         timing_model=capacity.timing_model,
         bus_fits=capacity.fits,
         verdict=capacity.verdict or "",

@@ -13,6 +13,7 @@ from busplan.analysis.comparison.circle_tests import circle_tests
 from busplan.analysis.comparison.difference import ComputeCircleFigures
 from busplan.analysis.network import varied_nodes
 from busplan.analysis.planning.freedoms import PERIOD
+from busplan.analysis.planning.settings import needed_settings
 from busplan.analysis.planning.smallest_period import SmallestPeriod, smallest_period
 from busplan.buses import kind_named, kind_names
 from busplan.errors import BusplanError
@@ -169,6 +170,11 @@ def _on_kind(profile: Profile, kind: str) -> MachineOnKind | NotOnKind:
         other = converted(profile, kind)
     except BusplanError as error:
         return NotOnKind(kind, error.problems)
+    needed = {} if kind == profile.bus.kind else needed_settings(other.profile)
+    if needed:
+        assumed = (one for one in other.assumed if one.key not in needed)
+        tried = (AssumedKey(key, value, "setting") for key, value in needed.items())
+        other = other._replace(profile=override(other.profile, dict(needed)), assumed=(*tried, *assumed))
     found = figures(other.profile, model=kind_named(kind).deciding_model)
     return MachineOnKind(
         profile=other.profile,

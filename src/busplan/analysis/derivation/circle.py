@@ -7,12 +7,14 @@ a figure is one step that names its method, and its inputs are all inputs of tha
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from busplan.analysis.circle.figures import CIRCLE_FIGURES
+from busplan.analysis.circle.figures import CIRCLE_FIGURES, JITTER
 from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
-from busplan.analysis.derivation.inputs import traced
+from busplan.analysis.derivation.inputs import traced, traced_profile
+from busplan.analysis.derivation.latency import remembered
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, found
+from busplan.analysis.network import bus_of, network_of
 from busplan.progress import Progress
 from busplan.sections.machine import CONTOUR_MEASURES, AxisKeys
 from busplan.sections.profile import Profile
@@ -86,6 +88,7 @@ def circle_figures(
         "timing_model": found(result.timing_model, "the timing model that decides, whichever leads", ()),
         **{key: bus[own] for key, own in _OF_BUS.items()},
         **{key: _delay(profile, key, result, bus["required_us"]) for key in _DELAYS},
+        JITTER.key: _jitter(profile, result),
     }
     for figure in CIRCLE_FIGURES:
         if figure.key not in derived:
@@ -110,6 +113,16 @@ def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) 
         return found(value, words, (loop, update, period_us))
     words = "from the start of the cycle to the command of the axis, at most T_s: x on the first node, y on the last"
     return found(value, words, (loop, update, required, period_us))
+
+
+def _jitter(profile: Profile, result: CircleFigures) -> Traced:
+    """The profile's own jitter, and what the bus adds."""
+    own_us = traced(profile, "delivery.jitter_us")
+    bus_us = bus_of(profile).sync_jitter_us(network_of(traced_profile(profile)))
+    both_us = remembered(own_us + bus_us, JITTER.key, JITTER.symbol)
+    if both_us.value == result.jitter_us:
+        return both_us
+    return found(result.jitter_us, "no more than leaves set-points in their order: half the period", (own_us, bus_us))
 
 
 def _found(profile: Profile, key: str, result: CircleFigures, bus: dict[str, Traced]) -> Traced:

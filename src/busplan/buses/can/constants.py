@@ -41,6 +41,28 @@ PDO_STEP: Final = _identifier(0x100, "from the identifier of a PDO to that of th
 MOST_PDOS: Final = _identifier(4, "PDOs of one node in one direction")
 MOST_NODES: Final = _identifier(127, "node-IDs")
 
+PIPELINE_CYCLES: Final = Sourced(
+    0,
+    unit="1",
+    grade="assumed",
+    source="chosen: commands follow the feedback that they rest on, in one cycle",
+    meaning="cycles from the one that brings feedback to the one that takes the command computed from it",
+)
+UNMEASURED_SHARE: Final = Sourced(
+    0.5,
+    unit="1",
+    grade="assumed",
+    source="chosen: the host's time of like machines differs by ten times",
+    meaning="standard uncertainty of a host's time that nobody has measured, as a share of it",
+)
+MOST_BLOCKS: Final = Sourced(
+    3,
+    unit="1",
+    grade="derived",
+    source="one frame before SYNC, before the last feedback, and before the commands",
+    meaning="frames of a lower priority that a cycle waits for, at most",
+)
+
 MAX_LOAD: Final = Sourced(
     0.8, unit="1", grade="published", source="Lenze system-bus manual", meaning="largest bus load of a plan"
 )
@@ -50,6 +72,20 @@ SATURATED: Final = Sourced(
     grade="assumed",
     source="chosen: a load so near 1 has a busy period without use",
     meaning="load from which on no response time is computed",
+)
+MOST_STEPS: Final = Sourced(
+    2000,
+    unit="1",
+    grade="assumed",
+    source="chosen: a bus below a load of 0.9 takes some ten",
+    meaning="steps of a busy period from which on no response time is computed",
+)
+EXPECTED_STUFFING: Final = Sourced(
+    0.4,
+    unit="1",
+    grade="calibrated",
+    source="bits that hardware counted (python-can's logs), and the load of a log at 500 kbit/s: within 4 %",
+    meaning="share of the possible stuff bits that frames have",
 )
 
 CONSTANTS: Final = constants(globals())

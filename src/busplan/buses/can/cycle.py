@@ -1,15 +1,24 @@
-"""The SYNC cycle: SYNC, feedback, command, and the other messages that arrive while it lasts."""
+"""The SYNC cycle: SYNC, feedback, the host, commands, and what other messages make it wait for."""
 
 from collections.abc import Iterator, Mapping
-from functools import cached_property, partial, reduce
-from itertools import chain
+from functools import cached_property, lru_cache, partial, reduce
+from itertools import chain, islice
 from math import inf
 from typing import Final, Literal
 
-from busplan.buses.can.equations import frame_us, payload_us
-from busplan.buses.can.response import Sender, settled_us
-from busplan.buses.can.streams import frame_sizes, response, streams
-from busplan.buses.can.traffic import NAMES, SYNC, Message, Pdos, Traffic, traffic_of
+from busplan.buses.can.constants import EXPECTED_STUFFING
+from busplan.buses.can.equations import bit_us, frame_us, payload_us
+from busplan.buses.can.response import Response
+from busplan.buses.can.streams import (
+    Stream,
+    frame_sizes,
+    is_higher,
+    last_identifier,
+    response,
+    streams,
+    waits,
+)
+from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of, without_times
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Group, Network
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, plain, pointwise, rounded_up, total
@@ -21,9 +30,11 @@ NONE: Final[TimingModelName] = "no-stuffing"
 
 
 class CanCycle(BusCycle):
-    """SYNC, the wait for the slowest node, all feedback PDOs, all command PDOs, other messages, and the window.
+    """SYNC, the wait for the slowest node, all feedback PDOs, the host, all command PDOs, and the window.
 
     All nodes execute at once: feedback waits for the slowest of them, and so does the next SYNC behind the commands.
+    Before SYNC, the last feedback and the commands a frame of a lower priority may be on the wire; frames of higher
+    priorities go whenever they are queued.
     """
 
     def __init__(self, network: Network, model: str) -> None:
@@ -72,78 +83,114 @@ class CanCycle(BusCycle):
         return reduce(larger, (_execution_us(one, kind, uncertainties) for one in self.network.groups))
 
     @cached_property
-    def _others(self) -> dict[str, Number]:
-        """All terms but the messages, whose number follows from them."""
+    def _own(self) -> dict[str, Number]:
+        """The terms that no other message is in."""
         return {
             "cycle_sync_us": self.sync_us,
             "cycle_wait_us": total(self._wait_us(kind) for kind in TRANSACTION_KINDS),
             "cycle_feedback_us": self._all_us("read"),
+            "cycle_host_us": self.traffic.host_us,
             "cycle_command_us": self._all_us("write"),
-            "nonperiodic_us": self.network.nonperiodic_us,
         }
 
     @cached_property
-    def _others_us(self) -> Number:
-        return total(self._others.values())
+    def _on_bus_us(self) -> Number:
+        """From SYNC to the end of the last command, but for other messages [us]."""
+        waits_us = {"cycle_wait_us": self._wait_us("read")}
+        return total((self._own | waits_us).values())
 
-    def _counts(self, others_us: Number) -> tuple[Number, ...]:
-        """How many of each message arrive in a cycle whose other terms take some time [1]."""
+    def _waits_us(self, extra_us: Number = 0.0) -> tuple[Number, Number]:
+        """Blocking by frames of lower priorities, and interference by those of higher ones [us].
+
+        Parameters
+        ----------
+        extra_us
+            By how much the rest takes longer [us].
+        """
         if not self._messages:
-            return ()
-        numbers = [number for one, us in self._messages for number in (us, one.period_us, one.jitter_us)]
-        lasts_us = named(
-            pointwise(
-                _settled, others_us, *numbers, words="w = others + sum of ceil((w + J) / T) C, a bound at high load"
-            ),
-            "busy_us",
-            "w",
-        )
-        return tuple(rounded_up((lasts_us + one.jitter_us) / one.period_us) for one, _ in self._messages)
+            return 0.0, 0.0
+        others_us = named(self._on_bus_us + extra_us, "others_us", "others")
 
-    def _messages_us(self, others_us: Number) -> Number:
-        counts = self._counts(others_us)
-        return total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
+        def found(key: str, words: str) -> Number:
+            return pointwise(
+                partial(_waits, self.traffic, self.is_stuffed, key), others_us, *self.traffic.numbers(), words=words
+            )
+
+        words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
+        lasts_us = named(found("lasts_us", words), "busy_us", "w")
+        blocking_us = found("blocking_us", "the 3 longest frames of a lower priority that can be there in w")
+        counts = self._higher(lasts_us)
+        return blocking_us, total(count * us for count, (_, us) in zip(counts, self._messages, strict=True))
+
+    def _higher(self, lasts_us: Number) -> Iterator[Number]:
+        """How many frames of each message go before the last PDO in a span of time [1]."""
+        window_us = lasts_us + bit_us(self.traffic.bit_rate_kbit_s)
+        for one, _ in self._messages:
+            count = rounded_up((window_us + one.jitter_us) / one.period_us)
+            yield choose(is_higher(one.identifier, self._last), count, 0)
+
+    @cached_property
+    def _last(self) -> Number:
+        """The largest identifier of SYNC and all PDOs."""
+        traffic = without_times(self.traffic)
+        words = "the largest identifier of SYNC and all PDOs"
+        return named(pointwise(partial(_last, traffic), *traffic.numbers(), words=words), "last_identifier", "id_last")
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
-        *others, last = self._others.items()
-        messages = Term("cycle_messages_us", self._messages_us(self._others_us))
-        return (*(Term(*one) for one in others), messages, Term(*last))
+        blocking_us, interference_us = self._waits_us()
+        return (
+            *(Term(*one) for one in self._own.items()),
+            Term("cycle_blocking_us", blocking_us),
+            Term("cycle_interference_us", interference_us),
+            Term("nonperiodic_us", self.network.nonperiodic_us),
+        )
 
     def added_us(self, extra_us: Number, *, after_us: Number = 0.0) -> Number:
         """What the cycle grows by if its nodes take longer: more messages may arrive, too [us]."""
         if not self._messages:
             return extra_us
-        before_us = self._others_us + after_us
-        return extra_us + self._messages_us(before_us + extra_us) - self._messages_us(before_us)
+        return extra_us + total(self._waits_us(after_us + extra_us)) - total(self._waits_us(after_us))
 
     def doubts(self) -> tuple[Doubt, ...]:
-        """The execution time: what two standard uncertainties more change, halved."""
+        """The execution time, what two standard uncertainties more change, halved, and the host's own time."""
         swing_us = total((self._wait_us(kind, uncertainties=2) - self._wait_us(kind)) / 2 for kind in TRANSACTION_KINDS)
         key = "node.execution" if self.network.is_uniform else "group.execution"
-        return (Doubt(key, "execution time", swing_us),)
+        bus = self.network.profile.bus
+        host_us = choose(bus.pipeline_cycles > 0, 0.0, bus.host_doubt_us)
+        return Doubt(key, "execution time", swing_us), Doubt("bus.host_us", "the host's own time", host_us)
 
     def left_out(self) -> tuple[LeftOut, ...]:
-        """The slowest execution, and what else is on the bus."""
+        """The host's own time, the slowest execution, and what else is on the bus."""
+        bus = self.network.profile.bus
+        host = () if bus.pipeline_cycles or bus.host_us else (LeftOut("host time", "bus.host_us"),)
         slowest = (
             LeftOut("the slowest execution", group.key("execution.worst_extra_us"))
             for group in self.network.groups
             if not group.worst_extra_us
         )
         others = () if self._messages or self.network.nonperiodic_us else (LeftOut("other messages", "message"),)
-        return (*slowest, *others)
+        return (*host, *slowest, *others)
 
     def events(self) -> Iterator[BusEvent]:
-        """The cycle node by node, then the messages that arrive meanwhile."""
+        """The cycle node by node, with other messages as late for the commands as they can be."""
+        found = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
+        blocks = (
+            BusEvent("blocking", "cycle_blocking_us", one.frame_us, f"message {one.name} of a lower priority")
+            for one in found.blocks
+        )
+        yield from islice(blocks, 1)
         yield BusEvent("sync", "cycle_sync_us", plain(self.sync_us), "SYNC")
-        for kind in TRANSACTION_KINDS:
-            waiting_us = plain(self._wait_us(kind))
-            if kind == "read":
-                yield BusEvent("wait", "cycle_wait_us", waiting_us, "wait for the slowest feedback")
-            yield from self._frames(kind)
-        for count, (one, us) in zip(self._counts(self._others_us), self._messages, strict=True):
+        yield BusEvent("wait", "cycle_wait_us", plain(self._wait_us("read")), "wait for the slowest feedback")
+        yield from islice(blocks, 1)
+        yield from self._frames("read")
+        yield BusEvent("host", "cycle_host_us", plain(self.traffic.host_us), "host")
+        yield from blocks
+        for count, (one, us) in zip(self._higher(found.lasts_us), self._messages, strict=True):
             for _ in range(int(plain(count))):
-                yield BusEvent("message", "cycle_messages_us", plain(us), f"message {one.name}")
+                yield BusEvent("message", "cycle_interference_us", plain(us), f"message {one.name}")
+        yield from self._frames("write")
+        waiting_us = plain(self._wait_us("write"))
         yield BusEvent("wait", "cycle_wait_us", waiting_us, "wait for the slowest execution of a command")
         yield BusEvent("nonperiodic", "nonperiodic_us", plain(self.network.nonperiodic_us), "non-periodic window")
 
@@ -162,7 +209,12 @@ class CanCycle(BusCycle):
 
     def figures(self) -> Mapping[str, Number | None]:
         """The bit rate and the load of the bus."""
-        return {"bit_rate_kbit_s": self.traffic.bit_rate_kbit_s, "bus_load": self.load}
+        least, most = (CanCycle(self.network, model).load for model in (NONE, WORST))
+        return {
+            "bit_rate_kbit_s": self.traffic.bit_rate_kbit_s,
+            "bus_load": self.load,
+            "expected_load": least + EXPECTED_STUFFING * (most - least),
+        }
 
     @cached_property
     def load(self) -> Number:
@@ -187,9 +239,28 @@ class CanCycle(BusCycle):
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""
         pdos = ((one.name, one.group) for one in self.traffic.pdos)
         names = ((SYNC, ""), *pdos, *((one.name, "") for one in self.traffic.messages))
-        return tuple(
-            BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names)
-        )
+        found = (BusLatency(name, None, self._phases(place, name), group) for place, (name, group) in enumerate(names))
+        return (*found, BusLatency(LOOP, None, self._loop()))
+
+    def _loop(self) -> dict[str, Number]:
+        """Parts of the way from SYNC to the last executed command that rests on it."""
+        blocking_us, interference_us = self._waits_us()
+        parts_us = {
+            "jitter_us": 0.0,
+            "blocking_us": blocking_us,
+            "interference_us": interference_us,
+            "backlog_us": 0.0,
+            "frame_us": self._in_cycle_us,
+            "execution_us": self._own["cycle_wait_us"] + self.traffic.host_us,
+            "pipeline_us": self.network.profile.bus.pipeline_cycles * self.network.period_us,
+        }
+        return _numbered(parts_us, identifier=inf, data_bytes=inf, instance=inf, deadline_us=inf)
+
+    @cached_property
+    def sync_spread_us(self) -> Number:
+        """How much later than without other messages SYNC may end, B + I [us]; infinite where it has no end."""
+        phases = self._phases(0, SYNC)
+        return named(phases["blocking_us"] + phases["interference_us"], "sync_spread_us", "B + I")
 
     def _phases(self, place: int, name: str) -> dict[str, Number]:
         """Figures of the stream at a place among those that end a PDO or a message."""
@@ -211,15 +282,22 @@ class CanCycle(BusCycle):
             "interference_us": named(interference_us, "interference_us", "I"),
             "backlog_us": named(backlog_us, "backlog_us", "q (C - T)"),
             "frame_us": named(frame_us_, "frame_us", "C"),
+            "execution_us": 0.0,
+            "pipeline_us": 0.0,
         }
-        return {
-            "identifier": found("last", f"identifier of {name}"),
-            "data_bytes": found("data_bytes", f"data of {name}"),
-            "instance": instance,
-            **parts_us,
-            "worst_response_us": total(parts_us.values()),
-            "deadline_us": found("deadline_us", f"deadline of {name}"),
-        }
+        return _numbered(
+            parts_us,
+            identifier=found("last", f"identifier of {name}"),
+            data_bytes=found("data_bytes", f"data of {name}"),
+            instance=instance,
+            deadline_us=found("deadline_us", f"deadline of {name}"),
+        )
+
+
+def _numbered(parts_us: Mapping[str, Number], **others: Number) -> dict[str, Number]:
+    """The figures of a latency with the sum of its parts."""
+    deadline_us = others.pop("deadline_us")
+    return {**others, **parts_us, "worst_response_us": total(parts_us.values()), "deadline_us": deadline_us}
 
 
 def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Number:
@@ -232,19 +310,29 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
     return slowest_us + uncertainties * doubt_us
 
 
-def _settled(others_us: float, *numbers: float) -> float:
-    """The span in which all messages that arrive in it are sent, of their times, periods and jitters in one row."""
-    return settled_us(others_us, [Sender(*numbers[place : place + 3]) for place in range(0, len(numbers), 3)])
+def _waits(traffic: Traffic, is_stuffed: bool, key: str, others_us: float, *numbers: float) -> float:
+    """One figure of what a cycle waits for."""
+    found: float = getattr(waits(traffic.with_numbers(*numbers), others_us, is_stuffed=is_stuffed), key)
+    return found
+
+
+def _last(traffic: Traffic, *numbers: float) -> float:
+    return last_identifier(streams(traffic.with_numbers(*numbers), is_stuffed=True))
 
 
 def _phase(traffic: Traffic, is_stuffed: bool, place: int, key: str, *numbers: float) -> float:
     """One figure of the response of the stream at a place; infinite where it does not exist."""
-    plain_traffic = traffic.with_numbers(*numbers)
-    each = streams(plain_traffic, is_stuffed=is_stuffed)
-    own = [one for one in each if one.is_end][place]
+    own, worst = _responses(traffic.with_numbers(*numbers), is_stuffed)[place]
     if hasattr(own, key):
         said: float = getattr(own, key)
         return said
-    worst = response(own, each, bit_rate_kbit_s=plain(plain_traffic.bit_rate_kbit_s))
     found: float = inf if worst is None else getattr(worst, key)
     return found
+
+
+@lru_cache(maxsize=64)
+def _responses(traffic: Traffic, is_stuffed: bool) -> tuple[tuple[Stream, Response | None], ...]:
+    """Each stream that ends a PDO or a message, with its response."""
+    each = streams(traffic, is_stuffed=is_stuffed)
+    ends = (one for one in each if one.is_end)
+    return tuple((one, response(one, each, traffic, is_stuffed=is_stuffed)) for one in ends)

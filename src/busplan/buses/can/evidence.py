@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from busplan.buses.can.constants import BASE_BITS
+from busplan.buses.can.constants import BASE_BITS, EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_bits, frame_us
 from busplan.buses.can.response import Response, Sender, worst_response
 from busplan.buses.published import Comparison, EvidenceSection
@@ -13,6 +13,7 @@ Published = Mapping[str, Any]
 """The published figures, as a data file of the package holds them."""
 _WORST: Final = "worst stuffing"
 _PLAIN: Final = "no stuffing"
+_EXPECTED: Final = f"{EXPECTED_STUFFING:g} of the stuffing"
 
 
 def can_sections(published: Published, paper: Published) -> tuple[EvidenceSection, ...]:
@@ -27,6 +28,8 @@ def can_sections(published: Published, paper: Published) -> tuple[EvidenceSectio
     """
     return (
         _lengths(published["frames"]),
+        _counted(published["bits"]),
+        _logged(published["log"]),
         _times(published["times"]),
         _example("CAN: a worked example, five messages", published["example"]),
         _axes(published["axes"]),
@@ -47,6 +50,38 @@ def _lengths(given: Published) -> EvidenceSection:
                     yield Comparison(title, quantity, "bits", bits, "frame", plain(computed), given["grade"])
 
     return EvidenceSection(title, f"{given['source']}.", tuple(compared()), "can")
+
+
+def _counted(given: Published) -> EvidenceSection:
+    """Bits of frames on a bus: each lies between no stuff bits and the most."""
+    size, title = given["payload_bytes"], f"CAN: bits of frames of {given['payload_bytes']} bytes that hardware counted"
+
+    def compared() -> Iterator[Comparison]:
+        for number, (identifier_bits, bits) in enumerate(
+            zip(given["identifier_bits"], given["bits"], strict=True), start=1
+        ):
+            plain_bits, stuffed_bits = (
+                plain(frame_bits(size, identifier_bits=identifier_bits, is_stuffed=one)) for one in (False, True)
+            )
+            quantity = f"frame {number}, {identifier_bits} bits of identifier"
+            for method, computed in _methods(plain_bits, stuffed_bits):
+                yield Comparison(title, quantity, "bits", bits, method, computed, given["grade"])
+
+    return EvidenceSection(title, f"{given['source']}.", tuple(compared()), "can")
+
+
+def _logged(given: Published) -> EvidenceSection:
+    title = "CAN: the load of a log"
+    found = (
+        Comparison(title, "bus load", "1", given["load"], method, computed, given["grade"])
+        for method, computed in _methods(given["plain_load"], given["stuffed_load"])
+    )
+    return EvidenceSection(title, f"{given['source']}.", tuple(found), "can")
+
+
+def _methods(least: float, most: float) -> tuple[tuple[str, float], ...]:
+    """A figure without stuff bits and with the most, and with as many as are expected."""
+    return (_WORST, most), (_EXPECTED, least + float(EXPECTED_STUFFING) * (most - least)), (_PLAIN, least)
 
 
 def _times(given: Published) -> EvidenceSection:

@@ -5,10 +5,10 @@ from functools import partial
 from math import inf
 from typing import Final
 
-from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS
+from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.streams import Stream, collisions, load_before, response, streams
-from busplan.buses.can.traffic import Traffic, traffic_of
+from busplan.buses.can.streams import Stream, collisions, deadline_share, load_before, streams
+from busplan.buses.can.traffic import Traffic, traffic_of, without_times
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
@@ -25,7 +25,7 @@ def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
     """Messages that miss their deadline, each with its response over its deadline."""
     each = streams(traffic, is_stuffed=True)
     for one in each:
-        if one.is_message and (share := _deadline_share(one, each, traffic)) > 1:
+        if one.is_message and (share := deadline_share(one, each, traffic)) > 1:
             yield one, share
 
 
@@ -47,20 +47,21 @@ def _late(one: Stream, share: float, traffic: Traffic) -> str:
     if share < inf:
         return f"its worst-case response time is {share * one.deadline_us:g} us, over its {one.deadline_us:g} us"
     load = load_before(one, streams(traffic, is_stuffed=True))
-    return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}"
-
-
-def _deadline_share(one: Stream, each: tuple[Stream, ...], traffic: Traffic) -> float:
-    """Response over deadline; infinite where there is no response time [1]."""
-    found = response(one, each, bit_rate_kbit_s=plain(traffic.bit_rate_kbit_s))
-    return inf if found is None else found.us / one.deadline_us
+    steps = "" if load >= SATURATED else f", and its busy period takes over {MOST_STEPS:.0f} steps to find"
+    return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
 def _slowest(traffic: Traffic, *numbers: float) -> float:
     """The largest response over deadline of any message [1]."""
     own = traffic.with_numbers(*numbers)
     each = streams(own, is_stuffed=True)
-    return max((_deadline_share(one, each, own) for one in each if one.is_message), default=0.0)
+    found = 0.0
+    # The lowest priorities first: one of them has no response time, or none has.
+    for one in sorted((one for one in each if one.is_message), key=lambda one: -one.first):
+        found = max(found, deadline_share(one, each, own))
+        if found == inf:
+            break
+    return found
 
 
 def _deadline(network: Network) -> Number:
@@ -99,19 +100,13 @@ def _from(first: int, shared: int) -> str:
     return f"{shared} identifiers from {first:#x}" if shared > 1 else f"the identifier {first:#x}"
 
 
-def _without_times(traffic: Traffic) -> Traffic:
-    """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
-    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
-    return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, messages=messages)
-
-
 def _shared(traffic: Traffic, *numbers: float) -> float:
     each = streams(traffic.with_numbers(*numbers), is_stuffed=True)
     return sum(shared for *_, shared in collisions(each))
 
 
 def _collisions(network: Network) -> Number:
-    traffic = _without_times(traffic_of(network))
+    traffic = without_times(traffic_of(network))
     return pointwise(partial(_shared, traffic), *traffic.numbers(), words="identifiers that stand twice")
 
 
@@ -120,7 +115,7 @@ def _last(traffic: Traffic, *numbers: float) -> float:
 
 
 def _largest_identifier(network: Network) -> Number:
-    traffic = _without_times(traffic_of(network))
+    traffic = without_times(traffic_of(network))
     return pointwise(partial(_last, traffic), *traffic.numbers(), words="the largest identifier")
 
 

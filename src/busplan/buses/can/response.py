@@ -6,11 +6,12 @@ R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, Controller Area Network (CAN) 
 revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 """
 
-from collections.abc import Callable, Sequence
-from math import ceil
+from collections.abc import Callable, Iterable, Sequence
+from itertools import repeat
+from math import ceil, inf
 from typing import NamedTuple
 
-from busplan.buses.can.constants import SATURATED
+from busplan.buses.can.constants import MOST_STEPS, SATURATED
 
 
 class Sender(NamedTuple):
@@ -20,6 +21,7 @@ class Sender(NamedTuple):
     """All frames of one instance, in the worst case [us]."""
     period_us: float
     jitter_us: float = 0.0
+    """How late an instance may be queued; negative where the first comes so much behind the start [us]."""
 
     @property
     def load(self) -> float:
@@ -44,7 +46,9 @@ class Response(NamedTuple):
     """R [us]."""
 
 
-def worst_response(own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float) -> Response | None:
+def worst_response(
+    own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float, first_us: float = 0.0
+) -> Response | None:
     """Find the worst-case response time of one message.
 
     Parameters
@@ -57,12 +61,14 @@ def worst_response(own: Sender, higher: Sequence[Sender], *, blocking_us: float,
         The longest frame of a lower priority B; 0 where there is none [us].
     bit_us
         Time of a bit [us]: a frame that arrives within it behind the start still takes part in the arbitration.
+    first_us
+        Frames of higher priorities that come once, when the busy period begins [us].
 
     Returns
     -------
     Response
-        Its worst instance, the first of equals; None where the message and those of higher priorities load the bus by
-        1 or more, for then the busy period has no end.
+        Its worst instance, the first of equals. None where the message and those of higher priorities load the bus by 1
+        or more, for then the busy period has no end, or where it takes over `MOST_STEPS` to find.
 
     References
     ----------
@@ -75,31 +81,64 @@ def worst_response(own: Sender, higher: Sequence[Sender], *, blocking_us: float,
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
     """
-    if sum(one.load for one in (own, *higher)) >= SATURATED:
-        return None
     everyone = (own, *higher)
-    busy_us = _settled(
-        blocking_us + sum(one.frames_us for one in everyone),
-        lambda span_us: blocking_us + sum(one.released_us(span_us) for one in everyone),
-    )
+    if sum(one.load for one in everyone) >= SATURATED:
+        return None
+    try:
+        return _worst(own, everyone, blocking_us=blocking_us, first_us=first_us, bit_us=bit_us)
+    except _TooManyStepsError:
+        return None
+
+
+def _worst(
+    own: Sender, everyone: Sequence[Sender], *, blocking_us: float, first_us: float, bit_us: float
+) -> Response | None:
+    _, *higher = everyone
+    steps = iter(range(int(MOST_STEPS)))
+    ahead_us = blocking_us + first_us
+    busy_us = _settled(ahead_us, everyone, steps, from_us=ahead_us + sum(one.frames_us for one in everyone))
     worst: Response | None = None
-    waits_us = blocking_us
+    waits_us = 0.0
     for instance in range(ceil((busy_us + own.jitter_us) / own.period_us)):
-        before_us = blocking_us + instance * own.frames_us
+        before_us = ahead_us + instance * own.frames_us
+        late_us = own.jitter_us + own.frames_us - instance * own.period_us
+        if worst and late_us + _bound_us(before_us, higher, bit_us=bit_us) <= worst.us:
+            break  # the bound falls from one instance to the next
         # It waits at least as long as the instance before it, and for that one.
-        waits_us = _settled(
-            max(waits_us, before_us),
-            lambda span_us, before_us=before_us: (  # type: ignore[misc]
-                before_us + sum(one.released_us(span_us + bit_us) for one in higher)
-            ),
-        )
-        us = own.jitter_us + waits_us - instance * own.period_us + own.frames_us
-        if worst is None or us > worst.us:
-            worst = Response(blocking_us, instance, waits_us - before_us, us)
+        waits_us = _settled(before_us, higher, steps, bit_us=bit_us, from_us=waits_us)
+        if worst is None or waits_us + late_us > worst.us:
+            interference_us = waits_us - blocking_us - instance * own.frames_us
+            worst = Response(blocking_us, instance, interference_us, waits_us + late_us)
     return worst
 
 
-def settled_us(others_us: float, senders: Sequence[Sender]) -> float:
+def response_bound_us(
+    own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float, first_us: float = 0.0
+) -> float:
+    """A time that no response is over, in closed form; the load of message and higher ones is below `SATURATED` [us].
+
+    Parameters
+    ----------
+    own, higher, blocking_us, bit_us, first_us
+        As `worst_response` takes them.
+
+    Notes
+    -----
+    ceil(x) is less than x + 1, so w <= (B + q C + sum (1 + (J + bit) / T) C) / (1 - load). With every further instance
+    q the response falls: C / (1 - load of the higher ones) is no more than T.
+    """
+    return own.jitter_us + own.frames_us + _bound_us(blocking_us + first_us, higher, bit_us=bit_us)
+
+
+def _bound_us(before_us: float, senders: Sequence[Sender], *, bit_us: float = 0.0) -> float:
+    """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us]."""
+    most_us = before_us + sum(one.frames_us + one.load * (max(one.jitter_us, 0.0) + bit_us) for one in senders)
+    return most_us / (1 - min(sum(one.load for one in senders), SATURATED))
+
+
+def settled_us(
+    others_us: float, senders: Sequence[Sender], *, more_us: Callable[[float], float] = lambda _: 0.0
+) -> float:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
@@ -108,32 +147,54 @@ def settled_us(others_us: float, senders: Sequence[Sender]) -> float:
         What takes time beside the senders [us].
     senders
         What arrives within the span.
+    more_us
+        What else takes time within a span, which does not fall with it [us].
 
     Returns
     -------
     float
-        The smallest w = others + sum ceil((w + J) / T) C. With a load of the senders above 0.99 a bound of it in closed
-        form, and from `SATURATED` on one that says no more than that the bus is full.
+        The smallest w = others + more(w) + sum ceil((w + J) / T) C. With a load of the senders above 0.99 a bound of it
+        in closed form, and from `SATURATED` on one that says no more than that the bus is full.
 
     Examples
     --------
     >>> settled_us(900.0, [Sender(100, 500)])
     1200.0
     """
-    load = sum(one.load for one in senders)
-    if load > _NEARLY_FULL:
-        first_us = others_us + sum(one.frames_us + one.load * one.jitter_us for one in senders)
-        return first_us / (1 - min(load, SATURATED))
-    start_us = others_us + sum(one.frames_us for one in senders)
-    return _settled(start_us, lambda span_us: others_us + sum(one.released_us(span_us) for one in senders))
+    others_us += more_us(inf) if (is_full := sum(one.load for one in senders) > _NEARLY_FULL) else 0.0
+    return _bound_us(others_us, senders) if is_full else _settled(others_us, senders, repeat(0), more_us=more_us)
 
 
 _NEARLY_FULL = 0.99
 """Load above which the smallest span takes too many steps to find."""
+_BELOW = 1 - 1e-9
+"""A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
 
 
-def _settled(start_us: float, step: Callable[[float], float]) -> float:
-    """The smallest number that a step leaves as it is, from a start that is no larger."""
-    while (further_us := step(start_us)) > start_us:
-        start_us = further_us
-    return start_us
+class _TooManyStepsError(Exception):
+    """A span takes too many steps to find."""
+
+
+def _settled(
+    before_us: float,
+    senders: Sequence[Sender],
+    steps: Iterable[int],
+    *,
+    bit_us: float = 0.0,
+    from_us: float = 0.0,
+    more_us: Callable[[float], float] = lambda _: 0.0,
+) -> float:
+    """The smallest w = before + more(w) + sum ceil((w + J + bit) / T) C that is no less than `from_us` [us].
+
+    The load of the senders is below 1; `steps` are as many as may be taken.
+    """
+    load = sum(one.load for one in senders)
+    # ceil(x) is no less than x: no solution lies below that of the sum without rounding.
+    least_us = (before_us + sum(one.load * (one.jitter_us + bit_us) for one in senders)) / (1 - load)
+    span_us = max(from_us, before_us, least_us * _BELOW)
+    for _ in steps:
+        further_us = before_us + more_us(span_us) + sum(one.released_us(span_us + bit_us) for one in senders)
+        if further_us <= span_us:
+            return span_us
+        span_us = further_us
+    raise _TooManyStepsError

@@ -9,19 +9,24 @@ from busplan.buses.can.constants import (
     FRAME_BYTES,
     MAX_IDENTIFIER,
     MAX_LOAD,
+    PIPELINE_CYCLES,
     SYNC_IDENTIFIER,
+    UNMEASURED_SHARE,
     BitRate,
     IdentifierBits,
 )
 from busplan.buses.can.cycle import WORST, TimingModelName
-from busplan.buses.can.traffic import NAMES, SYNC
+from busplan.buses.can.traffic import LOOP, NAMES, SYNC
+from busplan.elementwise import Number
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US, Count, Problem, Section, TimeUs, refused
 from busplan.sections.cycle import BusSection, GroupAxes, GroupName, GroupSection, NodeSection, PayloadSection
+from busplan.sections.execution import UNKNOWN_SHARE
 from busplan.sections.limits import Limits
 from busplan.sections.profile import Profile
 
 Identifier = Annotated[int, Field(ge=0, le=MAX_IDENTIFIER[29])]
 PeriodUs = Annotated[float, Field(ge=MIN_STEP_US, le=MAX_TIME_US, allow_inf_nan=False)]
+_MOST_CYCLES = 1000
 
 
 class CanBus(BusSection):
@@ -41,12 +46,41 @@ class CanBus(BusSection):
     sync_counter: bool = Field(
         default=False, description="Whether SYNC carries its counter, one byte (CiA 301)", examples=[True]
     )
+    pipeline_cycles: Annotated[int, Field(ge=0, le=_MOST_CYCLES)] = Field(
+        default=int(PIPELINE_CYCLES),
+        description="Cycles from the one that brings feedback to the one that takes the command computed from it; 0: "
+        "the host computes between the last feedback and the first command of a cycle. Of latency, and of a loop on "
+        "the host",
+        examples=[1],
+    )
+    host_us: TimeUs = Field(
+        default=0.0,
+        description="The host's own time between the last feedback and the queued commands; read where "
+        "pipeline_cycles is 0 [us]",
+        examples=[100],
+    )
+    host_grade: Literal["measured", "derived", "calibrated", "assumed"] | None = Field(
+        default=None, description="How host_us is known", examples=["measured"]
+    )
+    host_uncertainty_us: TimeUs | None = Field(
+        default=None,
+        description="Standard uncertainty of host_us; without it 10 % of it where it is measured, else half of it [us]",
+        examples=[5],
+    )
     timing_model: TimingModelName = Field(
         default=WORST,
         description="Timing model whose figures lead the tables, worst-stuffing or no-stuffing; the verdict is always "
         "by worst-stuffing",
         examples=[WORST],
     )
+
+    @property
+    def host_doubt_us(self) -> Number:
+        """Standard uncertainty of the host's own time [us]."""
+        if self.host_uncertainty_us is not None:
+            return self.host_uncertainty_us
+        share = UNKNOWN_SHARE if self.host_grade in ("measured", "derived") else UNMEASURED_SHARE
+        return share * self.host_us
 
 
 class CanPayload(PayloadSection):
@@ -137,7 +171,7 @@ class CanProfile(Profile):
         problems += (
             Problem("is what the frames of the cycle are called", key=f"message.{place}.name", kind="inconsistent")
             for place, name in enumerate(names)
-            if name in (SYNC, *NAMES.values())
+            if name in (SYNC, LOOP, *NAMES.values())
         )
         if problems:
             raise refused(*problems)

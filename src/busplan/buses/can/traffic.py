@@ -1,18 +1,21 @@
 """What a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
 from collections.abc import Iterator, Sequence
+from functools import reduce
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER
 from busplan.buses.can.equations import share_bytes
 from busplan.buses.network import Network
-from busplan.elementwise import Number, larger
+from busplan.elementwise import Number, choose, larger
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 FOLLOWS: Final = -1
 """In the place of an identifier: the one behind those of the group before."""
 SYNC: Final = "SYNC"
+LOOP: Final = "loop"
+"""What the way from SYNC to the executed commands is called."""
 NAMES: Final[dict[TransactionKind, str]] = {"read": "feedback", "write": "command"}
 """What a node's read payload and its write payload are called on CAN."""
 _FIRST: Final = {"read": FEEDBACK_IDENTIFIER, "write": COMMAND_IDENTIFIER}
@@ -55,6 +58,10 @@ class Traffic(NamedTuple):
     identifier_bits: Number
     sync_identifier: Number
     sync_bytes: Number
+    read_us: Number
+    """The slowest execution of any node, from SYNC to its queued feedback [us]."""
+    host_us: Number
+    """From the last feedback to the queued commands [us]."""
     pdos: tuple[Pdos, ...]
     messages: tuple[Message, ...]
 
@@ -92,12 +99,21 @@ class _Senders(NamedTuple):
     nodes: Number
     axes: Number
     payloads_bytes: dict[TransactionKind, Number]
+    read_us: Number
+    """Slowest execution of a read [us]."""
 
 
 def traffic_of(network: Network) -> Traffic:
     """What a network sends."""
     senders = [
-        _Senders(one.name, one.said, one.nodes, one.axes, {"read": one.read_bytes, "write": one.write_bytes})
+        _Senders(
+            one.name,
+            one.said,
+            one.nodes,
+            one.axes,
+            {"read": one.read_bytes, "write": one.write_bytes},
+            one.read_execution_us + one.worst_extra_us,
+        )
         for one in network.groups
     ]
     return _traffic(network.profile, senders, network.period_us)
@@ -106,10 +122,34 @@ def traffic_of(network: Network) -> Traffic:
 def traffic_of_profile(profile: Any) -> Traffic:
     """What the network of a profile sends, for who has no network."""
     senders = [
-        _Senders(one.name, one, one.nodes, one.node.axes, {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS})
+        _Senders(
+            one.name,
+            one,
+            one.nodes,
+            one.node.axes,
+            {kind: one.bytes_of(kind) for kind in TRANSACTION_KINDS},
+            one.node.execution.execution_us(one.bytes_of("read")) + one.node.execution.worst_extra_us,
+        )
         for one in profile.alike_nodes
     ]
     return _traffic(profile, senders, profile.cycle.period_us)
+
+
+def without_times(traffic: Traffic) -> Traffic:
+    """The same with all times alike, which identifiers do not rest on: over arrays of times they are computed once."""
+    messages = tuple(one._replace(period_us=1.0, jitter_us=0.0, deadline_us=1.0) for one in traffic.messages)
+    return traffic._replace(period_us=1.0, bit_rate_kbit_s=1.0, read_us=0.0, host_us=0.0, messages=messages)
+
+
+def host_us(bus: Any) -> Number:
+    """The host's own time within the cycle: none where it computes in a cycle of its own [us].
+
+    Parameters
+    ----------
+    bus
+        Section [bus]; its numbers may be of any sort.
+    """
+    return choose(bus.pipeline_cycles > 0, 0.0, bus.host_us)
 
 
 def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Traffic:
@@ -120,6 +160,8 @@ def _traffic(profile: Any, senders: Sequence[_Senders], period_us: Number) -> Tr
         identifier_bits=bus.identifier_bits,
         sync_identifier=bus.sync_identifier,
         sync_bytes=1 if bus.sync_counter else 0,
+        read_us=reduce(larger, (one.read_us for one in senders)),
+        host_us=host_us(bus),
         pdos=tuple(_pdos(one, kind, place) for kind in TRANSACTION_KINDS for place, one in enumerate(senders)),
         messages=tuple(
             Message(

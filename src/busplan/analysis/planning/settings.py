@@ -1,0 +1,30 @@
+"""Settings of a bus without which no period carries a machine."""
+
+from math import inf
+
+from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.planning.constraints import shown
+from busplan.analysis.planning.machine import Changes
+from busplan.profile.toml import override
+from busplan.sections.profile import Profile
+
+
+def needed_settings(profile: Profile) -> Changes:
+    """The cheapest setting of the bus with which some slice carries the network, where none does now.
+
+    Parameters
+    ----------
+    profile
+        The network.
+
+    Returns
+    -------
+    dict
+        New value by dotted key; empty where none is needed, or none is enough.
+    """
+    network = network_of(profile)
+    if shown(network).us < inf:
+        return {}
+    each = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
+    changes = (dict(values) for setting in each for values in setting.values)
+    return next((one for one in changes if shown(network_of(override(profile, dict(one)))).us < inf), {})

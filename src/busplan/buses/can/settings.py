@@ -1,0 +1,49 @@
+"""What a plan may turn on a CAN bus without new parts."""
+
+from typing import get_args
+
+from busplan.buses.can.constants import BASE_BITS, MAX_IDENTIFIER, BitRate
+from busplan.buses.can.streams import streams
+from busplan.buses.can.traffic import traffic_of
+from busplan.buses.network import Network
+from busplan.buses.parts import Cost, Setting
+from busplan.elementwise import plain
+
+
+def settings(network: Network) -> tuple[Setting, ...]:
+    """PDOs of each axis, a higher bit rate, identifiers of 11 bits.
+
+    Parameters
+    ----------
+    network
+        The network, of plain numbers.
+    """
+    several = any(one.node.axes > 1 for one in network.alike)
+    return (*((_pdo_per(network),) if several else ()), _bit_rate(network), _identifier_bits(network))
+
+
+def _pdo_per(network: Network) -> Setting:
+    """PDOs of each axis, where a node has several: its parameters map them."""
+    keys = {one.name: f"group.{one.name}.pdo_per" if one.name else "payload.pdo_per" for one in network.alike}
+    several = {keys[one.name]: "axis" for one in network.alike if one.payload.pdo_per == "node" and one.node.axes > 1}
+    reason = "" if several else "each axis has one already"
+    values = (several,) if several else ()
+    return Setting("pdo_per", "PDOs of each axis", Cost.REGISTER, tuple(keys.values()), values, reason)
+
+
+def _bit_rate(network: Network) -> Setting:
+    """Higher bit rates, the next one first: the cable must be short enough."""
+    key = "bus.bit_rate_kbit_s"
+    higher = tuple({key: rate} for rate in get_args(BitRate) if rate > network.profile.bus.bit_rate_kbit_s)
+    return Setting("bit_rate", "bit rate", Cost.SCHEDULE, (key,), higher, "" if higher else "it is the highest")
+
+
+def _identifier_bits(network: Network) -> Setting:
+    """Identifiers of 11 bits, where all are small enough."""
+    key, traffic = "bus.identifier_bits", traffic_of(network)
+    empty = Setting("identifier_bits", "length of identifiers", Cost.SCHEDULE, (key,), ())
+    if plain(traffic.identifier_bits) == BASE_BITS:
+        return empty._replace(reason=f"they have {BASE_BITS} bits")
+    if max(one.last for one in streams(traffic, is_stuffed=True)) > MAX_IDENTIFIER[BASE_BITS]:
+        return empty._replace(reason=f"some are over {MAX_IDENTIFIER[BASE_BITS]:#x}")
+    return empty._replace(values=({key: BASE_BITS},))

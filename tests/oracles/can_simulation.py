@@ -1,0 +1,175 @@
+"""An event simulation of a CAN bus with a SYNC cycle, as an oracle: it imports nothing of busplan.
+
+Every sender queues its frames; whenever the bus is free, the queued frame with the smallest identifier goes, and
+nothing interrupts it. The host queues SYNC at the start of each cycle. A node queues its feedback some time behind
+SYNC, the host queues all commands some time behind the last feedback, and a node executes its command some time behind
+its last frame. Other messages are queued whenever the caller says. Times are whole numbers of any unit.
+"""
+
+from collections.abc import Callable, Sequence
+from heapq import heappop, heappush
+from typing import Final, NamedTuple
+
+
+class Frame(NamedTuple):
+    """One frame on the bus."""
+
+    identifier: int
+    us: int
+
+
+class SimulatedNode(NamedTuple):
+    """A node: its frames in either direction, and its times in each cycle."""
+
+    feedback: tuple[Frame, ...]
+    command: tuple[Frame, ...]
+    read_us: tuple[int, ...]
+    """From the end of SYNC to its queued feedback, cycle by cycle."""
+    write_us: tuple[int, ...]
+    """From the end of its last command frame to its effect, cycle by cycle."""
+
+
+class SimulatedMessage(NamedTuple):
+    """Another message: its frame, and the instants at which it is due and queued."""
+
+    frame: Frame
+    due_us: tuple[int, ...]
+    queued_us: tuple[int, ...]
+
+
+class Run(NamedTuple):
+    """What a run took."""
+
+    cycles_us: tuple[int, ...]
+    """From the start of each cycle to the effect of its last command."""
+    syncs_us: tuple[int, ...]
+    """From the start of each cycle to the end of SYNC."""
+    feedback_us: tuple[tuple[int, ...], ...]
+    """From the start of each cycle to the queued feedback of each node."""
+    commands_us: tuple[int, ...]
+    """From the start of each cycle to the queued commands."""
+    responses_us: tuple[tuple[int, ...], ...]
+    """From the due instant of each instance of each message to its end, of those that were sent."""
+
+
+def simulate(
+    sync: Frame,
+    nodes: Sequence[SimulatedNode],
+    messages: Sequence[SimulatedMessage],
+    *,
+    period_us: int,
+    host_us: Sequence[int],
+    late_us: int = 0,
+) -> Run:
+    """Run as many cycles as there are host times.
+
+    Parameters
+    ----------
+    sync
+        The frame that opens a cycle.
+    nodes, messages
+        Who sends beside the host.
+    period_us
+        From one SYNC to the next.
+    host_us
+        From the last feedback to the queued commands, cycle by cycle.
+    late_us
+        A frame that is queued so long behind the start of another still takes part in its arbitration.
+    """
+    bus = _Bus(sync, nodes, messages, period_us, host_us)
+    bus.run(late_us)
+    return Run(
+        tuple(bus.ends),
+        tuple(bus.syncs),
+        tuple(map(tuple, bus.feedback)),
+        tuple(bus.commands),
+        tuple(map(tuple, bus.responses)),
+    )
+
+
+SYNC, FEEDBACK, COMMAND, MESSAGE = range(4)
+
+
+class _Bus:
+    """A bus while it runs; what it has measured counts from the start of each cycle."""
+
+    def __init__(
+        self,
+        sync: Frame,
+        nodes: Sequence[SimulatedNode],
+        messages: Sequence[SimulatedMessage],
+        period_us: int,
+        host_us: Sequence[int],
+    ) -> None:
+        self.nodes, self.messages, self.period_us, self.host_us = nodes, messages, period_us, host_us
+        cycles = len(host_us)
+        self.syncs, self.commands, self.ends = [0] * cycles, [0] * cycles, [0] * cycles
+        self.feedback = [[0] * len(nodes) for _ in range(cycles)]
+        self.responses: list[list[int]] = [[] for _ in messages]
+        self.missing = [sum(len(node.feedback) for node in nodes)] * cycles
+        """Feedback frames that have not arrived, of each cycle."""
+        self.unsent = [[len(node.command) for node in nodes] for _ in range(cycles)]
+        """Command frames that have not arrived, of each cycle and node."""
+        self.queue: list[tuple[int, int, int, tuple[int, ...]]] = []
+        """When each frame is queued, its identifier, its time, and whose it is."""
+        for cycle in range(cycles):
+            self.put(cycle * period_us, sync, SYNC, cycle)
+        for number, message in enumerate(messages):
+            for instance, when_us in enumerate(message.queued_us):
+                self.put(when_us, message.frame, MESSAGE, number, instance)
+
+    def put(self, when_us: int, frame: Frame, *owner: int) -> None:
+        """Queue a frame."""
+        heappush(self.queue, (when_us, frame.identifier, frame.us, owner))
+
+    def run(self, late_us: int) -> None:
+        """Send every frame: whenever the bus is free, that of the smallest identifier."""
+        pending: list[tuple[int, int, tuple[int, ...]]] = []
+        now_us = 0
+        while self.queue or pending:
+            if not pending:
+                now_us = max(now_us, self.queue[0][0])
+            while self.queue and self.queue[0][0] <= now_us + late_us:
+                heappush(pending, heappop(self.queue)[1:])
+            _, us, (sort, *whose) = heappop(pending)
+            now_us += us
+            _ARRIVED[sort](self, now_us, *whose)
+
+    def sync_arrived(self, now_us: int, cycle: int) -> None:
+        """Every node begins to execute."""
+        self.syncs[cycle] = now_us - cycle * self.period_us
+        for number, node in enumerate(self.nodes):
+            ready_us = now_us + node.read_us[cycle]
+            self.feedback[cycle][number] = ready_us - cycle * self.period_us
+            for frame in node.feedback:
+                self.put(ready_us, frame, FEEDBACK, cycle, number)
+
+    def feedback_arrived(self, now_us: int, cycle: int, _number: int) -> None:
+        """Behind the last feedback the host begins to compute."""
+        self.missing[cycle] -= 1
+        if self.missing[cycle]:
+            return
+        ready_us = now_us + self.host_us[cycle]
+        self.commands[cycle] = ready_us - cycle * self.period_us
+        for number, node in enumerate(self.nodes):
+            for frame in node.command:
+                self.put(ready_us, frame, COMMAND, cycle, number)
+
+    def command_arrived(self, now_us: int, cycle: int, number: int) -> None:
+        """Behind its last frame the node executes its command."""
+        self.unsent[cycle][number] -= 1
+        if not self.unsent[cycle][number]:
+            end_us = now_us + self.nodes[number].write_us[cycle] - cycle * self.period_us
+            self.ends[cycle] = max(self.ends[cycle], end_us)
+
+    def message_arrived(self, now_us: int, number: int, instance: int) -> None:
+        """Its response ends."""
+        self.responses[number].append(now_us - self.messages[number].due_us[instance])
+
+
+_ARRIVED: Final[tuple[Callable[..., None], ...]] = (
+    _Bus.sync_arrived,
+    _Bus.feedback_arrived,
+    _Bus.command_arrived,
+    _Bus.message_arrived,
+)
