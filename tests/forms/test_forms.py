@@ -42,6 +42,7 @@ from busplan.forms.csv_rows import csv_cell, to_csv
 from busplan.forms.json_document import to_json
 from busplan.forms.lines import Line, Mark
 from busplan.forms.numbers import decimals_of, period, with_unit
+from busplan.forms.picture import first_picture
 from busplan.forms.terminal import block_lines
 
 MARGIN = ShownValue(3.96912, "margin_us", "us", 3, at="/margin_us")
@@ -238,6 +239,12 @@ def test_html_has_the_style_of_its_drawings_once() -> None:
     html = render(answer(Chart(Picture(), Sentence(("one",))), Chart(Picture(), Sentence(("two",)))), "html")
     assert html.count(Picture.stylesheet) == 1
     assert html.count('<svg class="busplan-picture">') == 2
+
+
+def test_a_picture_of_its_own_has_the_style_of_its_drawing() -> None:
+    svg = first_picture([Chart(Picture(), Sentence(("one",)))]) or ""
+    assert Picture.stylesheet in svg.partition("<style>")[2].partition("</style>")[0]
+    assert first_picture([Sentence(("one",))]) is None
 
 
 def test_markdown_has_a_drawing_in_characters() -> None:

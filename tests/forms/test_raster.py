@@ -1,7 +1,7 @@
 """A PNG has what its SVG has: the marks in their places, and every letter."""
 
 import re
-from functools import cache
+from functools import cache, partial
 from io import BytesIO
 from xml.etree.ElementTree import fromstring
 
@@ -47,6 +47,13 @@ def test_letters_are_of_the_font_that_travels_with_the_package(text: str) -> Non
     for letter in filter(str.strip, text):
         assert ink(drawn(letter)) > 0
         assert not np.array_equal(drawn(letter), drawn("\uf8fe"))
+
+
+def test_a_picture_is_the_same_on_every_computer(monkeypatch: pytest.MonkeyPatch) -> None:
+    svg = busplan.timeline("paper-4ms")._repr_svg_()
+    here = png(svg)
+    monkeypatch.setattr(resvg_py, "svg_to_bytes", partial(resvg_py.svg_to_bytes, skip_system_fonts=True))
+    assert png(svg) == here == png(svg)
 
 
 def test_a_character_that_no_font_has_is_a_box() -> None:

@@ -34,24 +34,15 @@ class CircleDrawing(Drawing):
         Largest contour error that is allowed, where there is a limit [mm].
     direction
         Direction of rotation; the circle starts on the positive x axis.
-    scale
-        Scale of several circles that are compared; by default that of this one.
     """
 
     shape = "round"
 
-    def __init__(
-        self,
-        profile: ContourProfile,
-        *,
-        tolerance_mm: float | None,
-        direction: Direction,
-        scale: Magnified | None = None,
-    ) -> None:
+    def __init__(self, profile: ContourProfile, *, tolerance_mm: float | None, direction: Direction) -> None:
         self._profile = profile
         self._direction = direction
         largest_mm = max((abs(one) for one in (*profile.low_mm, *profile.high_mm) if one is not None), default=0.0)
-        self.scale = scale or magnified(largest_mm, tolerance_mm=tolerance_mm)
+        self.scale = magnified(largest_mm, tolerance_mm=tolerance_mm)
 
     def svg(self) -> str | None:
         """Draw the magnified circle; None if there is no error to show."""
@@ -62,7 +53,7 @@ class CircleDrawing(Drawing):
         return markup(root)
 
     def draw(self, root: Element, scale: Magnified) -> None:
-        """Draw the magnified circle into an SVG, whose coordinates are set."""
+        """Draw the magnified circle into an SVG, whose coordinates are set; several that are compared share a scale."""
         root.set("viewBox", f"{-_WIDTH // 2} {-HEIGHT // 2} {_WIDTH} {HEIGHT}")
         _cross(root)
         for error_mm in scale.rings_mm:

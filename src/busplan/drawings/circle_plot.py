@@ -11,7 +11,7 @@ from busplan.analysis.circle.roundness import CircleTest
 from busplan.drawings.bars import ROW, SignedBar, draw_bars, draw_zero
 from busplan.drawings.circle import HEIGHT, CircleDrawing
 from busplan.drawings.circle_rows import CircleRow, Curve, Scales, circle_rows, common_scales
-from busplan.drawings.frame import MARGIN_PERCENT, Frame, draw_frame, numbers
+from busplan.drawings.plot_area import MARGIN_PERCENT, PlotArea, draw_plot_area, numbers
 from busplan.forms.numbers import decimals_of, period
 from busplan.forms.picture import styled
 from busplan.forms.svg import LINE, Scale, drawing, inside, markup, paragraph, text_at
@@ -113,9 +113,7 @@ def _circle(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
         return y
     y += _GAP
     box = SubElement(body, "svg", {"class": "chart circle", "y": str(y), "width": "100%", "height": str(HEIGHT)})
-    shape = CircleDrawing(
-        contour_profile(row.run), tolerance_mm=None, direction=row.run.path.direction, scale=scales.circle
-    )
+    shape = CircleDrawing(contour_profile(row.run), tolerance_mm=None, direction=row.run.path.direction)
     shape.draw(box, scales.circle)
     return y + HEIGHT
 
@@ -130,29 +128,29 @@ def _errors(body: Element, row: CircleRow, scales: Scales, *, y: int) -> int:
     room_um = _ROOM * (errors.top_um - errors.bottom_um) or 1.0
     label = ", ".join(filter(None, (f"contour error [{unit.name}]", errors.zero_outside)))
     up = numbers(label, (errors.bottom_um - room_um) * unit.per_um, (errors.top_um + room_um) * unit.per_um)
-    frame = draw_frame(body, numbers("time [s]", 0.0, row.curves[-1].time_s[-1]), up, y=y, height=_ERRORS)
+    plot = draw_plot_area(body, numbers("time [s]", 0.0, row.curves[-1].time_s[-1]), up, y=y, height=_ERRORS)
     for curve in row.curves:
-        _curve(frame, curve, per_um=unit.per_um)
+        _curve(plot, curve, per_um=unit.per_um)
     if not errors.zero_outside:
-        frame.line(y=0.0, css="zero")
+        plot.line(y=0.0, css="zero")
     for limit in () if limit_mm is None else (-limit_mm * 1e3 * unit.per_um, limit_mm * 1e3 * unit.per_um):
         if up.low <= limit <= up.high:
-            frame.line(y=limit, css="tolerance")
-    return frame.bottom
+            plot.line(y=limit, css="tolerance")
+    return plot.bottom
 
 
-def _curve(frame: Frame, curve: Curve, *, per_um: float) -> None:
+def _curve(plot: PlotArea, curve: Curve, *, per_um: float) -> None:
     """Draw a part of the move: the measured one strong and on a shade, the rest pale."""
     if curve.measured:
-        start, end = (frame.across.share(float(curve.time_s[end])) for end in (0, -1))
-        box = {"x": f"{100 * start:.5g}%", "width": f"{100 * (end - start):.5g}%", "y": str(frame.top)}
-        SubElement(frame.area, "rect", {**box, "height": str(frame.height), "class": "during"})
+        start, end = (plot.across.share(float(curve.time_s[end])) for end in (0, -1))
+        box = {"x": f"{100 * start:.5g}%", "width": f"{100 * (end - start):.5g}%", "y": str(plot.top)}
+        SubElement(plot.area, "rect", {**box, "height": str(plot.height), "class": "during"})
     # Far outside, the place of a point does not matter; a huge one cannot be drawn.
-    spread = frame.up.high - frame.up.low
-    errors = np.clip(curve.error_um * per_um, frame.up.low - spread, frame.up.high + spread)
-    points = (frame.point(float(x), float(error)) for x, error in zip(curve.time_s, errors, strict=True))
+    spread = plot.up.high - plot.up.low
+    errors = np.clip(curve.error_um * per_um, plot.up.low - spread, plot.up.high + spread)
+    points = (plot.point(float(x), float(error)) for x, error in zip(curve.time_s, errors, strict=True))
     css = "measured" if curve.measured else "apart"
-    SubElement(frame.plot, "path", {"class": f"curve {css}", "d": f"M{'L'.join(points)}"})
+    SubElement(plot.paths, "path", {"class": f"curve {css}", "d": f"M{'L'.join(points)}"})
 
 
 def _ranking(body: Element, row: CircleRow, rows: Sequence[CircleRow], scales: Scales, *, y: int) -> int:

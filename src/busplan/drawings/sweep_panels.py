@@ -9,7 +9,7 @@ import numpy as np
 
 from busplan.analysis.sweep.grid import Array
 from busplan.drawings.axes import CURVES, draw_mark
-from busplan.drawings.frame import MARGIN_PERCENT, Frame, Ruler, choices, draw_across, draw_frame, numbers
+from busplan.drawings.plot_area import MARGIN_PERCENT, PlotArea, Ruler, choices, draw_across, draw_plot_area, numbers
 from busplan.drawings.sweep_scales import PlotScale
 from busplan.drawings.sweep_words import Panel, Plotted, caption
 from busplan.forms.picture import styled
@@ -83,17 +83,17 @@ def _curves(body: Element, plotted: Plotted, *, y: int) -> int:
         low, high = min(low, 0.0), max(high, 0.0)
     room = _ROOM * (high - low)
     up = numbers(plotted.label, low - room if low else low, high + room if high else high, whole=is_count)
-    frame = draw_frame(body, _ruler(scale, as_cells=False), up, y=y, height=_CURVES)
+    plot = draw_plot_area(body, _ruler(scale, as_cells=False), up, y=y, height=_CURVES)
     if plotted.has_zero:
-        frame.line(y=0.0, css="limit")
+        plot.line(y=0.0, css="limit")
     if scale.own is not None:
-        frame.line(x=scale.own, css="own")
+        plot.line(x=scale.own, css="own")
     for panel in plotted.panels:
-        _curve(frame, scale, panel)
+        _curve(plot, scale, panel)
     for panel in plotted.panels:
         for place in np.flatnonzero(panel.unsafe & np.isfinite(panel.values)):
-            _cross(frame.place(scale.places[place], panel.values[place]), "cross")
-    return _legend_of_curves(body, plotted, y=frame.bottom + _GAP)
+            _cross(plot.place(scale.places[place], panel.values[place]), "cross")
+    return _legend_of_curves(body, plotted, y=plot.bottom + _GAP)
 
 
 def _ends(plotted: Plotted) -> tuple[float, float]:
@@ -102,11 +102,11 @@ def _ends(plotted: Plotted) -> tuple[float, float]:
     return (float(min(one.min() for one in known)), float(max(one.max() for one in known))) if known else (0.0, 0.0)
 
 
-def _curve(frame: Frame, scale: PlotScale, panel: Panel) -> None:
+def _curve(plot: PlotArea, scale: PlotScale, panel: Panel) -> None:
     css, known = _css(panel), np.isfinite(panel.values)
     if not scale.are_choices:
         d = "".join(
-            f"{'L' if joined else 'M'}{frame.point(x, y)}"
+            f"{'L' if joined else 'M'}{plot.point(x, y)}"
             for x, y, joined in zip(
                 scale.places[known].tolist(),
                 panel.values[known].tolist(),
@@ -114,10 +114,10 @@ def _curve(frame: Frame, scale: PlotScale, panel: Panel) -> None:
                 strict=True,
             )
         )
-        SubElement(frame.plot, "path", {"class": f"curve {css}", "d": d})
+        SubElement(plot.paths, "path", {"class": f"curve {css}", "d": d})
     if scale.are_choices or known.size <= _MOST_MARKED:
         for x, y in zip(scale.places[known].tolist(), panel.values[known].tolist(), strict=True):
-            draw_mark(frame.area, css, x=frame.x(x), y=frame.y(y))
+            draw_mark(plot.area, css, x=plot.x(x), y=plot.y(y))
 
 
 def _css(panel: Panel) -> str:
@@ -183,33 +183,33 @@ def _maps(body: Element, plotted: Plotted, *, y: int) -> int:
         y = paragraph(body, f"{panel.model} model", y=y, css="head")
         height = min(_MOST_MAP, max(_LEAST_MAP, _CELL * up.places.size))
         rulers = (_ruler(one, as_cells=True) for one in (across, up))
-        frame = draw_frame(body, *rulers, y=y, height=height)
-        _cells(frame, plotted, panel, colours)
-        y = frame.bottom + _GAP
+        plot = draw_plot_area(body, *rulers, y=y, height=height)
+        _cells(plot, plotted, panel, colours)
+        y = plot.bottom + _GAP
     if plotted.panels:
         y = _bar(body, plotted, colours, y=y) + _GAP
     return _legend_of_maps(body, plotted, y=y)
 
 
-def _cells(frame: Frame, plotted: Plotted, panel: Panel, colours: _Colours) -> None:
+def _cells(plot: PlotArea, plotted: Plotted, panel: Panel, colours: _Colours) -> None:
     """Draw the cells, the line of zero, the unsafe cells and this design."""
     up, across = plotted.scales
     x, y = _edges(across.places), _edges(up.places)
-    area = SubElement(frame.plot, "g", {"class": "cells"})
-    for level, d in _runs(frame, panel.values, colours, x, y):
+    area = SubElement(plot.paths, "g", {"class": "cells"})
+    for level, d in _runs(plot, panel.values, colours, x, y):
         SubElement(area, "path", {"d": d, "fill": colours.colour(level)})
     if plotted.has_zero:
-        d = "".join(f"M{frame.point(*start)}L{frame.point(*end)}" for start, end in _border(panel.values, x, y))
-        SubElement(frame.plot, "path", {"class": "border", "d": d})
+        d = "".join(f"M{plot.point(*start)}L{plot.point(*end)}" for start, end in _border(panel.values, x, y))
+        SubElement(plot.paths, "path", {"class": "border", "d": d})
     rows, columns = np.nonzero(panel.unsafe)
     every = -(-rows.size // _MOST_CROSSED) or 1
     for row, column in zip(rows[::every].tolist(), columns[::every].tolist(), strict=True):
-        _cross(frame.place(across.places[column], up.places[row]), "below", "above")
+        _cross(plot.place(across.places[column], up.places[row]), "below", "above")
     if up.own is not None and across.own is not None:
-        _own(frame.place(across.own, up.own))
+        _own(plot.place(across.own, up.own))
 
 
-def _runs(frame: Frame, values: Array, colours: _Colours, x: Array, y: Array) -> Iterator[tuple[int, str]]:
+def _runs(plot: PlotArea, values: Array, colours: _Colours, x: Array, y: Array) -> Iterator[tuple[int, str]]:
     """One path for each colour: neighbours of a row that have it are one rectangle."""
     known = np.isfinite(values)
     levels = np.where(known, colours.levels(np.where(known, values, 0.0)), -1)
@@ -219,7 +219,7 @@ def _runs(frame: Frame, values: Array, colours: _Colours, x: Array, y: Array) ->
         for start, end in pairwise((*starts, line.size)):
             if line[start] >= 0:
                 (left, top), (right, bottom) = (
-                    frame.point(x[column], y[edge]).split() for column, edge in ((start, row + 1), (end, row))
+                    plot.point(x[column], y[edge]).split() for column, edge in ((start, row + 1), (end, row))
                 )
                 paths.setdefault(int(line[start]), []).append(f"M{left} {top}H{right}V{bottom}H{left}Z")
     for level, pieces in sorted(paths.items()):

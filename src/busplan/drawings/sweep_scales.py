@@ -14,8 +14,6 @@ from busplan.profile.kinds import words_of
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
-_MOST_LABELS: Final = 16
-"""Most labels along an axis of choices."""
 _NO_UNITS: Final = ("_per_s", "_mbit_s", "_mm_s")
 """Ends of keys that a label keeps as they are."""
 
@@ -38,13 +36,6 @@ class PlotScale(NamedTuple):
     def are_choices(self) -> bool:
         """Whether the values are choices that no number line joins."""
         return bool(self.labels)
-
-    @property
-    def marks(self) -> tuple[list[int], list[str]]:
-        """Places and names of the choices that have a label."""
-        step = 1 + (len(self.labels) - 1) // _MOST_LABELS
-        shown = range(0, len(self.labels), step)
-        return list(shown), [self.labels[one] for one in shown]
 
 
 def plot_scale(profile: Profile, key: str, axis: Values, *, as_cells: bool) -> PlotScale:

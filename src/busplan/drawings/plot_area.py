@@ -63,13 +63,13 @@ def choices(label: str, names: tuple[str, ...], *, own: int | None = None) -> Ru
     return Ruler(label, -0.5, len(names) - 0.5, names, own)
 
 
-class Frame(NamedTuple):
+class PlotArea(NamedTuple):
     """A plot of which scales and lines are drawn."""
 
     area: Element
     """The plot with text and marks: x in percent, y in px of the drawing."""
-    plot: Element
-    """The plot of paths in the coordinates of `point`, clipped to it. In a PNG nothing in it is stretched."""
+    paths: Element
+    """Its paths, in the coordinates of `point`, clipped to it. In a PNG nothing in it is stretched."""
     across: Ruler
     up: Ruler
     top: int
@@ -104,7 +104,7 @@ class Frame(NamedTuple):
         return SubElement(self.area, "svg", box)
 
 
-def draw_frame(body: Element, across: Ruler, up: Ruler, *, y: int, height: int) -> Frame:
+def draw_plot_area(body: Element, across: Ruler, up: Ruler, *, y: int, height: int) -> PlotArea:
     """Draw both scales with their labels, and the lines of numbers.
 
     Parameters
@@ -133,9 +133,9 @@ def draw_frame(body: Element, across: Ruler, up: Ruler, *, y: int, height: int) 
         if not up.names:
             SubElement(area, "line", {"x1": "0", "x2": "100%", "y1": at, "y2": at, "class": "rule"})
         text_at(body, mark.label, x=f"{gutter - 2:.5g}%", y=round(float(at)) + 4, css="small", anchor="end")
-    plot = SubElement(area, "svg", {**stretched, "viewBox": f"0 0 {width:.1f} {height}"})
+    paths = SubElement(area, "svg", {**stretched, "viewBox": f"0 0 {width:.1f} {height}"})
     draw_across(area, across, y=top + height, room=PHONE * (99 - gutter) / 100)
-    return Frame(area, plot, across, up, top, height, width, top + height + 2 * LINE + 4)
+    return PlotArea(area, paths, across, up, top, height, width, top + height + 2 * LINE + 4)
 
 
 def draw_across(area: Element, across: Ruler, *, y: int, room: float) -> None:
