@@ -101,7 +101,7 @@ HEADLINES = {
     "diff": "<DiffAnswer: B is better in 16 figures: corrected margin, safe nodes, safe axes, smallest safe period and "
     "12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",
-    "explain all": "<ExplainAnswer: paper-1ms: 43 assumptions behind its figures>",
+    "explain all": "<ExplainAnswer: paper-1ms: 44 assumptions behind its figures>",
     "calibrate": "<CalibrateAnswer: paper-1ms: Table: the mean at each payload, 4 to 1024 bytes.>",
     "report": "<ReportAnswer: paper-1ms: fits>",
 }

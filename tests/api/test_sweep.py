@@ -42,7 +42,7 @@ def test_numbers_are_numbers_and_words_are_text() -> None:
     answer = busplan.sweep("paper-4ms", vary=GRID)
     kinds = {name: answer[name].dtype.kind for name in answer}
     words = {
-        *("bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded"),
+        *("bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded", "not_shown"),
         *("safe_limited_by", "verdict"),
     }
     assert {name for name, kind in kinds.items() if kind == "U"} == words
