@@ -115,6 +115,7 @@ def test_the_registry_holds_every_key_of_the_results() -> None:
         *(
             *CAPACITY_KEYS,
             "models_agree",
+            "missed_limits",
             "verdict_after_reset",
             "uncertainty_parts",
             "reserve",

@@ -13,6 +13,7 @@ import json
 import math
 import random
 import re
+import resource
 import signal
 import sys
 import tempfile
@@ -48,6 +49,8 @@ LONGEST_S: Final = 5.0
 HANG_S: Final = 10.0
 """Of processor time, so that a busy machine makes no hang."""
 MOST_MB: Final = 300.0
+MOST_BYTES: Final = 4 << 30
+"""Of the whole run, so that a call that takes them fails, and not the machine."""
 SHORT_STEPS: Final = 50_000
 """Of a circle that is run; the goal of five seconds is for all but circles."""
 FILE: Final = "p.toml"
@@ -444,6 +447,10 @@ TELLERS: Final[Mapping[tuple[str, ...], Callable[[Any], Data]]] = {
 """Commands with a verdict, and where their documents tell it."""
 
 
+GATE_CODES: Final = ("BP103", "BP104", "BP105", "BP203")
+"""Findings on what capacity tells beside the verdict."""
+
+
 def deciding(rows: list[Data]) -> Data:
     """The row of the timing model that decides."""
     return next(row for row in rows if row["verdict"] is not None)
@@ -452,51 +459,57 @@ def deciding(rows: list[Data]) -> Data:
 def disagreements(profile: Profile) -> Iterator[tuple[tuple[str, ...], str]]:
     """Commands that do not tell of a profile what capacity tells, and what they tell."""
     values = {"ratio": profile.cycle.slice_ratio, "reserve": profile.limits.reserve, "kind": profile.bus.kind}
-    said = {}
+    own: Data = {}
     for (name, *options), find in TELLERS.items():
         done = call(name, FILE, *(one.format(**values) for one in options), "--format", "json")
-        if not done.out:  # as a timeline of too many events
-            yield from ((done.arguments, one) for one in broken_promises(done, "json"))
-            if name == "capacity":
-                return
-            continue
-        said[name] = document = find(json.loads(done.out))
-        if name == "capacity":
-            own, results = document, deciding(json.loads(done.out)["results"])
-            yield from ((done.arguments, one) for one in others(document, {**results}, "its figures"))
-            own = {**results, **document}
-        elif name == "check":
-            codes = {one["code"] for one in document["findings"]}
-            if ("BP203" in codes) != bool(own["circle_refused_by"]):
-                yield done.arguments, f"{codes}, and the circle is refused by {own['circle_refused_by']}"
-            if own["verdict"] != "fits" and done.code == 0:
-                yield done.arguments, f"is content, and capacity says {own['verdict']}"
-        elif name == "plan" and document["passes"] and (own["verdict"] != "fits" or own["circle_refused_by"]):
-            yield done.arguments, f"passes, and capacity says {own['verdict']}, {own['circle_refused_by']}"
-        yield from ((done.arguments, one) for one in others(document, own, "capacity"))
-    rows = list(csv.DictReader(StringIO(call("capacity", FILE, "--format", "csv").out.decode(), newline="")))
+        if done.out:
+            said = json.loads(done.out)
+            if not own:
+                own = {**deciding(said["results"]), **find(said)}
+                yield from (
+                    (done.arguments, one) for one in others(find(said), deciding(said["results"]), "its figures")
+                )
+            told = (*others(find(said), own, "capacity"), *unlike(name, find(said), own))
+        else:  # as a timeline of too many events
+            told = (*broken_promises(done, "json"),)
+        yield from ((done.arguments, one) for one in told)
+        if not own:
+            return
+    yield from ((("capacity", FILE), one) for one in otherwise_in_forms(profile, own))
+
+
+def unlike(name: str, said: Data, own: Data) -> Iterator[str]:
+    """What a gate or a plan says that does not go with the capacity."""
+    is_well = own["verdict"] == "fits" and not own["circle_refused_by"] and not own["missed_limits"]
+    if name == "plan" and said["passes"] and not is_well:
+        yield f"passes, and capacity is {own['verdict']}, {own['circle_refused_by']}, {own['missed_limits']}"
+    if name != "check":
+        return
+    keys = {code: {one["key"] for one in said["findings"] if one["code"] == code} for code in GATE_CODES}
+    if not is_well and said["status"] == "ok":
+        yield f"has no finding, and capacity is {own['verdict']}, {own['circle_refused_by']}, {own['missed_limits']}"
+    if bool(keys.pop("BP203")) != bool(own["circle_refused_by"]):
+        yield f"has {said['findings']}, and capacity {own['circle_refused_by']}"
+    if own["verdict"] == "fits" and set().union(*keys.values()) != set(own["missed_limits"]):
+        yield f"has {keys}, and capacity {own['missed_limits']}"
+
+
+def otherwise_in_forms(profile: Profile, own: Data) -> Iterator[str]:
+    """What capacity says otherwise as CSV, as text and in Python than as JSON."""
+    rows = csv.DictReader(StringIO(call("capacity", FILE, "--format", "csv").out.decode(), newline=""))
     row = next(one for one in rows if one["verdict"])
-    yield from (
-        (("capacity", FILE, "--format", "csv"), f"{key} {row[key]}, and JSON has {own[key]}")
-        for key in ("verdict", "safe_limited_by", "circle_refused_by")
-        if row[key] != (own[key] if isinstance(own[key], str) else " ".join(own[key] or ()))
-    )
-    text = call("capacity", FILE, "--format", "table", "--all").out.decode()
-    if (f": {own['verdict']}" not in text) or (
-        ("cannot be run" in text.split("\n")[0]) != bool(own["circle_refused_by"])
-    ):
-        yield ("capacity", FILE), f"says {text.splitlines()[:2]}, and JSON {own['verdict']}, {own['circle_refused_by']}"
-    answer = busplan.capacity(profile).verdicts[0].deciding
-    yield from (
-        (("Python",), f"{key} {getattr(answer, key)}, and JSON has {own[key]}")
-        for key in TOLD
-        if plain_data(getattr(answer, key)) != own[key]
-    )
-
-
-def plain_data(value: object) -> object:
-    """A value as JSON has it."""
-    return list(value) if isinstance(value, tuple) else value
+    for key in ("verdict", "safe_limited_by", "circle_refused_by"):
+        if row[key] != (own[key] if isinstance(own[key], str) else " ".join(own[key] or ())):
+            yield f"{key} {row[key]} as CSV, and {own[key]} as JSON"
+    text = call("capacity", FILE, "--format", "table").out.decode()
+    is_refused = "cannot be run at" in text.partition("\n")[0]
+    if f": {own['verdict']}" not in text or is_refused != bool(own["circle_refused_by"]):
+        yield f"{text[:300]} as text, and {own['verdict']}, {own['circle_refused_by']} as JSON"
+    figures = busplan.capacity(profile).verdicts[0].deciding
+    for key in TOLD:
+        value = getattr(figures, key)
+        if (list(value) if isinstance(value, tuple) else value) != own[key]:
+            yield f"{key} {value} in Python, and {own[key]} as JSON"
 
 
 def others(one: Data, other: Data, name: str) -> Iterator[str]:
@@ -574,9 +587,10 @@ def main() -> int:
     parser.add_argument("--calls", type=int, default=6, help="calls of each profile")
     parser.add_argument("--quiet", action="store_true", help="failures without their profiles")
     options = parser.parse_args()
-    rng, counts, kinds, failures = random.Random(options.seed), Counter[str](), kind_names(), 0
+    counts, kinds, failures = Counter[str](), kind_names(), 0
     every = [(command, form) for command in commands() for form in command.forms]
     said = set()
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         for number in range(options.profiles):
             # A number of its own for each profile, so that one can be made again alone.

@@ -234,6 +234,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
         "verdict": figures.verdict,
         "fits": figures.fits,
         "circle_refused_by": list(figures.circle_refused_by),
+        "missed_limits": [need.key for need in verdict.missed_limits],
         "models_agree": verdict.models_agree,
         "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
         **safety_record(figures, result.profile),

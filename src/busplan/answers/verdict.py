@@ -69,6 +69,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     figures = verdict.deciding
     at = places.get("verdict", "")
     yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
+    yield from _missed_limits(verdict, profile)
     yield _headline(verdict, profile, at=at)
     yield from not_in_it(profile)
     yield from evidence_sentence(bus_of(profile))
@@ -98,6 +99,14 @@ def refused_circle(profile: Profile) -> Iterator[Sentence]:
     if causes:
         subject = ("The circle of ", Code(profile.name), " cannot be run at ", period_value(profile.cycle.period_us))
         yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
+
+
+def _missed_limits(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
+    """Say which keys of [limits] a cycle that fits does not hold."""
+    missed = verdict.missed_limits if verdict.deciding.verdict == FITS else ()
+    for need in missed:
+        subject = (Code(profile.name), " at ", period_value(verdict.period_us), " does not hold its [limits]: ")
+        yield Sentence((*subject, need.words(verdict.deciding.available_us), "."), "fails")
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
@@ -152,7 +161,8 @@ def _place(at: str, key: str) -> str:
 
 
 def _headline(verdict: Verdict, profile: Profile, *, at: str) -> Sentence:
-    alone = ", the bus alone: " if verdict.deciding.circle_refused_by else ": "
+    is_more = verdict.deciding.circle_refused_by or verdict.missed_limits
+    alone = ", the bus alone: " if is_more else ": "
     subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), alone)
     parts = (*subject, *verdict_story(verdict.deciding, profile, at=at).parts)
     return Sentence(parts, state_of(verdict.all_well))
@@ -377,8 +387,9 @@ def period_must_change(profile: Profile) -> str:
 
 def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     """Say that no change is advised, and why."""
-    fits = verdict.deciding.verdict == FITS
-    purpose = "carries more nodes" if verdict.all_well else "makes it safe" if fits else "makes it fit"
+    figures = verdict.deciding
+    cured = "makes it fit" if figures.verdict != FITS else "makes it safe" if not figures.safe else "passes `check`"
+    purpose = "carries more nodes" if verdict.all_well else cured
     words = f"No change of {listed(changeable(profile), 'and')} {purpose}: {verdict.no_change}."
     return Sentence((words,), "neutral" if verdict.all_well else "fails")
 

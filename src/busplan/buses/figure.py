@@ -296,6 +296,13 @@ CERTAINTY: Final = (
 """Figures of the timing model that decides; under another they do not exist."""
 VERDICT_FIGURES: Final = (
     Figure(
+        "missed_limits",
+        "missed",
+        _CYCLE,
+        "keys of [limits] that ask for more than the slice gives",
+        sort="words",
+    ),
+    Figure(
         "models_agree",
         "models agree",
         _CYCLE,

@@ -6,6 +6,7 @@ from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import Capacity, CapacityFigures, figures
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.advice import Change, advice
+from busplan.analysis.planning.constraints import Need, missed_limits
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -18,6 +19,8 @@ class Verdict(NamedTuple):
     """Figures of the timing model that decides, whatever was asked for."""
     others: tuple[CapacityFigures, ...]
     """Figures of the other models that were asked for."""
+    missed_limits: tuple[Need, ...]
+    """What keys of [limits] ask for, and the slice does not give."""
     after_reset: CapacityFigures | None
     """Figures after a bus reset, where the cycle fits as it is set and is not shown to fit then."""
     change: Change | None
@@ -33,8 +36,9 @@ class Verdict(NamedTuple):
 
     @property
     def all_well(self) -> bool:
-        """Whether the cycle is shown to fit, the bus is set safely, and nothing keeps the circle from being run."""
-        return self.deciding.verdict == FITS and self.deciding.safe and not self.deciding.circle_refused_by
+        """Whether the cycle is shown to fit, on a safe bus, within [limits], and the circle can be run."""
+        one = self.deciding
+        return one.verdict == FITS and one.safe and not one.circle_refused_by and not self.missed_limits
 
 
 def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
@@ -51,6 +55,7 @@ def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
         period_us=deciding.period_us,
         deciding=deciding,
         others=tuple(one for one in results if one is not deciding),
+        missed_limits=missed_limits(profile),
         after_reset=after_reset(profile, deciding),
         change=change,
         no_change=no_change,

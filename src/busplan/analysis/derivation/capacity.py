@@ -32,7 +32,7 @@ from busplan.forms.numbers import listed
 from busplan.sections.profile import Profile
 
 _SENTENCES: Final = "sentences on what the command computes"
-OF_DOCUMENT: Final = ("verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
+OF_DOCUMENT: Final = ("missed_limits", "verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")
 """Figures whose values the document of `capacity` has."""
 OF_SENSITIVITY: Final = ("sensitivity", "next_bottleneck")
 """Those that it has with --sensitivity."""

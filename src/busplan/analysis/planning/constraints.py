@@ -5,7 +5,7 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
 from busplan.analysis.circle.refusal import circle_refusals, step_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
@@ -87,6 +87,13 @@ def spare(profile: Profile) -> Iterator[Need]:
 
 
 CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, utilisation, spare)
+
+
+def missed_limits(profile: Profile) -> tuple[Need, ...]:
+    """What each key of [limits] asks that the slice of a profile does not give; the verdict is not among it."""
+    given_us = available_us(network_of(profile))
+    asked = (need for constraint in CONSTRAINTS[1:] for need in constraint(profile))
+    return tuple(need for need in asked if not fits_in(need.us, available_us=given_us))
 
 
 def needs(profile: Profile) -> list[Need]:
