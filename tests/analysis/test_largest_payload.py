@@ -92,4 +92,4 @@ def test_a_payload_is_the_largest_that_is_in_time(own: int) -> None:
         return figures(sized, model="standard", with_counts=False).verdict == FITS
 
     good = [size for size in range(4, own + 1, 4) if is_good(size)]
-    assert best.profile.payload.read_bytes == max(good)
+    assert network_of(best.profile).largest_payload_bytes == max(good)

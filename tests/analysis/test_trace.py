@@ -155,6 +155,7 @@ def test_lines_and_inputs_are_listed_once_and_in_order() -> None:
 def test_a_sum_of_thousands_is_short_and_has_all_its_inputs() -> None:
     each = [Traced(float(n), given=Input(f"x{n}", f"key{n}", n, "", "given", "", "")) for n in range(5000)]
     whole = 2 * total(one * 3 for one in each)
+    assert isinstance(whole, Traced)
     text = formula_text(whole, in_numbers=False)
     assert text == "2 (x0 * 3 + x1 * 3 + x2 * 3 + ... 4996 more ... + x4999 * 3)"
     assert len(list(inputs(whole))) == 5000
