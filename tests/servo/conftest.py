@@ -1,6 +1,7 @@
 """References that owe nothing to the code under test: scipy and python-control."""
 
 import importlib.util
+import math
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -49,14 +50,18 @@ def plant(axis: Axis, *, period_s: float, delay_s: float) -> control.StateSpace:
 
 def open_loop(axis: Axis, timing: LoopTiming) -> control.StateSpace:
     period_s = timing.control_period_us / 1e6
-    delay_s = min(axis.delay_us, timing.period_us) / 1e6 if timing.loop == "host" else 0.0
+    delay_s = axis.delay_us / 1e6 if timing.loop == "host" else 0.0
+    # A delay of whole periods and a rest: each period is a shift.
+    waiting = max(math.ceil(delay_s / period_s - 1e-9) - 1, 0)
     controller = control.tf([axis.position_gain_per_s], [1], period_s)
     if axis.integral_gain_per_s2:
         controller += control.tf([axis.integral_gain_per_s2 * period_s, 0], [1, -1], period_s)
     if axis.derivative_gain:
         gain = axis.derivative_gain / period_s
         controller += control.tf([gain, -gain], [1, 0], period_s)
-    return plant(axis, period_s=period_s, delay_s=delay_s) * control.ss(controller)
+    if waiting:
+        controller *= control.tf([1], [1, *[0] * waiting], period_s)
+    return plant(axis, period_s=period_s, delay_s=delay_s - waiting * period_s) * control.ss(controller)
 
 
 @pytest.fixture(scope="session")

@@ -142,7 +142,7 @@ def test_a_p_loop_cuts_the_circle_as_the_continuous_one_does_in_the_limit() -> N
     assert 2 * fine - coarse == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.parametrize("delays_us", [(0.0, 1000.0), (300.0, 700.0), (1000.0, 1000.0)])
+@pytest.mark.parametrize("delays_us", [(0.0, 1000.0), (300.0, 700.0), (1000.0, 1000.0), (1300.0, 3000.0)])
 def test_delays_of_a_host_that_differ_make_an_ellipse(reference_loop: Loop, delays_us: tuple[float, float]) -> None:
     timing = LoopTiming(period_us=1000.0, step_us=1000.0, loop="host")
     axes = [an_axis(delay_us=delay_us) for delay_us in delays_us]

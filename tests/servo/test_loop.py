@@ -28,7 +28,7 @@ CONTROLLERS: list[dict[str, float]] = [
 ]
 NODE = LoopTiming(period_us=500.0, step_us=500.0)
 HOST = LoopTiming(period_us=1000.0, step_us=250.0, loop="host")
-PLACES = [(NODE, 0.0), (HOST, 0.0), (HOST, 317.0), (HOST, 1000.0)]
+PLACES = [(NODE, 0.0), (HOST, 0.0), (HOST, 317.0), (HOST, 1000.0), (HOST, 2317.0)]
 """Timing, and delay of the axis."""
 
 
@@ -132,9 +132,11 @@ def test_a_host_that_is_one_period_late_is_python_controls_own_sampling_and_a_de
     assert found.crossover_hz == pytest.approx(crossover / (2 * math.pi), rel=1e-5)
 
 
-def test_a_delay_beyond_the_period_is_one_of_a_period() -> None:
-    whole, longer = (loop_margins(an_axis(delay_us=delay_us), timing=HOST) for delay_us in (1000.0, 5000.0))
-    assert whole == longer != loop_margins(an_axis(delay_us=999.0), timing=HOST)
+def test_each_period_of_a_delay_takes_its_phase() -> None:
+    first, longer = (loop_margins(an_axis(delay_us=delay_us), timing=HOST) for delay_us in (1000.0, 5000.0))
+    assert first.crossover_hz == longer.crossover_hz
+    lost_deg = 360 * (first.crossover_hz or 0) * 4000.0e-6
+    assert longer.phase_margin_deg == pytest.approx((first.phase_margin_deg or 0) - lost_deg)
     assert loop_margins(an_axis(delay_us=5000.0), timing=NODE) == loop_margins(an_axis(), timing=NODE)
 
 
@@ -161,7 +163,7 @@ plants = st.fixed_dictionaries(
         "drive_lag_us": st.one_of(st.just(0.0), st.floats(10, 1e5)),
     }
 )
-delays = st.one_of(st.sampled_from([0.0, 1000.0]), st.floats(0, 1000))
+delays = st.one_of(st.sampled_from([0.0, 1000.0, 2000.0]), st.floats(0, 1000), st.floats(1000, 5000))
 
 
 @settings(max_examples=60)
@@ -291,9 +293,12 @@ def literal_host(setpoints: Floats, *, axis: Axis, timing: LoopTiming, arriving:
     cycles = len(setpoints) - 1
     at = np.arange(cycles + 1) * timing.period_us + arriving.offsets_us
     events: list[tuple[float, float, int]] = [(t, 2, 0) for t in times_us]
+    # A command takes effect with the next packet at the latest; an older one has waited for its turn.
+    waited = max(math.ceil(axis.delay_us / timing.period_us) - 1, 0)
+    rest_us = axis.delay_us - waited * timing.period_us
     for k in range(cycles):
         events.append((at[k], 1, k))
-        events.append((min(at[k] + axis.delay_us, at[k + 1]), 0 if axis.delay_us else 1.5, k))
+        events.append((min(at[k] + rest_us, at[k + 1]), 0 if rest_us else 1.5, k))
     position, velocity, command, integral, now, seen = setpoints[0], 0.0, 0.0, 0.0, 0.0, []
     commands: dict[int, float] = {}
     for time_us, kind, k in sorted(events):
@@ -310,11 +315,11 @@ def literal_host(setpoints: Floats, *, axis: Axis, timing: LoopTiming, arriving:
             forward = axis.velocity_feedforward * (setpoints[k + 1] - setpoints[k]) / (timing.period_us / 1e6)
             commands[k] = axis.position_gain_per_s * error + axis.integral_gain_per_s2 * integral + forward
         elif not arriving.lost[k]:
-            command = commands[k]
+            command = commands.get(k - waited, 0.0)
     return np.array(seen)
 
 
-@pytest.mark.parametrize("delay_us", [0.0, 250.0, 731.0, 1000.0, 1400.0])
+@pytest.mark.parametrize("delay_us", [0.0, 250.0, 731.0, 1000.0, 1400.0, 3000.0])
 @pytest.mark.parametrize(
     "delivery", [Delivery(), Delivery(jitter_us=170.0, skew_us=23.0, loss_probability=0.1, seed=4)]
 )

@@ -5,7 +5,7 @@ from libc.stdint cimport int64_t
 
 cdef int64_t CONTROL, SWITCH, STORE
 cdef double ROUND
-cdef Py_ssize_t INTEGRAL, LAST_ERROR
+cdef Py_ssize_t INTEGRAL, LAST_ERROR, QUEUE
 
 
 @cython.locals(
@@ -14,7 +14,7 @@ cdef Py_ssize_t INTEGRAL, LAST_ERROR
     disturbance=double, sign=double, command=double, pending=double, remembers=bint, stored=Py_ssize_t, row=Py_ssize_t,
     act=int64_t, control=int64_t, switch=int64_t, store=int64_t, aim=double, move=double, feed=double, dt=double,
     keep=double, shift=double, fade=double, fade_shift=double, error=double, turned=double, wanted=double, lag=double,
-    _=int64_t,
+    newest=double, last=Py_ssize_t, place=Py_ssize_t, _=int64_t,
 )
 cpdef Py_ssize_t run_rows(
     double[::1] state,

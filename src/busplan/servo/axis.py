@@ -73,7 +73,8 @@ def simulate_axis(
 
     A node with linear interpolation moves its target on the line between the last two set-points and reaches the newest
     one after a period; with hold, it uses each set-point a period late. A loop on the host samples at each synchronous
-    packet; its command takes effect `delay_us` later, at the latest with the next such packet.
+    packet; its command takes effect `delay_us` later, whole periods of which it waits for its turn, and then with the
+    next such packet at the latest.
 
     The drive follows command plus offset as a first-order lag. Coulomb friction, ``-reversal tanh(v / smoothing)``
     with the drive velocity v, disturbs the velocity; the disturbance decays with the time constant of its recovery.
@@ -98,7 +99,7 @@ def simulate_axis(
     position_mm = np.empty(checked_steps(setpoints_mm, axis=axis, timing=timing))
     compiled = compiled_kernel(engine)
     chunk_steps = _CHUNK_STEPS[compiled is not None]
-    state, constants, done = _at_rest(setpoints_mm[0], axis), _constants(axis, timing), 0
+    state, constants, done = _at_rest(setpoints_mm[0], axis, timing), _constants(axis, timing), 0
     for rows in kernel_rows(setpoints_mm, axis=axis, timing=timing, arrivals=arrivals, chunk_steps=chunk_steps):
         out = position_mm[done:]
         # Compiled code checks no bounds.
@@ -153,11 +154,12 @@ def _run_plain(state: Floats, constants: Constants, rows: KernelRows, out: Float
     return stored
 
 
-def _at_rest(position_mm: float, axis: Axis) -> Floats:
-    """State of the kernel for an axis at rest on its target."""
+def _at_rest(position_mm: float, axis: Axis, timing: LoopTiming) -> Floats:
+    """State of the kernel for an axis at rest on its target; commands that wait there are zero."""
     resolution = axis.encoder_resolution_mm
     error = position_mm - (position_mm * (1 / resolution) + ROUND - ROUND) * resolution if resolution else 0.0
-    return np.array([position_mm, 0.0, 0.0, 0.0, 0.0, 0.0, error])
+    waiting = timing.delay_parts(axis.delay_us)[0] if timing.loop == "host" else 0
+    return np.array([position_mm, 0.0, 0.0, 0.0, 0.0, 0.0, error, *[0.0] * waiting])
 
 
 def _constants(axis: Axis, timing: LoopTiming) -> Constants:

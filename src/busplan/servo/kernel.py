@@ -21,6 +21,8 @@ ROUND = 6755399441055744.0
 
 INTEGRAL = 5
 LAST_ERROR = 6
+QUEUE = 7
+"""Place of the oldest command that waits for its turn; further ones stand behind it."""
 
 Constants = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
@@ -30,7 +32,7 @@ highest command [mm/s], levels [s/mm], level [mm/s], drive offset [mm/s], fricti
 An element whose ki, kd, counts, levels or friction is 0 is left out."""
 
 
-def run_rows(  # noqa: C901, PLR0915 - calls would cost more than the arithmetic
+def run_rows(  # noqa: C901, PLR0912, PLR0915 - calls would cost more than the arithmetic
     state: MutableSequence[float],
     constants: Constants,
     out: MutableSequence[float],
@@ -51,7 +53,8 @@ def run_rows(  # noqa: C901, PLR0915 - calls would cost more than the arithmetic
     ----------
     state
         Position [mm], drive velocity [mm/s], friction disturbance [mm/s], friction sign [1], command in effect [mm/s],
-        integral of the error [mm s], last error [mm]; updated in place.
+        integral of the error [mm s], last error [mm], and the commands that wait for their turn, the oldest first
+        [mm/s]; updated in place. A control puts its command behind them and takes the oldest out.
     constants
         See `Constants`.
     out
@@ -69,6 +72,7 @@ def run_rows(  # noqa: C901, PLR0915 - calls would cost more than the arithmetic
     # Every chunk begins with a control, so no command is pending between chunks.
     pending = command
     remembers = ki > 0.0 or kd > 0.0
+    last = len(state) - 1
     stored = 0
     for row in range(len(substeps)):
         act = action[row]
@@ -104,6 +108,12 @@ def run_rows(  # noqa: C901, PLR0915 - calls would cost more than the arithmetic
                         state[INTEGRAL] -= error * period
                 if levels > 0.0:
                     pending = (pending * levels + ROUND - ROUND) * level
+                if last >= QUEUE:
+                    newest = pending
+                    pending = state[QUEUE]
+                    for place in range(QUEUE, last):
+                        state[place] = state[place + 1]
+                    state[last] = newest
                 aim += move
             if switch:
                 command = pending

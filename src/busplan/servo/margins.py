@@ -98,7 +98,8 @@ def loop_margins(axis: Axis, *, timing: LoopTiming) -> LoopMargins:
 
         C = kp + ki h z / (z - 1) + kd (z - 1) / (h z)
 
-    and the zero-order-hold equivalent of exp(-s Td) / (s (tau s + 1)) for any 0 <= Td <= h (modified z-transform):
+    and the zero-order-hold equivalent of exp(-s Td) / (s (tau s + 1)) for any 0 <= Td <= h (modified z-transform; each
+    whole period of a longer delay is a further 1 / z):
 
         G = ((h - Td) z + Td) / (z (z - 1)) - tau (b0 z + b1) / (z (z - p)),
         p = exp(-h / tau), b0 = 1 - exp(-(h - Td) / tau), b1 = exp(-(h - Td) / tau) - p.
@@ -173,7 +174,8 @@ def loop_gain(frequency_hz: Floats, *, axis: Axis, timing: LoopTiming) -> NDArra
 def _loop(axis: Axis, timing: LoopTiming) -> tuple[Floats, Floats]:
     """Numerator and denominator of the open loop in w = z - 1, highest power first."""
     period = timing.control_period_us / _US_PER_S
-    delay = min(axis.delay_us, timing.period_us) / _US_PER_S if timing.loop == "host" else 0.0
+    waiting, rest_us = timing.delay_parts(axis.delay_us) if timing.loop == "host" else (0, 0.0)
+    delay = rest_us / _US_PER_S
     lag = axis.drive_lag_us / _US_PER_S
     z, integrator, derivative = np.array([1.0, 1.0]), np.array([1.0, 0.0]), np.array([1.0, 0.0])
     proportional = axis.position_gain_per_s * z
@@ -188,6 +190,8 @@ def _loop(axis: Axis, timing: LoopTiming) -> tuple[Floats, Floats]:
     motion = np.polymul([rest, period], drive_pole)
     lagging = lag * np.polymul([moved, decayed], integrator)
     plant_poles = np.polymul(np.polymul(z, integrator), drive_pole)
+    for _ in range(waiting):
+        plant_poles = np.polymul(plant_poles, z)
     return np.polymul(control, np.polysub(motion, lagging)), np.polymul(control_poles, plant_poles)
 
 

@@ -4,6 +4,7 @@ Zero means ideal: no lag, no offset, no play, no quantisation. Profiles take nam
 from these fields. This module does not need numpy, so that profiles can be validated without it.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -28,6 +29,10 @@ MAX_LENGTH_MM = 1e6
 MAX_SPEED_MM_S = 1e6
 _MIN_SPEED_MM_S = 1e-6
 _MAX_PPM = 1e5
+_ROUNDING_PERIODS = 1e-9
+"""Tolerance in periods, so that rounding does not add one to a delay."""
+LONGEST_DELAY_PERIODS = 16
+"""Most periods from a sample to its command; a loop with more needs another controller than this one."""
 FINEST_ENCODER_MM = 1e-9
 """A picometre: a float of 53 bits cannot count finer steps over metres of travel."""
 
@@ -39,7 +44,7 @@ class Axis:
     Parameters
     ----------
     delay_us
-        Time Td from a sample until its command takes effect, at most one period; used only by a loop on the host [us].
+        Time Td from a sample until its command takes effect; used only by a loop on the host [us].
 
     Raises
     ------
@@ -191,6 +196,23 @@ class LoopTiming:
     def control_period_us(self) -> float:
         """Time from one run of the position loop to the next [us]."""
         return self.step_us if self.loop == "node" else self.period_us
+
+    def delay_parts(self, delay_us: float) -> tuple[int, float]:
+        """Periods that a command waits in a loop on the host [1], and the rest of its delay, up to one period [us].
+
+        Parameters
+        ----------
+        delay_us
+            Time from a sample until its command takes effect [us].
+
+        Examples
+        --------
+        >>> timing = LoopTiming(period_us=1000, step_us=100, loop="host")
+        >>> [timing.delay_parts(delay_us) for delay_us in (0, 400, 1000, 2100)]
+        [(0, 0), (0, 400), (0, 1000), (2, 100)]
+        """
+        waiting = max(math.ceil(delay_us / self.period_us - _ROUNDING_PERIODS) - 1, 0)
+        return waiting, min(delay_us - waiting * self.period_us, self.period_us)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -211,8 +211,9 @@ def _host_rows(setpoints_mm: Floats, *, axis: Axis, timing: LoopTiming, arrivals
     edges = np.append(cycles, cycles[-1] + 1)
     times = edges * timing.steps_per_period + arrivals.offsets_us[edges] / timing.step_us
     sampled, following = times[:-1], times[1:]
-    # A command takes effect with the next SP at the latest.
-    switched = np.minimum(sampled + axis.delay_us / timing.step_us, following)
+    # A command takes effect with the next SP at the latest, and so does one that waited for its turn.
+    _, rest_us = timing.delay_parts(axis.delay_us)
+    switched = np.minimum(sampled + rest_us / timing.step_us, following)
     once, nothing = np.ones_like(cycles), np.zeros_like(sampled)
     pieces = [
         (once, nothing, CONTROL * once),

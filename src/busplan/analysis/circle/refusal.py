@@ -13,7 +13,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.sections.base import Section, value_at
 from busplan.sections.profile import Profile
 from busplan.servo.checks import LARGEST, ParameterError, Refused, no_multiple, parameters
-from busplan.servo.parameters import Axis, Delivery, LoopTiming
+from busplan.servo.parameters import LONGEST_DELAY_PERIODS, Axis, Delivery, LoopTiming
 from busplan.servo.runnable import (
     LONGEST_SETTLING_US,
     Move,
@@ -128,13 +128,15 @@ def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
 
 
 def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
-    """Refuse a loop on the host with more than a period of the bus in it."""
+    """Refuse a loop on the host with more of the bus in it than its controller is made for."""
     period_us, delay_us = profile.cycle.period_us, max(loop_delays_us(profile))
-    if delay_us > period_us:
-        why = f"the bus puts {delay_us:g} us into a loop over it, and the circle test knows one period"
+    most_us = LONGEST_DELAY_PERIODS * period_us
+    if delay_us > most_us:
+        known = f"the circle test knows {LONGEST_DELAY_PERIODS} periods"
+        why = f"the bus puts {delay_us:g} us into a loop over it, and {known}"
         key = bus_of(profile).loop_key
         less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
-        right = f'{why}, {period_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
+        right = f'{why}, {most_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
         yield Refused("servo.loop", '"host"', right)
 
 

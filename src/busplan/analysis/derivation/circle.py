@@ -109,9 +109,12 @@ def _delay(profile: Profile, key: str, result: CircleFigures, required: Traced) 
         return found(value, "none: the loop is closed on the node", (loop,))
     update, period_us = traced(profile, "servo.update"), traced(profile, "cycle.period_us")
     if result.update == "next_sync":
-        words = "T_s: the synchronous packet triggers the sample and the update with the last command (paper, III-C)"
+        words = (
+            "T_s: the synchronous packet triggers the sample and the update with the last command (paper, III-C); "
+            "and the periods that the kind of bus and its host add"
+        )
         return found(value, words, (loop, update, period_us))
-    words = "from the start of the cycle to the command of the axis, at most T_s: x on the first node, y on the last"
+    words = "from the sample to the end of the command's execution on the axis: x on the first node, y on the last"
     return found(value, words, (loop, update, required, period_us))
 
 
