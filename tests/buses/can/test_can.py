@@ -16,8 +16,9 @@ from busplan.buses import kind_named
 from busplan.buses.can.limits import shared_identifiers
 from busplan.buses.can.response import Sender, worst_response
 from busplan.buses.can.section import CanProfile
-from busplan.buses.can.streams import response, streams
+from busplan.buses.can.streams import streams
 from busplan.buses.can.traffic import traffic_of_profile
+from busplan.buses.can.waiting import response
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
@@ -221,7 +222,7 @@ def test_the_last_pdo_of_a_group_answers_last_of_it(data: st.DataObject) -> None
             )
             for identifier in range(own.first, own.last + 1)
         ]
-        found = response(own, each, traffic, is_stuffed=True)
+        found = response(own, traffic, is_stuffed=True)
         # A message may also meet a late cycle, and the next one soon behind it.
         assert found == alone[-1] or (own.is_message and (found is None or (alone[-1] and found.us > alone[-1].us)))
         assert found is None or all(one is not None and one.us <= found.us for one in alone)

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import pytest
 
-from busplan.buses.can.streams import Stream, deadline_share, load_before, response, streams, waits
+from busplan.buses.can.streams import Stream, load_before, streams
 from busplan.buses.can.traffic import SYNC, Message, Pdos, Traffic
+from busplan.buses.can.waiting import messages, response, waits
 from busplan.elementwise import plain
 
 if TYPE_CHECKING:
@@ -129,11 +130,10 @@ def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene 
     each = streams(sent, is_stuffed=True)
     if load_before(max(each, key=lambda one: one.last), each) > MOST_LOAD:
         return None
-    if any(deadline_share(one, each, sent) > 1 for one in each if one.is_message):
+    ranked = messages(sent, is_stuffed=True)
+    if any(ranked.deadline_share(one) > 1 for one in ranked.by_priority()):
         return None
-    bounds = {
-        one.name: response(one, each, sent, is_stuffed=True) for one in each if one.is_message or one.name == SYNC
-    }
+    bounds = {one.name: response(one, sent, is_stuffed=True) for one in each if one.is_message or one.name == SYNC}
     return Scene(sent, each, nodes, write_us, lasts_us, {name: one.us for name, one in bounds.items() if one})
 
 

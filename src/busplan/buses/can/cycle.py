@@ -1,6 +1,6 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and what other messages make it wait for."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import chain, islice
 from math import inf
@@ -9,16 +9,9 @@ from typing import Final, Literal
 from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.response import Response
-from busplan.buses.can.streams import (
-    Stream,
-    frame_sizes,
-    is_higher,
-    last_identifier,
-    response,
-    streams,
-    waits,
-)
+from busplan.buses.can.streams import Stream, frame_sizes, streams
 from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of, without_times
+from busplan.buses.can.waiting import is_higher, last_identifier, response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Group, Network
 from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, plain, pointwise, rounded_up, total
@@ -27,6 +20,8 @@ from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
+_MOST_ANSWERS: Final = 1024
+"""Responses that a cycle remembers: those of the points of a grid one after the other."""
 
 
 class CanCycle(BusCycle):
@@ -45,6 +40,15 @@ class CanCycle(BusCycle):
     def traffic(self) -> Traffic:
         """What the network sends."""
         return traffic_of(self.network)
+
+    @cached_property
+    def _numbers(self) -> tuple[Number, ...]:
+        return self.traffic.numbers()
+
+    @cached_property
+    def _answer(self) -> "Callable[..., _Answer]":
+        """The stream at a place and its response, of plain numbers; each is found once."""
+        return lru_cache(maxsize=_MOST_ANSWERS)(partial(_answer, self.traffic, self.is_stuffed))
 
     @cached_property
     def _wire(self) -> dict[str, Number]:
@@ -112,9 +116,8 @@ class CanCycle(BusCycle):
         others_us = named(self._on_bus_us + extra_us, "others_us", "others")
 
         def found(key: str, words: str) -> Number:
-            return pointwise(
-                partial(_waits, self.traffic, self.is_stuffed, key), others_us, *self.traffic.numbers(), words=words
-            )
+            own = partial(_waits, self.traffic, self.is_stuffed, key)
+            return pointwise(own, others_us, *self._numbers, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(found("lasts_us", words), "busy_us", "w")
@@ -266,8 +269,7 @@ class CanCycle(BusCycle):
         """Figures of the stream at a place among those that end a PDO or a message."""
 
         def found(key: str, words: str) -> Number:
-            phase = partial(_phase, self.traffic, self.is_stuffed, place, key)
-            return pointwise(phase, *self.traffic.numbers(), words=words)
+            return pointwise(partial(_phase, self._answer, place, key), *self._numbers, words=words)
 
         jitter_us = found("jitter_us", f"how late {name} may be queued")
         frame_us_ = found("frame_us", f"the last frame of {name}")
@@ -320,9 +322,9 @@ def _last(traffic: Traffic, *numbers: float) -> float:
     return last_identifier(streams(traffic.with_numbers(*numbers), is_stuffed=True))
 
 
-def _phase(traffic: Traffic, is_stuffed: bool, place: int, key: str, *numbers: float) -> float:
+def _phase(answer: "Callable[..., _Answer]", place: int, key: str, *numbers: float) -> float:
     """One figure of the response of the stream at a place; infinite where it does not exist."""
-    own, worst = _responses(traffic.with_numbers(*numbers), is_stuffed)[place]
+    own, worst = answer(place, *numbers)
     if hasattr(own, key):
         said: float = getattr(own, key)
         return said
@@ -330,9 +332,12 @@ def _phase(traffic: Traffic, is_stuffed: bool, place: int, key: str, *numbers: f
     return found
 
 
-@lru_cache(maxsize=64)
-def _responses(traffic: Traffic, is_stuffed: bool) -> tuple[tuple[Stream, Response | None], ...]:
-    """Each stream that ends a PDO or a message, with its response."""
-    each = streams(traffic, is_stuffed=is_stuffed)
-    ends = (one for one in each if one.is_end)
-    return tuple((one, response(one, each, traffic, is_stuffed=is_stuffed)) for one in ends)
+_Answer = tuple[Stream, Response | None]
+
+
+def _answer(traffic: Traffic, is_stuffed: bool, place: int, *numbers: float) -> _Answer:
+    """The stream at a place among those that end a PDO or a message, with its response."""
+    plain_traffic = traffic.with_numbers(*numbers)
+    ends = (one for one in streams(plain_traffic, is_stuffed=is_stuffed) if one.is_end)
+    own = next(islice(ends, place, None))
+    return own, response(own, plain_traffic, is_stuffed=is_stuffed)

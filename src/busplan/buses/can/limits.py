@@ -7,8 +7,9 @@ from typing import Final
 
 from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.streams import Stream, collisions, deadline_share, load_before, streams
+from busplan.buses.can.streams import Stream, collisions, streams
 from busplan.buses.can.traffic import Traffic, traffic_of, without_times
+from busplan.buses.can.waiting import messages
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
@@ -23,9 +24,9 @@ def late_messages(traffic: Traffic) -> tuple[str, ...]:
 
 def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
     """Messages that miss their deadline, each with its response over its deadline."""
-    each = streams(traffic, is_stuffed=True)
-    for one in each:
-        if one.is_message and (share := deadline_share(one, each, traffic)) > 1:
+    each = messages(traffic, is_stuffed=True)
+    for one in streams(traffic, is_stuffed=True):
+        if one.is_message and (share := each.deadline_share(one)) > 1:
             yield one, share
 
 
@@ -46,19 +47,17 @@ def _all_late(traffic: Traffic) -> str:
 def _late(one: Stream, share: float, traffic: Traffic) -> str:
     if share < inf:
         return f"its worst-case response time is {share * one.deadline_us:g} us, over its {one.deadline_us:g} us"
-    load = load_before(one, streams(traffic, is_stuffed=True))
+    load = messages(traffic, is_stuffed=True).load(one)
     steps = "" if load >= SATURATED else f", and its busy period takes over {MOST_STEPS:.0f} steps to find"
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
 def _slowest(traffic: Traffic, *numbers: float) -> float:
     """The largest response over deadline of any message [1]."""
-    own = traffic.with_numbers(*numbers)
-    each = streams(own, is_stuffed=True)
-    found = 0.0
+    each, found = messages(traffic.with_numbers(*numbers), is_stuffed=True), 0.0
     # The lowest priorities first: one of them has no response time, or none has.
-    for one in sorted((one for one in each if one.is_message), key=lambda one: -one.first):
-        found = max(found, deadline_share(one, each, own))
+    for one in each.by_priority():
+        found = max(found, each.deadline_share(one))
         if found == inf:
             break
     return found

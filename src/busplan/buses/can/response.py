@@ -7,7 +7,8 @@ revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from itertools import repeat
+from functools import cached_property
+from itertools import count, repeat
 from math import ceil, inf
 from typing import NamedTuple
 
@@ -27,10 +28,6 @@ class Sender(NamedTuple):
     def load(self) -> float:
         """Share of the bus, 0..1 [1]."""
         return self.frames_us / self.period_us
-
-    def released_us(self, span_us: float) -> float:
-        """Frames that arrive in a span of time, in the worst case [us]."""
-        return ceil((span_us + self.jitter_us) / self.period_us) * self.frames_us
 
 
 class Response(NamedTuple):
@@ -81,59 +78,30 @@ def worst_response(
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
     """
-    everyone = (own, *higher)
-    if sum(one.load for one in everyone) >= SATURATED:
+    before, everyone = Arrivals(higher), Arrivals((own, *higher))
+    if everyone.load >= SATURATED:
         return None
+    steps, ahead_us = iter(range(int(MOST_STEPS))), blocking_us + first_us
+    bound_us, per_us = before.bound_us(ahead_us, bit_us=bit_us), own.frames_us / (1 - before.load)
+    worst, waits_us = None, 0.0
     try:
-        return _worst(own, everyone, blocking_us=blocking_us, first_us=first_us, bit_us=bit_us)
+        for instance in count():
+            late_us = own.jitter_us + own.frames_us - instance * own.period_us
+            if worst and late_us + bound_us + instance * per_us <= worst.us:
+                break  # the bound falls from one instance to the next
+            if instance == 1:
+                from_us = ahead_us + everyone.frames_us
+                busy_us = everyone.settled_us(ahead_us, steps, from_us=from_us)
+            if instance and instance * own.period_us >= busy_us + own.jitter_us:
+                break
+            # It waits at least as long as the instance before it, and for that one.
+            own_us = instance * own.frames_us
+            waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us)
+            if worst is None or waits_us + late_us > worst.us:
+                worst = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
     except _TooManyStepsError:
         return None
-
-
-def _worst(
-    own: Sender, everyone: Sequence[Sender], *, blocking_us: float, first_us: float, bit_us: float
-) -> Response | None:
-    _, *higher = everyone
-    steps = iter(range(int(MOST_STEPS)))
-    ahead_us = blocking_us + first_us
-    busy_us = _settled(ahead_us, everyone, steps, from_us=ahead_us + sum(one.frames_us for one in everyone))
-    worst: Response | None = None
-    waits_us = 0.0
-    for instance in range(ceil((busy_us + own.jitter_us) / own.period_us)):
-        before_us = ahead_us + instance * own.frames_us
-        late_us = own.jitter_us + own.frames_us - instance * own.period_us
-        if worst and late_us + _bound_us(before_us, higher, bit_us=bit_us) <= worst.us:
-            break  # the bound falls from one instance to the next
-        # It waits at least as long as the instance before it, and for that one.
-        waits_us = _settled(before_us, higher, steps, bit_us=bit_us, from_us=waits_us)
-        if worst is None or waits_us + late_us > worst.us:
-            interference_us = waits_us - blocking_us - instance * own.frames_us
-            worst = Response(blocking_us, instance, interference_us, waits_us + late_us)
     return worst
-
-
-def response_bound_us(
-    own: Sender, higher: Sequence[Sender], *, blocking_us: float, bit_us: float, first_us: float = 0.0
-) -> float:
-    """A time that no response is over, in closed form; the load of message and higher ones is below `SATURATED` [us].
-
-    Parameters
-    ----------
-    own, higher, blocking_us, bit_us, first_us
-        As `worst_response` takes them.
-
-    Notes
-    -----
-    ceil(x) is less than x + 1, so w <= (B + q C + sum (1 + (J + bit) / T) C) / (1 - load). With every further instance
-    q the response falls: C / (1 - load of the higher ones) is no more than T.
-    """
-    return own.jitter_us + own.frames_us + _bound_us(blocking_us + first_us, higher, bit_us=bit_us)
-
-
-def _bound_us(before_us: float, senders: Sequence[Sender], *, bit_us: float = 0.0) -> float:
-    """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us]."""
-    most_us = before_us + sum(one.frames_us + one.load * (max(one.jitter_us, 0.0) + bit_us) for one in senders)
-    return most_us / (1 - min(sum(one.load for one in senders), SATURATED))
 
 
 def settled_us(
@@ -161,40 +129,80 @@ def settled_us(
     >>> settled_us(900.0, [Sender(100, 500)])
     1200.0
     """
-    others_us += more_us(inf) if (is_full := sum(one.load for one in senders) > _NEARLY_FULL) else 0.0
-    return _bound_us(others_us, senders) if is_full else _settled(others_us, senders, repeat(0), more_us=more_us)
+    arrivals = Arrivals(senders)
+    if arrivals.load > _NEARLY_FULL:
+        return arrivals.bound_us(others_us + more_us(inf))
+    return arrivals.settled_us(others_us, repeat(0), more_us=more_us)
 
 
 _NEARLY_FULL = 0.99
 """Load above which the smallest span takes too many steps to find."""
 _BELOW = 1 - 1e-9
 """A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
+_MANY = 50
+"""Senders from which on arrays are faster."""
 
 
 class _TooManyStepsError(Exception):
     """A span takes too many steps to find."""
 
 
-def _settled(
-    before_us: float,
-    senders: Sequence[Sender],
-    steps: Iterable[int],
-    *,
-    bit_us: float = 0.0,
-    from_us: float = 0.0,
-    more_us: Callable[[float], float] = lambda _: 0.0,
-) -> float:
-    """The smallest w = before + more(w) + sum ceil((w + J + bit) / T) C that is no less than `from_us` [us].
+class Arrivals:
+    """What several senders put on the bus.
 
-    The load of the senders is below 1; `steps` are as many as may be taken.
+    Parameters
+    ----------
+    senders
+        The senders.
     """
-    load = sum(one.load for one in senders)
-    # ceil(x) is no less than x: no solution lies below that of the sum without rounding.
-    least_us = (before_us + sum(one.load * (one.jitter_us + bit_us) for one in senders)) / (1 - load)
-    span_us = max(from_us, before_us, least_us * _BELOW)
-    for _ in steps:
-        further_us = before_us + more_us(span_us) + sum(one.released_us(span_us + bit_us) for one in senders)
-        if further_us <= span_us:
-            return span_us
-        span_us = further_us
-    raise _TooManyStepsError
+
+    def __init__(self, senders: Sequence[Sender]) -> None:
+        self._senders = senders
+        self.load = sum(one.load for one in senders)
+        """Share of the bus, 0..1 [1]."""
+        self.frames_us = sum(one.frames_us for one in senders)
+        """One instance of each [us]."""
+        self._of_jitter_us = sum(one.load * one.jitter_us for one in senders)
+
+    @cached_property
+    def in_window_us(self) -> Callable[[float], float]:
+        """Frames that arrive in a window of time, sum ceil((window + J) / T) C [us]."""
+        if len(self._senders) < _MANY:
+            return lambda window_us: sum(
+                ceil((window_us + jitter_us) / period_us) * us for us, period_us, jitter_us in self._senders
+            )
+        import numpy as np
+
+        us, period_us, jitter_us = np.array(self._senders).T
+        return lambda window_us: float(np.ceil((window_us + jitter_us) / period_us) @ us)
+
+    def bound_us(self, before_us: float, *, bit_us: float = 0.0) -> float:
+        """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us].
+
+        ceil(x) is less than x + 1, so w <= (before + sum (1 + (J + bit) / T) C) / (1 - load).
+        """
+        most_us = before_us + self.frames_us + self._of_jitter_us + self.load * bit_us
+        return most_us / (1 - min(self.load, SATURATED))
+
+    def settled_us(
+        self,
+        before_us: float,
+        steps: Iterable[int],
+        *,
+        bit_us: float = 0.0,
+        from_us: float = 0.0,
+        more_us: Callable[[float], float] = lambda _: 0.0,
+    ) -> float:
+        """The smallest w = before + more(w) + sum ceil((w + J + bit) / T) C that is no less than `from_us` [us].
+
+        The load is below 1; `steps` are as many as may be taken.
+        """
+        # ceil(x) is no less than x: no solution lies below that of the sum without rounding.
+        least_us = (before_us + self._of_jitter_us + self.load * bit_us) / (1 - self.load)
+        span_us = max(from_us, before_us, least_us * _BELOW)
+        for _ in steps:
+            further_us = before_us + more_us(span_us) + self.in_window_us(span_us + bit_us)
+            if further_us <= span_us:
+                return span_us
+            span_us = further_us
+        raise _TooManyStepsError
