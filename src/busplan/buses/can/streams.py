@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from itertools import combinations
+from itertools import chain, combinations, islice, repeat
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
