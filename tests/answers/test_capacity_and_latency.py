@@ -76,8 +76,8 @@ def test_the_verdict_names_margin_term_limit_and_change(profile: Profile) -> Non
 
 
 def test_a_verdict_that_is_not_shown_says_so_with_its_reserve(profile: Profile) -> None:
-    narrow = override(profile, {"cycle.period_us": 545})
-    assert words(narrow).startswith("paper-1ms at 545 us: not shown to fit. Margin 2.564 us +/- 6.311 us of 272.500 us")
+    narrow = override(profile, {"cycle.period_us": 550, "servo.step_us": 50})
+    assert words(narrow).startswith("paper-1ms at 550 us: not shown to fit. Margin 5.064 us +/- 6.311 us of 275.000 us")
     reserved = override(profile, {"cycle.period_us": 600, "limits.reserve": 0.15})
     text = words(reserved)
     assert text.startswith("paper-1ms at 600 us: not shown to fit. Margin 30.064 us +/- 6.311 us of 300.000 us")

@@ -224,7 +224,9 @@ def test_why_a_circle_has_no_figures_is_said() -> None:
     assert "The circle of B is not simulated: the cycle does not fit the bus: 263.320 us needed of 100.000 us." in lines
     bare = override(one, {"servo": {"grade": "calibrated", "drive_lag_us": 7500.0}})
     lines = text(difference(bare, override(one, {"cycle.period_us": 1050.5}), circle=run_circle))
-    assert any(line.startswith("The circle of B is not simulated: step_us = 100.0: the period of") for line in lines)
+    assert any(
+        line.startswith("The circle of B is not simulated: servo.step_us = 100.0: the period of") for line in lines
+    )
     assert "The servo values behind the circle's figures are calibrated in A and assumed in B." in lines
     lines = text(difference(one, override(one, {"tolerance.max_contour_error_mm": 0.01}), circle=run_circle))
     assert any(
@@ -390,6 +392,7 @@ def test_the_document_holds_both_sides_in_full(paper: Profile) -> None:
         "profile": "paper-1ms",
         "timing_model": "paper",
         "circle_problems": None,
+        "circle_refused_by": [],
     }
     assert document["changes"] == [
         {"key": "bus.max_hops", "a": None, "a_source": "default", "b": 2, "b_source": "file"},

@@ -64,7 +64,7 @@ def expected() -> dict[str, list[object]]:
     vary = {key: [*axis.part(0, axis.size).tolist()] for key, axis in AXES.items()}
     rows = busplan.sweep("paper-4ms", vary=vary).to_dict()["rows"]
     found = {name: [row[name] for row in rows] for name in rows[0]}
-    for name in ("exceeded", "not_shown"):
+    for name in ("exceeded", "not_shown", "circle_refused_by"):
         found[name] = [" ".join(one or ()) or None for one in found[name]]
     found["bus.gap_count"] = [str(one) for one in found["bus.gap_count"]]
     return found

@@ -157,7 +157,9 @@ def test_the_summary_counts_points_under_each_model() -> None:
         f"p: 18 points; {by_hand[0]} fit by the closed form of the paper model, {by_hand[1]} shown to fit "
         "(standard model)."
     )
-    assert (len(lines) == 2) == (unsafe > 0)
+    refused = sum(bool(standard.circle_refused_by) for _, standard in pairs)
+    assert lines[1] == f"The circle cannot be run at {refused} points: servo.step_us."
+    assert (len(lines) == 3) == (unsafe > 0)
     partial = Tally(named("p"), grid, BOTH)
     partial.add(blocks(5)[0])
     stopped = next(partial.sentences())

@@ -42,7 +42,7 @@ def test_numbers_are_numbers_and_words_are_text() -> None:
     answer = busplan.sweep("paper-4ms", vary=GRID)
     kinds = {name: answer[name].dtype.kind for name in answer}
     words = {
-        *("bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded", "not_shown"),
+        *("bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded", "not_shown", "circle_refused_by"),
         *("safe_limited_by", "verdict"),
     }
     assert {name for name, kind in kinds.items() if kind == "U"} == words
@@ -169,7 +169,7 @@ def test_the_text_is_the_table_of_the_command() -> None:
             "vary servo.drive_lag_us: no figure of capacity depends on it; add circle=True",
         ),
         ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without force=True"),
-        ({"cycle.period_us": [1050]}, {"circle": True}, "at cycle.period_us = 1050: step_us = 100.0"),
+        ({"cycle.period_us": [1050]}, {"circle": True}, "at cycle.period_us = 1050: servo.step_us = 100.0"),
     ],
 )
 def test_what_makes_no_sweep_is_refused(vary: Any, options: Any, message: str) -> None:

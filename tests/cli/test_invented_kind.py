@@ -561,7 +561,8 @@ def doubted(ring_file: Path) -> Iterator[Path]:
 def test_doubts_without_a_bias_make_three_verdicts(
     run: Run, doubted: Path, slice_us: float, verdict: str, code: int
 ) -> None:
-    doubted.write_text(TEXT.replace("period_us = 1500", f"period_us = {2 * slice_us}"), encoding="utf-8")
+    text = TEXT.replace("period_us = 1500", f"period_us = {2 * slice_us}")
+    doubted.write_text(text.replace("[servo]", f"[servo]\nstep_us = {2 * slice_us}"), encoding="utf-8")
     (one,) = busplan.capacity(doubted).results
     assert (one.verdict, one.bias_us) == (verdict, None)
     assert one.uncertainty_us == pytest.approx(DOUBT_US)
@@ -645,7 +646,8 @@ class HastyCycle(DoubtedCycle):
 
 def test_one_of_its_timing_models_decides_whatever_leads_and_whatever_is_asked_for(run: Run, ring_file: Path) -> None:
     # 640 us fit 645 us, 650 us do not, and 12.955 us are in doubt.
-    ring_file.write_text(TEXT.replace("period_us = 1500", "period_us = 1290"), encoding="utf-8")
+    text = TEXT.replace("period_us = 1500", "period_us = 1290")
+    ring_file.write_text(text.replace("[servo]", "[servo]\nstep_us = 129"), encoding="utf-8")
     with registered(HastyRing()):
         hasty, plain = busplan.capacity(ring_file).results
         assert [(one.timing_model, one.fits, one.verdict) for one in (hasty, plain)] == [

@@ -136,14 +136,14 @@ class Tally:
 
     def sentences(self) -> Iterator[Sentence]:
         """Summary of the counts."""
-        if self._refused:
-            words = f"The circle cannot be run at {{}} {nouns(self._refused, 'point')}: {', '.join(self._refused_by)}."
-            yield sentence(words, count_value(self._refused, grouped=True), state="fails")
         whole = count_value(self.expected, "points", at="/points", grouped=True)
         found = whole if self.points == self.expected else count_value(self.points, grouped=True)
         cut = Sentence(()) if self.points == self.expected else sentence(" of {} (interrupted)", whole)
         head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(self.profile.name), found)
         yield joined(head, cut, Sentence(("; ",)), self._fitting(), Sentence((".",)), by="")
+        if self._refused:
+            words = f"The circle cannot be run at {{}} {nouns(self._refused, 'point')}: {', '.join(self._refused_by)}."
+            yield sentence(words, count_value(self._refused, grouped=True), state="fails")
         if self._unjudged:
             unjudged = count_value(self._unjudged, grouped=True)
             words = "The circle is not judged at {}: no contour tolerance is asked for."
