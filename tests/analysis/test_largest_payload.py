@@ -13,6 +13,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import keeps_limits, refused_period
 from busplan.analysis.planning.machine import with_payload_within
 from busplan.analysis.planning.plan import plan
+from busplan.analysis.planning.search import Search
 from busplan.buses import kind_names
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
@@ -93,3 +94,13 @@ def test_a_payload_is_the_largest_that_is_in_time(own: int) -> None:
 
     good = [size for size in range(4, own + 1, 4) if is_good(size)]
     assert network_of(best.profile).largest_payload_bytes == max(good)
+
+
+def test_many_places_are_tried_in_a_row_then_in_strides_and_the_last_always() -> None:
+    search = Search(load("paper-1ms").profile, max_circles=5)
+    assert list(search.in_strides(range(6, 0, -1))) == [6, 5, 4, 3, 2, 1]
+    assert search.proven
+    assert list(search.in_strides(range(100))) == [0, 1, 2, 3, 4, 6, 10, 18, 34, 66, 99]
+    assert not search.proven
+    assert len(list(search.in_strides(range(10**9)))) < 40
+    assert list(search.in_strides([])) == []

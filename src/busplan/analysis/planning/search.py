@@ -156,7 +156,7 @@ class Search:
             if at >= len(places) - 1:
                 break
             yield places[at]
-            if tried >= self.max_circles:
+            if tried >= self.max_circles and at + 1 < len(places) - 1:
                 stride *= 2
                 self.proven = False
             at += stride
