@@ -22,6 +22,8 @@ WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
 _MOST_ANSWERS: Final = 1024
 """Responses that a cycle remembers: those of the points of a grid one after the other."""
+_RESTS_ON: Final = {"cycle_host_us": "bus.host_us"}
+"""The key that a term comes from alone."""
 
 
 class CanCycle(BusCycle):
@@ -143,7 +145,7 @@ class CanCycle(BusCycle):
         """The cycle in the order of the wire."""
         blocking_us, interference_us = self._waits_us()
         return (
-            *(Term(*one) for one in self._own.items()),
+            *(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._own.items()),
             Term("cycle_blocking_us", blocking_us),
             Term("cycle_interference_us", interference_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),

@@ -252,7 +252,7 @@ class BroadcastTerms(CycleWithStarts):
             Term("cycle_acknowledge_us", 3 * own.acknowledge_us),
             *(Term(f"cycle_{name}_us", 0.0) for name in ("hold", "execution", "worst_extra")),
             Term("cycle_idle_us", self.node_waits_us + self.hub_wait.gap_us + 2 * self.idle.gap_us),
-            Term("cycle_host_us", self.hub_wait.host_us + 2 * self.idle.host_us),
+            Term("cycle_host_us", self.hub_wait.host_us + 2 * self.idle.host_us, "host.transaction_us"),
             Term("retries_us", self.retries_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),
         )

@@ -39,6 +39,8 @@ _SHOWN: Final = (
     *("gaps_us", "subaction_gap_us", "arbitration_reset_gap_us"),
 )
 """Phases of a transaction that are figures of a cycle."""
+_RESTS_ON: Final = {"cycle_host_us": "host.transaction_us"}
+"""The key that a term comes from alone."""
 
 
 class Ieee1394Cycle(CycleWithStarts):
@@ -114,7 +116,7 @@ class Ieee1394Cycle(CycleWithStarts):
                 own[term] = own[term] + one.nodes * _sum(parts_us)
         return (
             Term("sync_us", self.sync_us),
-            *(Term(key, us) for key, us in own.items()),
+            *(Term(key, us, _RESTS_ON.get(key, "")) for key, us in own.items()),
             Term("retries_us", self.retries_us),
             Term("nonperiodic_us", self.network.nonperiodic_us),
         )

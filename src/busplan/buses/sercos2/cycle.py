@@ -14,6 +14,8 @@ from busplan.elementwise import Number, named, plain, total
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
+_RESTS_ON: Final = {"cycle_gap_us": "bus.at_gap_us"}
+"""The key that a term comes from alone."""
 
 
 class Sercos2Cycle(SercosCycle):
@@ -60,7 +62,7 @@ class Sercos2Cycle(SercosCycle):
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The telegrams, the gaps, and the waits for the drives."""
-        return tuple(Term(*one) for one in self._sent_us.items())
+        return tuple(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._sent_us.items())
 
     def doubts(self) -> tuple[Doubt, ...]:
         """The gap between two drives, which is the same in the whole cycle."""

@@ -33,6 +33,8 @@ from busplan.sections.transactions import TransactionKind
 TimingModelName = Literal["window", "telegrams"]
 WINDOW: Final[TimingModelName] = "window"
 TELEGRAMS: Final[TimingModelName] = "telegrams"
+_RESTS_ON: Final = {"cycle_wait_us": "bus.at_start_us", "cycle_master_us": "bus.master_delay_us"}
+"""The key that a term comes from alone."""
 
 
 class Sercos3Cycle(SercosCycle):
@@ -122,7 +124,7 @@ class Sercos3Cycle(SercosCycle):
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The telegrams, the wait of the devices, and what the window keeps free."""
-        return tuple(Term(*one) for one in self._sent_us.items())
+        return tuple(Term(key, us, _RESTS_ON.get(key, "")) for key, us in self._sent_us.items())
 
     def doubts(self) -> tuple[Doubt, ...]:
         """What is published as a range alone: the delay of a device, the master's jitter, and the gap.
