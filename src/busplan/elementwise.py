@@ -7,7 +7,7 @@ traced numbers, and polynomials of the number of nodes. numpy loads only where a
 from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
-from math import ceil, floor, inf, sqrt
+from math import ceil, floor, inf, isinf, sqrt
 from typing import TYPE_CHECKING, Final, TypeAlias
 
 if TYPE_CHECKING:
@@ -20,6 +20,9 @@ else:
     Number: TypeAlias = object  # only type checkers ask what it is, and numpy stays unloaded
 """A plain number, an array, or a `SpecialNumber`. Truths are numbers, too."""
 
+FIT_ROUNDING: Final = 1e-12
+"""Relative allowance for the rounding of floats where a number is held against a limit: what is exactly at the limit
+keeps it. It is far below the tolerance of any clock and buys no time."""
 _PLAIN: Final = (int, float)
 
 
@@ -152,6 +155,30 @@ def plain(number: Number) -> float:
     if isinstance(number, _PLAIN):
         return number
     raise TypeError(f"expected a plain number, got {type(number).__name__}")
+
+
+def existing(number: Number) -> float | None:
+    """A plain number; None for an infinite one, which stands for what does not exist.
+
+    Examples
+    --------
+    >>> existing(2.5), existing(inf)
+    (2.5, None)
+    """
+    found = plain(number)
+    return None if isinf(found) else found
+
+
+def within(number: Number, most: Number) -> Number:
+    """Whether a number is no larger than a limit, but for the rounding of floats: a truth, or an array of them.
+
+    Examples
+    --------
+    >>> within(0.1 + 0.2, 0.3), within(0.3001, 0.3)
+    (True, False)
+    """
+    bound: Number = most * (1 + FIT_ROUNDING)
+    return number <= bound
 
 
 def larger(one: Number, other: Number) -> Number:

@@ -1,7 +1,6 @@
 """What is advised has been seen to work, and is safe."""
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -13,13 +12,14 @@ from busplan.analysis.capacity.figures import capacity, figures
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.circle.check import CircleCheck
 from busplan.analysis.circle.roundness import circle_test
-from busplan.analysis.circle.setup import path_steps
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.advice import Change, cure
+from busplan.analysis.planning.advice import UNTESTED_CIRCLE, Change, cure
 from busplan.analysis.planning.plan import plan
 from busplan.analysis.planning.short_numbers import MOST_RATIO
+from busplan.answers.verdict import verdict_sentences
 from busplan.buses.ieee1394.constants import safe_gap_count
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of
+from busplan.forms.columns import sentence_text
 from busplan.profile.document import Document
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
@@ -151,7 +151,7 @@ def test_advice_for_shipped_profiles_is_safe(name: str) -> None:
 
 
 def test_no_gap_count_is_advised_for_cables_that_the_table_does_not_know(make: Make) -> None:
-    changes = cure(make(cycle__period_us=550.0, bus__cable_length_m=20.0), circle=None).changes
+    changes = cure(make(cycle__period_us=550.0, bus__cable_length_m=20.0)).changes
     assert changes is not None
     assert "bus.gap_count" not in changes
 
@@ -165,38 +165,90 @@ def test_nothing_is_advised_where_the_standard_ends(make: Make) -> None:
     assert verdict.no_change.startswith("20 hops are over the 16 of one bus (a tree with")
 
 
-class Counting(CircleCheck):
-    """Counts its tests, and fails them at one period."""
-
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self.tests: list[float] = []
-
-    def _run(self, profile: Profile) -> tuple[str, ...]:
-        self.tests.append(profile.cycle.period_us)
-        return ("rough",) if profile.cycle.period_us == 300.0 else ()
+ROUND_ONE = {"servo": {"step_us": 100.0}, "tolerance": {"max_contour_error_mm": 0.1}}
 
 
-def test_the_circle_of_what_fits_is_left_alone_and_that_of_a_cure_must_pass(
-    make: Make, monkeypatch: pytest.MonkeyPatch
+@pytest.fixture
+def tested_us(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Periods of the circles that are simulated; all fail but those of whole milliseconds."""
+    found: list[float] = []
+
+    def run(_self: CircleCheck, profile: Profile) -> tuple[str, ...]:
+        found.append(profile.cycle.period_us)
+        return () if profile.cycle.period_us % 1000.0 == 0 else ("rough",)
+
+    monkeypatch.setattr(CircleCheck, "_run", run)
+    return found
+
+
+@pytest.mark.parametrize("period_us", [200.0, 300.0, 1000.0])
+def test_capacity_simulates_no_circle_and_says_so_where_its_change_gives_another(
+    make: Make, tested_us: list[float], period_us: float
 ) -> None:
-    made: list[Counting] = []
+    profile = make(cycle__period_us=period_us, **ROUND_ONE)
+    (verdict,) = verdicts(capacity(profile))
+    assert tested_us == []
+    assert verdict.change is not None
+    # 200 us must become 300, and 300 us are enough with other settings of the bus: the circle of a node is the same.
+    assert verdict.change.changes.get("cycle.period_us") == (300.0 if period_us == 200.0 else None)
+    assert verdict.change.circle_is_untested == (period_us == 200.0)
+    text = " ".join(map(sentence_text, verdict_sentences(verdict, profile)))
+    assert (UNTESTED_CIRCLE in text) == (period_us == 200.0)
 
-    def counting(**options: Any) -> Counting:
-        made.append(Counting(**options))
-        return made[-1]
 
-    monkeypatch.setattr("busplan.analysis.planning.advice.CircleCheck", counting)
-    round_one = {"servo": {"step_us": 100.0}, "tolerance": {"max_contour_error_mm": 0.1}}
-    (fine,) = verdicts(capacity(make(cycle__period_us=1000.0, **round_one)))
-    assert fine.change is not None
-    assert made[-1].tests == []
-    # 300 us would fit the bus after a change, and is rough: also where it is the profile's own period.
-    for period_us in (200.0, 300.0):
-        (short,) = verdicts(capacity(make(cycle__period_us=period_us, **round_one)))
-        assert short.change is not None
-        assert short.change.changes["cycle.period_us"] == 400.0
-        assert made[-1].tests == [300.0, 400.0]
+def test_without_a_circle_nobody_misses_its_test(make: Make) -> None:
+    (verdict,) = verdicts(capacity(make(cycle__period_us=200.0)))
+    assert verdict.change is not None
+    assert "cycle.period_us" in verdict.change.changes
+    assert not verdict.change.circle_is_untested
+
+
+@pytest.mark.parametrize(
+    ("circle_steps", "tests_us", "failures"), [(None, [], None), (10, [], None), (10**9, [300.0], ("rough",))]
+)
+def test_a_cure_is_ranked_by_time_and_one_circle_at_most_is_simulated(
+    make: Make, tested_us: list[float], circle_steps: int | None, tests_us: list[float], failures: tuple[str] | None
+) -> None:
+    found = cure(make(cycle__period_us=200.0, **ROUND_ONE), circle_steps=circle_steps)
+    assert found.changes is not None
+    assert found.changes["cycle.period_us"] == 300.0
+    assert (tested_us, found.circle_failures) == (tests_us, failures)
+
+
+@pytest.mark.parametrize(
+    ("with_circle", "said"),
+    [
+        (False, f"{UNTESTED_CIRCLE}; cheapest cure: cycle.period_us = 300"),
+        (True, "it fits, and then rough; `plan` tries more"),
+    ],
+)
+def test_check_never_says_more_of_the_circle_of_a_cure_than_was_tested(
+    make: Make, tested_us: list[float], with_circle: bool, said: str
+) -> None:
+    document = Document("a.toml", profile_text(make(cycle__period_us=200.0, **ROUND_ONE)))
+    (finding,) = (one for one in check_document(document, with_circle=with_circle).findings if one.code == "BP101")
+    assert said in finding.message
+    assert (finding.cure is None) == with_circle
+    assert tested_us == [300.0] * with_circle
+
+
+def test_a_step_that_does_not_divide_the_period_is_the_cause_and_its_own_cure() -> None:
+    profile = override(load("ethercat-servo-8").profile, {"cycle.period_us": 500.0, "servo.step_us": 200.0})
+    (verdict,) = verdicts(capacity(profile))
+    assert verdict.all_well
+    assert verdict.change is not None
+    assert verdict.change.changes == {"servo.step_us": 125.0}
+    assert verdict.change.circle_is_untested
+    headline, cause, *_ = map(sentence_text, verdict_sentences(verdict, profile))
+    assert ": fits." in headline
+    assert cause.startswith("Its circle cannot be simulated: servo.step_us = 200")
+    best = plan(profile).recommended
+    assert best is not None
+    assert best.changes == {"servo.step_us": 125.0}
+    kept = plan(profile, wanted={"servo.step_us": 200.0}, free=["slice_ratio"])
+    assert kept.binding is not None
+    assert kept.binding.key == "servo.step_us"
+    assert {one.relaxed: one.changes for one in kept.relaxations}["step"] == {"servo.step_us": 125.0}
 
 
 @pytest.mark.parametrize("own", ["paper", "standard"])
@@ -226,13 +278,13 @@ def test_what_fits_but_is_not_shown_to_gets_advice_too(make: Make, period_us: fl
     # 280 and 290 us: both over the 253.2 us that are needed, and only one over the 287.5 us that show it.
     profile = make(cycle__period_us=period_us)
     assert figures(profile, model="standard").fits
-    assert list(cure(profile, circle=None).changes or {}) == keys
+    assert list(cure(profile).changes or {}) == keys
 
 
 @pytest.mark.parametrize("period_us", [300.0, 4000.0])
 def test_a_gap_count_that_no_table_cures_is_not_advised_away(make: Make, period_us: float) -> None:
     # The table holds for cables of 4.5 m: nobody knows what is safe at 10 m.
-    found = cure(make(bus__gap_count=0, bus__cable_length_m=10.0, cycle__period_us=period_us), circle=None)
+    found = cure(make(bus__gap_count=0, bus__cable_length_m=10.0, cycle__period_us=period_us))
     assert found.changes is None
     assert "for cables of more than 4.5 m none is known to be safe" in found.why
 
@@ -259,22 +311,6 @@ def test_a_loop_on_the_node_that_lacks_its_margin_is_tried_once(make: Make) -> N
             for each in circle_test(one, periods_us=[600.0, 900.0, 4000.0], explain=False).results
         }
         assert len(margins) == 1
-
-
-def test_no_period_is_advised_whose_circle_is_too_long_to_be_run() -> None:
-    # Lost set-points spoil the circle at every period; ramps of a hundred periods of minutes are millions of steps.
-    profile = override(load("ethercat-servo-8").profile, {"delivery.loss_probability": 0.02})
-    (verdict,) = (one for one in verdicts(capacity(profile)) if one.all_well)
-    assert (verdict.change, verdict.no_change) == (None, "no period that was tried passes the circle")
-
-
-def test_a_circle_that_is_longer_than_is_run_fails_unless_the_own_one_is_as_long(make: Make) -> None:
-    own = make(servo={"step_us": 1.0}, cycle__period_us=4000.0)
-    longer = override(own, {"cycle.period_us": 5000.0})
-    steps = path_steps(own)
-    assert CircleCheck(most_steps=steps - 1, own=own)(own) == ()
-    (said,) = CircleCheck(most_steps=steps, own=own)(longer)
-    assert said == f"a circle of {path_steps(longer):,} steps is too long to be run here"
 
 
 def test_more_nodes_of_a_loaded_can_bus_take_a_longer_period() -> None:

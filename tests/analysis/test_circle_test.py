@@ -9,10 +9,16 @@ from busplan.analysis.capacity.figures import figures
 from busplan.analysis.circle.contour_profile import CONTOUR_SECTORS, contour_profile, drawn_profile
 from busplan.analysis.circle.roundness import CircleFigures, circle_test, to_attack
 from busplan.analysis.timeline.schedule import schedule
+from busplan.answers.circle import circle_document
 from busplan.errors import BusplanError
+from busplan.printable import json_text
+from busplan.profile.document import Document
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
+from busplan.profile.write import profile_text
+from busplan.rules.gate import check_document
 from busplan.sections.profile import Profile
+from busplan.servo.checks import ParameterError
 
 Make = Callable[..., Profile]
 
@@ -565,3 +571,58 @@ def test_a_step_that_is_a_default_is_said_to_be_one(make: Make) -> None:
         only(make(cycle__period_us=1050.0))
     with pytest.raises(BusplanError, match=r"would fit$"):
         only(make(cycle__period_us=1050.0, servo={"step_us": 100.0}))
+
+
+def test_a_failure_without_a_value_is_null_and_says_why() -> None:
+    # Behind the load of 2.23 no message of a low priority has a worst-case response time.
+    test = circle_test(override(load("can-servo-8").profile, {"cycle.period_us": 1000.0}))
+    (result,) = circle_document(test, with_contributions=True)["results"]
+    assert json_text(result)
+    late = {one["name"]: one for one in result["failures"]}
+    assert late["deadline"]["value"] is None
+    assert late["deadline"]["text"] == "sdo-request and 2 more messages have no worst-case response time"
+    assert late["required_us"]["value"] == 2950.0
+
+
+def test_a_skew_that_is_too_long_is_refused_at_the_clock_that_is_missing() -> None:
+    # Twenty devices with frames of their own: the last frame arrives most of a period behind the first.
+    changes = {"bus.nodes": 20, "payload.write_bytes": 1000, "payload.read_bytes": 1000, "cycle.period_us": 2500.0}
+    profile = override(load("ethercat-servo-8").profile, {**changes, "bus.distributed_clocks": False})
+    with pytest.raises(ParameterError, match="the last axis then takes its set-points") as raised:
+        circle_test(profile)
+    assert [one.name for one in raised.value.refused] == ["bus.distributed_clocks"]
+    found = check_document(Document("a.toml", profile_text(profile))).findings
+    assert [one.key for one in found if one.code == "BP203"] == ["bus.distributed_clocks"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"delivery": {"skew_us": 600.0}}, "delivery.skew_us"),
+        ({"delivery": {"jitter_us": 600.0}}, "delivery.jitter_us"),
+        ({"cycle.period_us": 950.0, "servo.step_us": 300.0}, "servo.step_us"),
+    ],
+)
+def test_a_circle_that_is_refused_names_a_key_that_was_set(changes: dict[str, object], key: str) -> None:
+    profile = override(load("paper-1ms").profile, changes)
+    found = check_document(Document("a.toml", profile_text(profile))).findings
+    assert [one.key for one in found if one.code == "BP203"] == [key]
+    assert [one.cure for one in found if one.key == "servo.step_us"] == ["servo.step_us = 237.5"] * (
+        key == "servo.step_us"
+    )
+
+
+def test_the_key_of_a_default_step_is_the_period(make: Make) -> None:
+    profile = make(cycle__period_us=4050.0, tolerance={"max_contour_error_mm": 0.1})
+    (found,) = (
+        one for one in check_document(Document("a.toml", profile_text(profile))).findings if one.code == "BP203"
+    )
+    assert (found.key, found.cure) == ("cycle.period_us", "servo.step_us = 90")
+
+
+def test_what_the_bus_lacks_is_said_of_the_bus_alone() -> None:
+    profile = override(load("gantry-24").profile, {"limits.reserve": 0.6})
+    assert "safe_required_us" in {one.name for one in circle_test(profile).results[0].failures}
+    found = {one.code for one in check_document(Document("a.toml", profile_text(profile))).findings}
+    assert "BP114" in found
+    assert "BP201" not in found

@@ -15,7 +15,6 @@ from busplan.analysis.comparison.kinds import (
     SafeAxes,
     checked_kinds,
     compare,
-    dividing_step_us,
     most_safe_axes,
 )
 from busplan.analysis.network import bus_of, network_of
@@ -197,24 +196,6 @@ def test_a_machine_without_axes_has_none_to_count() -> None:
     found = most_safe_axes(inputs)
     assert found.axes is None
     assert found.nodes > 0
-
-
-@pytest.mark.parametrize(
-    ("period_us", "most_us", "step_us"),
-    [
-        (1000.0, 100.0, 100.0),
-        (250.0, 100.0, 250 / 3),
-        (50.0, 100.0, 50.0),
-        (0.1 + 0.2, 0.1, 0.1),
-        (747.3, 100.0, 93.4125),
-    ],
-)
-def test_the_step_is_the_largest_that_divides_the_period(period_us: float, most_us: float, step_us: float) -> None:
-    found = dividing_step_us(period_us, most_us=most_us)
-    assert found == pytest.approx(step_us, rel=1e-12)
-    steps = round(period_us / found)
-    assert steps == pytest.approx(period_us / found, rel=1e-12)
-    assert steps == 1 or period_us / (steps - 1) > most_us
 
 
 def test_a_circle_is_that_of_the_smallest_period_and_its_step() -> None:

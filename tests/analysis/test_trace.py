@@ -15,7 +15,7 @@ from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
-from busplan.elementwise import choose, plain
+from busplan.elementwise import choose, plain, total
 from busplan.sourced import EQUATIONS
 
 # As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
@@ -150,3 +150,13 @@ def test_lines_and_inputs_are_listed_once_and_in_order() -> None:
     assert [one.symbol for one in inputs(second)] == ["x", "y"]
     assert formula_text(second, in_numbers=False) == "A + A x"
     assert math.isclose(second.value, 18.0)
+
+
+def test_a_sum_of_thousands_is_short_and_has_all_its_inputs() -> None:
+    each = [Traced(float(n), given=Input(f"x{n}", f"key{n}", n, "", "given", "", "")) for n in range(5000)]
+    whole = 2 * total(one * 3 for one in each)
+    assert isinstance(whole, Traced)
+    text = formula_text(whole, in_numbers=False)
+    assert text == "2 (x0 * 3 + x1 * 3 + x2 * 3 + ... 4996 more ... + x4999 * 3)"
+    assert len(list(inputs(whole))) == 5000
+    assert list(lines(whole)) == [whole]

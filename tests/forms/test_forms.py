@@ -38,7 +38,7 @@ from busplan.forms.blocks import (
     values_in,
     with_values,
 )
-from busplan.forms.csv_rows import to_csv
+from busplan.forms.csv_rows import csv_cell, to_csv
 from busplan.forms.json_document import to_json
 from busplan.forms.lines import Line, Mark
 from busplan.forms.numbers import decimals_of, period, with_unit
@@ -342,3 +342,8 @@ def test_markdown_says_a_chart_that_it_cannot_draw(caption: str) -> None:
     chart = Chart(Blank(), Sentence((caption,)), Sentence(("The dot is the start.",)))
     report = Report(Sentence(("x",)), lambda: (chart,), dict)
     assert render(report, "markdown") == "### x\n\nReads take \\<most\\>, 3 us.\n"
+
+
+def test_a_text_that_no_spreadsheet_takes_says_so_in_its_cell() -> None:
+    assert csv_cell("x" * 32_767) == "x" * 32_767
+    assert csv_cell("x" * 131_073) == "(131,073 characters, too long for a cell: --format json has them)"

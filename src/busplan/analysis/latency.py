@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
-from math import isinf
 from typing import Any, NamedTuple
 
 from busplan.analysis.figure_values import FigureValues
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses.cycle import BusLatency
-from busplan.elementwise import Number, plain
+from busplan.elementwise import Number, existing
 from busplan.errors import BusplanError
 from busplan.sections.base import with_unchecked
 from busplan.sections.execution import TableExecution
@@ -93,9 +92,9 @@ def latency(
 
 def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
     """Phases with the sizes of packets as whole numbers; None for one that does not exist."""
-    numbers = {key: plain(value) for key, value in phases.items()}
+    numbers = {key: existing(value) for key, value in phases.items()}
     return {
-        key: None if isinf(value) else int(value) if key.endswith("_bytes") else value for key, value in numbers.items()
+        key: int(value) if value is not None and key.endswith("_bytes") else value for key, value in numbers.items()
     }
 
 

@@ -255,6 +255,7 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
             "verdict": change.figures.verdict,
             "margin_corrected_us": change.figures.margin_corrected_us,
             "uncertainty_us": change.figures.uncertainty_us,
+            "circle_is_untested": change.circle_is_untested,
         },
         "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
         "text": " ".join(map(sentence_text, verdict_sentences(verdict, result.profile))),

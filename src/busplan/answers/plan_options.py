@@ -76,6 +76,7 @@ _SHORT: Final = {
     "bus.nodes": "{} nodes",
     "cycle.period_us": "{}",
     "cycle.slice_ratio": "ratio {}",
+    "servo.step_us": "step {}",
     "payload.read_bytes": "read {} bytes",
     "payload.write_bytes": "write {} bytes",
     "payload.read_bytes_per_axis": "read {} bytes an axis",
@@ -112,4 +113,4 @@ def _counted(words: str, value: BusValue) -> str:
 
 def _short_value(key: str, value: BusValue, *, at: str) -> ShownValue:
     found = key_value(key, value, at=at)
-    return found._replace(unit=period_value(float(value)).unit) if key == "cycle.period_us" else found
+    return found._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else found

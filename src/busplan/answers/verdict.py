@@ -9,7 +9,7 @@ from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
 from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.advice import changeable
+from busplan.analysis.planning.advice import UNTESTED_CIRCLE, changeable
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.answers.key_values import settings_sentence
 from busplan.buses.figure import (
@@ -345,6 +345,7 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
         change.changes, meanings=bus_of(profile).change_meanings, at=_place(at, "changes"), quotes=False
     ).parts
     first = f"{period_must_change(profile)} " if PERIOD in change.changes else ""
+    untested = f"; {UNTESTED_CIRCLE}" if change.circle_is_untested else ""
     if change.nodes > figures.nodes:
         more = change.nodes - (figures.safe_nodes or 0)
         way = (
@@ -355,12 +356,12 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
             ", which carries ",
         )
         carried = _nodes(change.figures.safe_nodes or 0, change.figures.safe_axes or 0).parts
-        return Sentence((*way, *carried, "."))
+        return Sentence((*way, *carried, untested, "."))
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     margin, doubt = (_figure(one, change.figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
     either_way = (" +/- ", doubt) if change.figures.uncertainty_us else ()
-    return Sentence((*way, margin, *either_way, "."))
+    return Sentence((*way, margin, *either_way, untested, "."))
 
 
 def period_must_change(profile: Profile) -> str:

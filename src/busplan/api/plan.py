@@ -116,8 +116,8 @@ def plan(
     reserve
         Share of the slice that must stay free, 0..0.99, instead of the profile's limits.reserve [1].
     free
-        Names of what may be changed, of gap_count, slice_ratio, responses, payload, period and nodes; by default gap
-        count, slice ratio up to 0.9, and period.
+        Names of what may be changed, of step (of the circle, where it does not divide the period), gap_count,
+        slice_ratio, responses, payload, period and nodes; by default step, gap count, slice ratio to 0.9, period.
     circle
         Run the circle test, if the profile has a section for it.
     max_circles

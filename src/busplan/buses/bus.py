@@ -71,6 +71,8 @@ class Bus(ABC):
     """In the order in which they are reported; at least one grows with the nodes."""
     periods: ClassVar[Periods] = ANY_PERIOD
     """Communication periods that it knows. One that knows some alone has a limit and a rule of `known_period`."""
+    clock_key: ClassVar[str] = ""
+    """Key that says whether a clock is common to the nodes, where a profile may do without."""
     starter: "ClassVar[Starter]"
     """What a new profile starts from."""
     rules: ClassVar[tuple[Rule, ...]] = ()

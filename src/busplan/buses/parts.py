@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.figure import MARGIN, Ink
 from busplan.buses.network import Network
-from busplan.elementwise import Number
+from busplan.elementwise import FIT_ROUNDING, Number
 
 Value = int | float | str
 """A value of a profile's key."""
@@ -62,7 +62,11 @@ class Limit(NamedTuple):
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it: a truth, or an array of them."""
-        return self.value(network) > self.most(network)
+        return self.value(network) > self.bound(network)
+
+    def bound(self, network: Network) -> Number:
+        """The largest value that keeps it: `most`, but for the rounding of floats."""
+        return self.most(network) * (1 + FIT_ROUNDING)
 
     def words(self, network: Network) -> str:
         """Say by how much a network breaks it."""
@@ -89,6 +93,8 @@ class Starter(NamedTuple):
 class Cost(IntEnum):
     """What a change of a network costs, the cheapest first: the one order of plans, of advice and of cures."""
 
+    SIMULATION = 0
+    """A number that the circle test alone knows."""
     REGISTER = 1
     """A number in the nodes, such as a gap count."""
     HOST_TIME = 2

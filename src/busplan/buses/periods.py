@@ -4,10 +4,7 @@ from bisect import bisect_left, bisect_right
 from math import inf
 from typing import Final, NamedTuple
 
-from busplan.elementwise import Number, next_entry
-
-_ROUNDING: Final = 1e-12
-"""Relative allowance for the rounding of floats, as where a cycle is held against its slice."""
+from busplan.elementwise import FIT_ROUNDING, Number, next_entry
 
 
 class Periods(NamedTuple):
@@ -45,7 +42,7 @@ class Periods(NamedTuple):
         """
         if not self.us:
             return least_us
-        return next_entry(self.us, least_us * (1 - _ROUNDING), words="the next period that the bus knows")
+        return next_entry(self.us, least_us * (1 - FIT_ROUNDING), words="the next period that the bus knows")
 
     def neighbours(self, period_us: float) -> tuple[float, ...]:
         """The next shorter one and the next longer one, where they exist [us].

@@ -68,9 +68,10 @@ def plan_command(
         typer.Option(
             "--free",
             metavar="NAMES",
-            help="What may be changed, with commas: gap_count, slice_ratio, responses (reads concatenated, writes "
+            help="What may be changed, with commas: step (of the circle, where it does not divide the period), "
+            "gap_count, slice_ratio, responses (reads concatenated, writes "
             "unified), schedule (where the bus has one), payload (less), period, nodes (fewer), in the order of their "
-            "cost.  [default: gap_count,slice_ratio,period]",
+            "cost.  [default: step,gap_count,slice_ratio,period]",
         ),
     ] = None,
     circle: Annotated[

@@ -9,6 +9,8 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 
 _BLOCK: Final = 1 << 16
+_LONGEST_CELL: Final = 32_767
+"""Most characters of a cell in a spreadsheet; Python's csv module reads four times as many."""
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 """First characters of a text that spreadsheets run as a formula: it could start a program or send data away."""
 
@@ -47,13 +49,19 @@ def csv_blocks(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) 
 def csv_cell(value: object) -> object:
     """Convert a value to a CSV cell; text that a spreadsheet would run as a formula gets an apostrophe in front.
 
+    A text that no spreadsheet takes is left out, and says so.
+
     Examples
     --------
     >>> csv_cell("=1+1"), csv_cell(-1.5), csv_cell(["time", "nodes"]), csv_cell(True), csv_cell(None)
     ("'=1+1", -1.5, 'time nodes', 'true', '')
     """
     cell = spelled(value)
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell
+    if not isinstance(cell, str):
+        return cell
+    if len(cell) > _LONGEST_CELL:
+        return f"({len(cell):,} characters, too long for a cell: --format json has them)"
+    return f"'{cell}" if cell.startswith(_FORMULA) else cell
 
 
 def spelled(value: object) -> object:

@@ -1,7 +1,6 @@
 """A new profile: of a machine of one's own, or from a shipped one with its comments and layout."""
 
 import re
-from math import ceil
 from typing import Final, NamedTuple
 
 from busplan.buses import kind_named
@@ -11,6 +10,7 @@ from busplan.nearest import did_you_mean
 from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
 from busplan.profile.write import value_text
+from busplan.servo.checks import dividing_step_us
 
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
 _TURN: Final = (
@@ -137,7 +137,7 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
             measure=starter.measure.format(file=file, group=""),
             base=starter.base,
         )
-    step_us = machine.period_us / ceil(machine.period_us / _LONGEST_STEP_US)
+    step_us = dividing_step_us(machine.period_us, most_us=_LONGEST_STEP_US)
     text = _MACHINE.format(
         name=value_text(name),
         bus=starter.bus,

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN
-from busplan.analysis.capacity.cycle import TIME
+from busplan.analysis.capacity.cycle import TIME, fits_in
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
 
@@ -34,7 +34,7 @@ def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
 def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The slice is fuller than [limits] allows."""
     limit, one = subject.profile.limits.max_utilisation, subject.deciding
-    if limit is not None and one.utilisation > limit:
+    if limit is not None and not (limit and fits_in(one.required_us / limit, available_us=one.available_us)):
         used, allowed = told_apart(100 * one.utilisation, 100 * limit)
         words = f"{used}% of the slice is used, {allowed}% allowed"
         yield RuleProblem("limits.max_utilisation", words, *subject.cure())

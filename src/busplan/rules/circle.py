@@ -6,8 +6,8 @@ They share one run of the test, only for profiles with a section for it.
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from busplan.analysis.circle.refusal import circle_refusals
-from busplan.buses.rule import Rule, RuleProblem
+from busplan.analysis.circle.refusal import STEP, circle_refusals
+from busplan.buses.rule import Mending, Rule, RuleProblem
 from busplan.rules.finding import Subject
 from busplan.sections.base import value_at
 from busplan.sections.machine import CONTOUR_MEASURES
@@ -30,7 +30,7 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     """
     profile, most_steps = subject.profile, subject.circle_steps
     refused = circle_refusals(profile)
-    yield from (("BP203", _refused(one, profile)) for one in refused)
+    yield from (("BP203", _refused(one, subject)) for one in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.analysis.circle.failures import STABILITY
@@ -40,12 +40,14 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     steps = path_steps(profile)
     if steps > most_steps:
         words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
-        yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile), words)
+        yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
         return
     result = circle_test(profile).results[0]
+    # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
+    failures = [one for one in result.failures if not one.is_of_bus]
     first = to_attack(result)
     attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
-    for failure in result.failures:
+    for failure in failures:
         stability = failure.name in STABILITY
         # A finding needs a key in the file: a default limit has none.
         said = failure.name in profile.tolerance.model_fields_set
@@ -57,19 +59,20 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
 
 
-def _refused(cause: Refused, profile: Profile) -> RuleProblem:
-    """Why a circle cannot be run, at a key of the file."""
-    key = _key_in_file(cause.name, profile)
+def _refused(cause: Refused, subject: Subject) -> RuleProblem:
+    """Why a circle cannot be run, at a key that the file sets."""
+    key = _key_in_file(cause.name, *cause.beside, profile=subject.profile)
     # A key that is the cause says its name already.
     words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
-    return RuleProblem(key, words, way_out)
+    return RuleProblem(key, words, *(subject.cure() if cause.name == STEP else Mending(way_out)))
 
 
-def _key_in_file(key: str, profile: Profile) -> str:
-    """A key where the profile sets it, or the nearest section."""
-    section, _, name = key.rpartition(".")
-    if name in value_at(profile, section).model_fields_set:
-        return key
+def _key_in_file(*keys: str, profile: Profile) -> str:
+    """The first of some keys that the profile sets, or the nearest section."""
+    for key in keys:
+        section, _, name = key.rpartition(".")
+        if name in value_at(profile, section).model_fields_set:
+            return key
     return "servo" if "servo" in profile.model_fields_set else "circle"
 
 

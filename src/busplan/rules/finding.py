@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 from busplan.analysis.capacity.cycle import available_us, cycle_of, fits_in
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.circle.check import MOST_STEPS, CircleCheck
+from busplan.analysis.circle.check import MOST_STEPS
 from busplan.analysis.network import bus_of, model_names, network_of
-from busplan.analysis.planning.advice import changeable, cure
+from busplan.analysis.planning.advice import UNTESTED_CIRCLE, changeable, cure
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.buses.rule import Mending, Rule, RuleProblem, Severity
 from busplan.forms.numbers import listed
@@ -71,7 +71,7 @@ class Subject:
     changes
         Changes of the profile, which the text does not show.
     circle_steps
-        Most simulated steps of each axis of a circle that a cure must pass; None for no circle.
+        Most simulated steps of each axis of the circle that a cure gives the profile; None for no circle.
     """
 
     def __init__(
@@ -121,9 +121,14 @@ class Subject:
 
     @cached_property
     def _cure(self) -> Mending:
-        circle = None if self.circle_steps is None else CircleCheck(most_steps=self.circle_steps, own=self.profile)
-        found = cure(self.profile, circle=circle)
+        found = cure(self.profile, circle_steps=self.circle_steps)
         if found.changes is None:
             return Mending(f"no change of {listed(changeable(self.profile), 'and')} is a cure: {found.why}")
         lines = tuple(f"{key} = {short_text(value)}" for key, value in found.changes.items())
-        return Mending("the period must change" if PERIOD in found.changes else "", lines)
+        if found.circle_failures:
+            return Mending(f"with {', '.join(lines)} it fits, and then {found.circle_failures[0]}; `plan` tries more")
+        words = (
+            "the period must change" if PERIOD in found.changes else "",
+            UNTESTED_CIRCLE if found.circle_failures is None else "",
+        )
+        return Mending("; ".join(filter(None, words)), lines)

@@ -1,6 +1,7 @@
 """The execution time of a node: section [node.execution], a line or a table."""
 
 from itertools import pairwise
+from math import inf
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
@@ -49,6 +50,16 @@ class GradedExecution(Section):
         default=0.0, description="What the slowest execution takes beyond the execution time [us]", examples=[3.1]
     )
 
+    @property
+    def covered_bytes(self) -> tuple[float, float]:
+        """The smallest and the largest payload whose execution time is known."""
+        return 0, inf
+
+    def covers(self, payload_bytes: int) -> bool:
+        """Tell whether the execution time of that payload is known."""
+        least, most = self.covered_bytes
+        return least <= payload_bytes <= most
+
     def standard_uncertainty_us(self, execution_us: Number) -> Number:
         """Standard uncertainty u(T_exec) of an execution time [us].
 
@@ -72,10 +83,6 @@ class LinearExecution(GradedExecution):
     def ascends_from_bytes(self) -> int:
         """The payload from which on no larger one takes less time."""
         return 0
-
-    def covers(self, payload_bytes: int) -> bool:
-        """Tell whether the execution time of that payload is known."""
-        return payload_bytes >= 0
 
     def execution_us(self, payload_bytes: Number) -> Number:
         """Execution time T_exec of one transaction with that payload [us]."""
@@ -118,9 +125,10 @@ class TableExecution(GradedExecution):
         falls = [self.payload_bytes[at + 1] for at, (one, other) in enumerate(pairwise(self.time_us)) if other < one]
         return falls[-1] if falls else 0
 
-    def covers(self, payload_bytes: int) -> bool:
-        """Tell whether the execution time of that payload is known."""
-        return self.payload_bytes[0] <= payload_bytes <= self.payload_bytes[-1]
+    @property
+    def covered_bytes(self) -> tuple[float, float]:
+        """The smallest and the largest payload whose execution time is known."""
+        return self.payload_bytes[0], self.payload_bytes[-1]
 
     @property
     def range_bytes(self) -> str:

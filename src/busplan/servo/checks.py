@@ -13,6 +13,11 @@ SHORTEST_STEP_US = 1e-3
 
 _MULTIPLE_TOLERANCE = 1e-9
 """Periods such as 1000 / 3 us are not exact floats; a relative 1e-9 is a microsecond in a quarter of an hour."""
+_ROUNDING = 1e-12
+_NANOSECONDS = 3
+"""Decimals of a time in us."""
+_MOST_STEPS_MORE = 100
+"""More steps in a period than the fewest that are tried for a round one. Chosen."""
 _KNOWN = "known"
 _Value = TypeVar("_Value")
 
@@ -26,6 +31,8 @@ class Refused(NamedTuple):
     """Value as the message shows it."""
     right: str
     """What would be right."""
+    beside: tuple[str, ...] = ()
+    """Other parameters that it is refused for, which may be the ones that a user gave."""
 
     @property
     def message(self) -> str:
@@ -212,20 +219,43 @@ def no_multiple(*, period_us: float, step_us: float) -> Iterator[Refused]:
     Yields
     ------
     Refused
-        The problem, with the nearest steps that fit.
+        The problem, with a step that fits.
 
     Examples
     --------
     >>> [one.message for one in no_multiple(period_us=1000, step_us=300)]
-    ['step_us = 300: the period of 1000 us is no multiple of it; 333.333 or 250 us would fit']
+    ['step_us = 300: the period of 1000 us is no multiple of it; 250 us would fit']
     >>> [one.message for one in no_multiple(period_us=1000, step_us=2000)]
     ['step_us = 2000: longer than the period of 1000 us; the period is the longest step that fits']
     """
     steps = period_us / step_us
     if round(steps) == 0 or steps < 1 - _MULTIPLE_TOLERANCE:
         right = f"longer than the period of {period_us:g} us; the period is the longest step that fits"
-        yield Refused("step_us", step_us, right)
+        yield Refused("step_us", step_us, right, ("period_us",))
     elif abs(steps - round(steps)) > _MULTIPLE_TOLERANCE * steps:
-        longer, shorter = period_us / math.floor(steps), period_us / math.ceil(steps)
-        right = f"the period of {period_us:g} us is no multiple of it; {longer:.6g} or {shorter:.6g} us would fit"
-        yield Refused("step_us", step_us, right)
+        fits_us = dividing_step_us(period_us, most_us=step_us)
+        right = f"the period of {period_us:g} us is no multiple of it; {fits_us:.15g} us would fit"
+        yield Refused("step_us", step_us, right, ("period_us",))
+
+
+def dividing_step_us(period_us: float, *, most_us: float) -> float:
+    """The longest step, up to a given one, that divides a period: one in whole nanoseconds, where one is near [us].
+
+    Parameters
+    ----------
+    period_us
+        The period [us].
+    most_us
+        The longest step allowed [us].
+
+    Examples
+    --------
+    >>> [dividing_step_us(period_us, most_us=100.0) for period_us in (1000.0, 250.0, 50.0, 1000 / 3)]
+    [100.0, 62.5, 50.0, 83.33333333333333]
+    """
+    fewest = math.ceil(period_us / most_us * (1 - _MULTIPLE_TOLERANCE))
+    for steps in range(fewest, min(2 * fewest, fewest + _MOST_STEPS_MORE) + 1):
+        step_us = round(period_us / steps, _NANOSECONDS)
+        if math.isclose(step_us * steps, period_us, rel_tol=_ROUNDING):
+            return step_us
+    return period_us / fewest

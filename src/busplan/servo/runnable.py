@@ -100,13 +100,14 @@ def unfit_move(move: Move, *, radius_mm: float) -> Iterator[Refused]:
             move.feed_mm_per_min,
             f"never reached on a circle of radius_mm = {radius_mm} with ramps of {move.ramp_s:g} s; "
             f"choose at most {reachable:.6g} mm/min, at least {smallest_mm:.6g} mm, or shorter ramps",
+            ("radius_mm", "ramp_periods", "period_us"),
         )
     elif move.setpoints > MAX_SETPOINTS:
         right = (
             f"the circle takes {move.setpoints:.3g} periods of {move.period_us:g} us, more than {MAX_SETPOINTS}; "
             f"choose a faster feed, a smaller radius or a longer period"
         )
-        yield Refused("feed_mm_per_min", move.feed_mm_per_min, right)
+        yield Refused("feed_mm_per_min", move.feed_mm_per_min, right, ("radius_mm", "period_us"))
 
 
 def unfit_steps(setpoints: int, *, reach_mm: float, axis: Axis, timing: LoopTiming) -> Iterator[Refused]:
@@ -124,7 +125,7 @@ def unfit_steps(setpoints: int, *, reach_mm: float, axis: Axis, timing: LoopTimi
     steps = setpoints * timing.steps_per_period
     if steps > MAX_STEPS:
         right = f"the move takes {steps} steps, more than {MAX_STEPS}; choose a longer step or a shorter move"
-        yield Refused("step_us", timing.step_us, right)
+        yield Refused("step_us", timing.step_us, right, ("feed_mm_per_min", "radius_mm"))
     travel_mm = reach_mm + axis.max_velocity_mm_s * setpoints * timing.period_us / _US_PER_S
     if travel_mm > _LARGEST_COUNT * axis.encoder_resolution_mm > 0:
         right = (
@@ -152,6 +153,7 @@ def out_of_reach(axis: Axis, *, name: str, feed_mm_per_min: float) -> Iterator[R
             axis.drive_offset_mm_s,
             f"axis {name} commands at most {highest_mm_s:g} mm/s with "
             f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the offset must stay below it",
+            ("max_velocity_mm_s",),
         )
     elif feed_mm_per_min / _S_PER_MIN >= highest_mm_s - offset_mm_s:
         yield Refused(
@@ -159,6 +161,7 @@ def out_of_reach(axis: Axis, *, name: str, feed_mm_per_min: float) -> Iterator[R
             feed_mm_per_min,
             f"axis {name} reaches {(highest_mm_s - offset_mm_s) * _S_PER_MIN:g} mm/min with "
             f"max_velocity_mm_s = {axis.max_velocity_mm_s}{levels}; the feed must stay below it",
+            ("max_velocity_mm_s", "drive_offset_mm_s"),
         )
 
 
@@ -174,4 +177,5 @@ def unfit_delivery(delivery: Delivery, *, period_us: float) -> Iterator[Refused]
     """
     if abs(delivery.skew_us) + delivery.jitter_us > period_us / 2:
         both = f"{delivery.jitter_us} and skew_us = {delivery.skew_us}"
-        yield Refused("jitter_us", both, f"together they must not exceed half the period, {period_us / 2:g} us")
+        right = f"together they must not exceed half the period, {period_us / 2:g} us"
+        yield Refused("jitter_us", both, right, ("skew_us", "period_us"))

@@ -7,13 +7,13 @@ JCGM 100 (GUM): the combined standard uncertainty of independent inputs (5.1), a
 
 from typing import Final, Literal, NamedTuple
 
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, available_us, fits_in, time_limit
+from busplan.analysis.capacity.cycle import available_us, fits_in, time_limit
 from busplan.analysis.network import bus_of
 from busplan.buses.cycle import BusCycle, Doubt
 from busplan.buses.figure import BIAS, UNCERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.parts import Limit
-from busplan.elementwise import Number, choose, named, square_root, total
+from busplan.elementwise import FIT_ROUNDING, Number, choose, named, square_root, total
 
 VerdictWord = Literal["fits", "not shown to fit", "does not fit"]
 FITS: Final[VerdictWord] = "fits"

@@ -8,14 +8,11 @@ from busplan.buses.cycle import BusCycle
 from busplan.buses.network import Network
 from busplan.buses.parts import Limit
 from busplan.buses.time_slice import time_slice_us
-from busplan.elementwise import Number
+from busplan.elementwise import Number, within
 from busplan.sections.profile import Profile
 
 TIME: Final = "time"
 """Key of the limit that is none of the bus: the cycle takes longer than its slice."""
-FIT_ROUNDING: Final = 1e-12
-"""Relative allowance for the rounding of floats, so that a cycle that fills its slice exactly fits it. It is a
-billionth of a crystal's tolerance and buys no time."""
 
 
 def cycle_of(profile: Profile, *, model: str, nodes: int | None = None) -> BusCycle:
@@ -47,8 +44,7 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
     >>> fits_in(0.1 + 0.2, available_us=0.3)
     True
     """
-    most_us: Number = available_us * (1 + FIT_ROUNDING)
-    return required_us <= most_us
+    return within(required_us, available_us)
 
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
@@ -64,7 +60,7 @@ def time_limit(needed_us: Callable[[Network], Number]) -> Limit:
         TIME,
         "{value:.3f} us needed of {most:.3f} us",
         needed_us,
-        lambda one: available_us(one) * (1 + FIT_ROUNDING),
+        available_us,
         failure="required_us",
     )
 

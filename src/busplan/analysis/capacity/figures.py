@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import chain
-from math import isinf
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import VERDICTS, Certainty, VerdictWord, certainty, verdict_code
@@ -16,7 +15,7 @@ from busplan.buses.cycle import BusCycle, Doubt, Term
 from busplan.buses.figure import CERTAINTY
 from busplan.buses.network import Network
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
-from busplan.elementwise import Number, choose, plain
+from busplan.elementwise import Number, choose, existing, plain
 from busplan.profile.toml import at_periods
 from busplan.sections.profile import Profile
 
@@ -175,7 +174,7 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
     network = network_of(profile)
     bus = bus_of(profile)
     cycle = bus.cycle(network, model=model)
-    numbers: dict[str, Any] = {key: _existing(number) for key, number in numeric_figures(cycle).items()}
+    numbers: dict[str, Any] = {key: existing(number) for key, number in numeric_figures(cycle).items()}
     own = FigureValues({key: None if number is None else plain(number) for key, number in cycle.figures().items()})
     late = not fits_in(numbers["required_us"], available_us=numbers["available_us"])
     broken = broken_limits(profile)
@@ -232,7 +231,7 @@ def _certainty_figures(cycle: BusCycle, *, is_broken: bool) -> dict[str, Any]:
     """Figures of how sure the verdict is, by the names of `CapacityFigures`, without counts."""
     found = certainty(cycle)
     return {
-        **{key: None if one is None else _existing(one) for key, one in certainty_numbers(found, cycle).items()},
+        **{key: None if one is None else existing(one) for key, one in certainty_numbers(found, cycle).items()},
         "verdict": VERDICTS[int(verdict_code(found, cycle.network, is_broken=is_broken))],
         "doubts": found.doubts,
     }
@@ -288,11 +287,6 @@ def numeric_figures(cycle: BusCycle) -> dict[str, Number]:
         "min_period_us": _shortest_us(network, required_us),
         "min_slice_ratio": required_us / period_us,
     }
-
-
-def _existing(number: Number) -> float | None:
-    """A plain number; None for an infinite one, which does not exist."""
-    return None if isinf(found := plain(number)) else found
 
 
 def _shortest_us(network: Network, needed_us: Number) -> Number:

@@ -108,7 +108,7 @@ def _in_closed_form(limit: Limit, network: Network) -> Number | None:
     """The most nodes within one limit, infinite where they play no part; None where there is no closed form."""
     try:
         at = network.with_nodes(NODES)
-        value, most = limit.value(at), limit.most(at)
+        value, most = limit.value(at), limit.bound(at)
         if isinstance(most, Polynomial):
             return None
         if isinstance(value, Polynomial):

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import FIT_ROUNDING
 from busplan.analysis.capacity.node_limit import largest_nodes, safe_nodes
 from busplan.analysis.network import bus_of, network_of
+from busplan.elementwise import FIT_ROUNDING
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_TIME_US
 from busplan.sections.profile import Profile

@@ -8,7 +8,7 @@ from busplan.progress import Progress
 from busplan.sections.profile import Profile
 
 MOST_STEPS: Final = 10_000_000
-"""Most steps of a circle that is run where nobody asked for it: seconds, and a few hundred megabytes."""
+"""Most steps of a circle that a gate runs: seconds, and a few hundred megabytes."""
 _PARTS: Final = 1000
 """Progress steps of one test."""
 
@@ -22,33 +22,14 @@ class CircleCheck:
         Called with the parts of tests done and those expected.
     expected
         Number of tests expected [1].
-    most_steps
-        Most simulated steps of each axis; None for any number. A longer circle is not run, and fails unless it is no
-        longer than that of `own`.
-    own
-        Profile that the variants are of.
-    is_taken
-        Whether its circle, at its own period and with its own delays, is taken to pass.
     """
 
-    def __init__(
-        self,
-        *,
-        progress: Progress | None = None,
-        expected: int = 1,
-        most_steps: int | None = None,
-        own: Profile | None = None,
-        is_taken: bool = False,
-    ) -> None:
+    def __init__(self, *, progress: Progress | None = None, expected: int = 1) -> None:
         self._progress = progress
         self._expected = expected
-        self._most_steps = most_steps
-        self._known: dict[tuple[float, tuple[float, float], float], tuple[str, ...]] = {}
+        self._known: dict[tuple[float, ...], tuple[str, ...]] = {}
         self._always: tuple[str, ...] = ()
         """Failures that no period mends."""
-        self._own = own
-        if own is not None and is_taken:
-            self._known[_key(own)] = ()
 
     def __call__(self, profile: Profile) -> tuple[str, ...]:
         """Run the circle test and list its failures, or why it cannot be run; empty if it passes.
@@ -58,7 +39,7 @@ class CircleCheck:
         profile
             A variant that is shown to fit its bus: its failures are those of the circle.
         """
-        key = _key(profile)
+        key = rests_on(profile)
         if key not in self._known:
             self._known[key] = self._always or self._run(profile)
         return self._known[key]
@@ -66,13 +47,8 @@ class CircleCheck:
     def _run(self, profile: Profile) -> tuple[str, ...]:
         from busplan.analysis.circle.failures import STABILITY
         from busplan.analysis.circle.roundness import circle_test
-        from busplan.analysis.circle.setup import path_steps
 
         try:
-            steps = path_steps(profile)
-            if self._most_steps is not None and steps > self._most_steps:
-                own_steps = 0 if self._own is None else path_steps(self._own)
-                return () if steps <= own_steps else (f"a circle of {steps:,} steps is too long to be run here",)
             result = circle_test(profile, explain=False, progress=self._report).results[0]
         except BusplanError as error:
             return error.problems
@@ -88,6 +64,25 @@ class CircleCheck:
             self._progress(tests * _PARTS + done * _PARTS // total, max(self._expected, tests + 1) * _PARTS)
 
 
-def _key(profile: Profile) -> tuple[float, tuple[float, float], float]:
-    """What a circle rests on: the cycle itself matters only inside a loop on the host, or without a common clock."""
-    return profile.cycle.period_us, loop_delays_us(profile), skew_us(profile)
+def rests_on(profile: Profile) -> tuple[float, ...]:
+    """What of bus and cycle a circle rests on: the period, its steps, delays in a loop on the host, and skew [us]."""
+    return profile.cycle.period_us, profile.servo.step_us, *loop_delays_us(profile), skew_us(profile)
+
+
+def failures_within(profile: Profile, *, most_steps: int) -> tuple[str, ...] | None:
+    """What the circle of a profile does not hold, or why it cannot be run; None where it is too long to be run.
+
+    Parameters
+    ----------
+    profile
+        A profile that is shown to fit its bus.
+    most_steps
+        Most simulated steps of each axis.
+    """
+    from busplan.analysis.circle.setup import path_steps
+
+    try:
+        steps = path_steps(profile)
+    except BusplanError as error:
+        return error.problems
+    return None if steps > most_steps else CircleCheck()(profile)

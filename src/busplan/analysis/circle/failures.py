@@ -9,6 +9,7 @@ from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures
 from busplan.analysis.network import bus_of, network_of
+from busplan.elementwise import existing
 from busplan.sections.machine import CONTOUR_MEASURES
 from busplan.sections.profile import Profile
 from busplan.servo.circle import FULL_TURN_DEG, CircleRun
@@ -111,6 +112,9 @@ _FAILURES: Final[dict[str, _Saying]] = {
 }
 
 
+_OF_TIME: Final = ("required_us", "safe_required_us")
+
+
 class Failure(NamedTuple):
     """One failure of the test: a tolerance by its key, a limit of the bus, or stability."""
 
@@ -124,9 +128,15 @@ class Failure(NamedTuple):
     more: str = ""
     """What the message goes on to say."""
 
+    @property
+    def is_of_bus(self) -> bool:
+        """Whether the bus is what fails, and not the circle."""
+        return bool(self.said) or self.name in _OF_TIME
+
     def document(self) -> dict[str, Any]:
-        """Return it as in the JSON document."""
-        return {"name": self.name, "value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
+        """Return it as in the JSON document; a value that does not exist is null, and the text says why."""
+        numbers = {"value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
+        return {"name": self.name, **numbers, "text": self.text}
 
     @property
     def text(self) -> str:
@@ -187,7 +197,9 @@ def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, 
         late = (Failure("safe_required_us", capacity.safe_required_us, capacity.available_us),)
     return (
         *(
-            Failure(one.failure or one.key, float(one.value(network)), float(one.most(network)), one.words(network))
+            Failure(
+                one.failure or one.key, existing(one.value(network)), existing(one.most(network)), one.words(network)
+            )
             for one in broken
         ),
         *late,

@@ -98,8 +98,7 @@ def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refuse
         except ParameterError as error:
             found = [*error.refused]
         causes += (_at_key(cause, profile, name) for cause in found)
-    late = unfit_delivery(delivery_of(profile), period_us=profile.cycle.period_us)
-    causes += (_at_key(cause, profile) for cause in late)
+    causes += _late(profile)
     if not (causes or of_loop):
         causes += _move(profile, axes)
     # Both axes may refuse one key.
@@ -124,7 +123,7 @@ def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
     """
     default = "" if "step_us" in profile.servo.model_fields_set else f"; it is the default of {STEP}"
     for one in no_multiple(period_us=period_us, step_us=profile.servo.step_us):
-        yield one._replace(name=STEP, right=f"{one.right}{default}")
+        yield one._replace(name=STEP, right=f"{one.right}{default}", beside=("cycle.period_us",))
 
 
 def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
@@ -155,12 +154,31 @@ def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) ->
         yield from (_at_key(cause, profile, name) for cause in causes)
 
 
+def _late(profile: Profile) -> Iterator[Refused]:
+    """Refuse a delivery that would change the order of packets: the profile's own, or for want of a common clock."""
+    period_us, apart_us = profile.cycle.period_us, skew_us(profile)
+    own = [*unfit_delivery(Delivery(**parameters_in(profile.delivery, Delivery)), period_us=period_us)]
+    yield from (_at_key(cause, profile) for cause in own)
+    if not own and any(unfit_delivery(delivery_of(profile), period_us=period_us)):
+        right = (
+            f"the last axis then takes its set-points {apart_us:g} us behind the first, which the circle test knows up "
+            f"to half the period, {period_us / 2:g} us, with jitter and skew; set it true if the drives have a clock"
+        )
+        yield Refused(bus_of(profile).clock_key, "false", right)
+
+
 def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> Refused:
-    """A cause by the dotted key of its parameter: that of one axis, where the axis has its own."""
-    if axis is not None and cause.name in getattr(profile.servo, axis).model_fields_set:
-        return cause._replace(name=f"servo.{axis}.{cause.name}")
-    sections = (name for name in ("servo", "circle", "delivery") if hasattr(getattr(profile, name), cause.name))
-    return cause._replace(name=f"{next(sections)}.{cause.name}")
+    """A cause by the dotted keys of its parameters."""
+    name, *beside = (_key_of(one, profile, axis) for one in (cause.name, *cause.beside))
+    return cause._replace(name=name, beside=tuple(beside))
+
+
+def _key_of(name: str, profile: Profile, axis: AxisName | None) -> str:
+    """Dotted key of a parameter: that of one axis, where the axis has its own."""
+    if axis is not None and name in getattr(profile.servo, axis).model_fields_set:
+        return f"servo.{axis}.{name}"
+    sections = (one for one in ("servo", "circle", "delivery", "cycle") if hasattr(getattr(profile, one), name))
+    return f"{next(sections)}.{name}"
 
 
 # --- parts of the simulation that need no numpy -----------------------------------------------------------------

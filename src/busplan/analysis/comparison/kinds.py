@@ -22,6 +22,7 @@ from busplan.profile.toml import override
 from busplan.progress import Progress
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
+from busplan.servo.checks import dividing_step_us
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures
@@ -48,7 +49,7 @@ class CircleAtSmallest(NamedTuple):
     """The circle test at the smallest period."""
 
     step_us: float
-    """The largest step, up to the profile's own, that divides the period [us]."""
+    """The longest round step, up to the profile's own, that divides the period [us]."""
     figures: "CircleFigures | None"
     """None if it could not be run."""
     problems: tuple[str, ...]
@@ -219,24 +220,6 @@ def _circle(one: MachineOnKind, run: ComputeCircleFigures) -> CircleAtSmallest |
     except BusplanError as error:
         return CircleAtSmallest(step_us, None, error.problems)
     return CircleAtSmallest(step_us, found, tuple(failure.text for failure in found.failures))
-
-
-def dividing_step_us(period_us: float, *, most_us: float) -> float:
-    """Find the largest step, up to a given one, that divides a period [us].
-
-    Parameters
-    ----------
-    period_us
-        The period [us].
-    most_us
-        The longest step allowed [us].
-
-    Examples
-    --------
-    >>> [dividing_step_us(period_us, most_us=100.0) for period_us in (1000.0, 250.0, 50.0)]
-    [100.0, 83.33333333333333, 50.0]
-    """
-    return period_us / ceil(period_us / most_us * (1 - 1e-12))
 
 
 def fitting(found: KindComparison) -> Iterator[MachineOnKind]:

@@ -1,5 +1,6 @@
 """Write the lines of a derivation in symbols and in numbers."""
 
+from collections.abc import Sequence
 from inspect import signature
 from typing import Final
 
@@ -9,6 +10,10 @@ from busplan.elementwise import Number
 from busplan.sourced import SYMBOLS, Equation, Sourced
 
 _ATOM: Final = 4
+_MOST_TERMS: Final = 24
+"""Operands of a sum that is written out."""
+_SHOWN_TERMS: Final = 3
+"""First operands that are written of a longer one."""
 _MOST_DIGITS: Final = 17
 """Digits that distinguish any two floats."""
 _SUPPORTS: Final = 1e-4
@@ -97,7 +102,32 @@ def _written(operand: Number, *, in_numbers: bool, top: bool = False) -> tuple[s
         if isinstance(won, Sourced) and not in_numbers:
             return _atom(won.symbol or won.meaning)
         return _written(won, in_numbers=in_numbers)
+    terms = _chained(operand)
+    if len(terms) > _MOST_TERMS:
+        return _shortened(operand.operation, terms, in_numbers=in_numbers)
     return _joined(operand, [_written(part, in_numbers=in_numbers) for part in operand.parts], in_numbers=in_numbers)
+
+
+def _chained(operand: Traced) -> list[Number]:
+    """The operands of a sum, or of the largest or smallest of several; of other operations none."""
+    if operand.operation not in ("add", "larger", "smaller"):
+        return []
+    found: list[Number] = []
+    left: Number = operand
+    while isinstance(left, Traced) and left.operation == operand.operation and (left is operand or not left.symbol):
+        left, right = left.parts
+        found.append(right)
+    return [left, *reversed(found)]
+
+
+def _shortened(name: str, terms: Sequence[Number], *, in_numbers: bool) -> tuple[str, int]:
+    """The first operands and the last: nobody reads a sum of hundreds."""
+    operation = OPERATIONS[name]
+    each = [_written(one, in_numbers=in_numbers)[0] for one in (*terms[:_SHOWN_TERMS], terms[-1])]
+    each.insert(-1, f"... {len(terms) - len(each)} more ...")
+    if operation.rank == FUNCTION:
+        return f"{operation.sign}({', '.join(each)})", FUNCTION
+    return f" {operation.sign} ".join(each), operation.rank
 
 
 def _joined(operand: Traced, parts: list[tuple[str, int]], *, in_numbers: bool) -> tuple[str, int]:

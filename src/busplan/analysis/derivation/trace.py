@@ -245,24 +245,28 @@ def _is_switch(operand: Number, value: int) -> bool:
 
 def lines(figure: Traced) -> Iterator[Traced]:
     """Every named number behind a figure, in the order of computation; the figure is last."""
-    yield from (one for one in _visit(figure, set()) if not one.given and (one.symbol or one is figure))
+    yield from (one for one in _visit(figure) if not one.given and (one.symbol or one is figure))
 
 
 def inputs(figure: Traced) -> Iterator[Input]:
     """Inputs of a figure: keys of the profile and constants, each once."""
     found: dict[tuple[str, str], Input] = {}
-    for one in _visit(figure, set()):
+    for one in _visit(figure):
         for leaf in (one.given, *(constant(part) for part in one.parts if isinstance(part, Sourced))):
             if leaf is not None:
                 found.setdefault((leaf.name, leaf.symbol), leaf)
     yield from found.values()
 
 
-def _visit(one: Traced, seen: set[int]) -> Iterator[Traced]:
-    if id(one) in seen:
-        return
-    seen.add(id(one))
-    for part in one.parts:
-        if isinstance(part, Traced):
-            yield from _visit(part, seen)
-    yield one
+def _visit(figure: Traced) -> Iterator[Traced]:
+    """Every number behind a figure once, its parts before it; a sum of thousands is deeper than Python recurses."""
+    seen: set[int] = set()
+    waiting = [(figure, False)]
+    while waiting:
+        one, has_parts_behind = waiting.pop()
+        if has_parts_behind:
+            yield one
+        elif id(one) not in seen:
+            seen.add(id(one))
+            waiting.append((one, True))
+            waiting.extend((part, False) for part in reversed(one.parts) if isinstance(part, Traced))

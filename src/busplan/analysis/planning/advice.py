@@ -1,10 +1,9 @@
 """What to change in a profile: the one answer of `capacity` and of `check`, which is that of `plan`."""
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.capacity.figures import CapacityFigures, figures
-from busplan.analysis.circle.check import MOST_STEPS, CircleCheck
+from busplan.analysis.circle.check import failures_within, rests_on
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.freedoms import freed
 from busplan.analysis.planning.machine import with_nodes
@@ -13,6 +12,9 @@ from busplan.buses.parts import Value
 from busplan.profile.toml import override
 from busplan.sections.base import MAX_COUNT
 from busplan.sections.profile import Profile
+
+UNTESTED_CIRCLE: Final = "the circle is another one then, and is not simulated here"
+"""What is said of a change whose circle nobody has tested."""
 
 
 class Change(NamedTuple):
@@ -24,6 +26,8 @@ class Change(NamedTuple):
     """Nodes that the change is made for."""
     figures: CapacityFigures
     """The capacity after it, under the model that decides."""
+    circle_is_untested: bool
+    """Whether the profile has another circle after it, which nobody has simulated."""
 
 
 class Cure(NamedTuple):
@@ -33,6 +37,8 @@ class Cure(NamedTuple):
     """New value by dotted key, the dearest change first; empty if nothing is to change, None if no change is enough."""
     why: str = ""
     """What stands in the way, if no change is enough."""
+    circle_failures: tuple[str, ...] | None = ()
+    """What the circle does not hold after it; None where it is another one then, and was not simulated."""
 
 
 def changeable(profile: Profile) -> tuple[str, ...]:
@@ -40,26 +46,33 @@ def changeable(profile: Profile) -> tuple[str, ...]:
     return tuple(one.label for one in freed(profile, None))
 
 
-def cure(profile: Profile, *, circle: CircleCheck | None) -> Cure:
-    """Find the least change after which a profile holds every constraint.
+def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
+    """Find the least change after which a profile holds every constraint but its circle.
+
+    One circle at most is simulated: the one after the change, where that is another one.
 
     Parameters
     ----------
     profile
         The network.
-    circle
-        Runs the circle test; None for none.
+    circle_steps
+        Most simulated steps of each axis of that circle; None for no simulation.
     """
-    search, levels = Search(profile, circle=circle), freed(profile, None)
+    search, levels = Search(profile), freed(profile, None)
     found = search.least(levels)
-    return Cure(None, search.binding(levels).why) if found is None else Cure(dict(found))
+    if found is None:
+        return Cure(None, search.binding(levels).why)
+    changes, after = dict(found), search.profile(found)
+    if not profile.asks_for_circle or rests_on(after) == rests_on(profile):
+        return Cure(changes)
+    failures = None if circle_steps is None else failures_within(after, most_steps=circle_steps)
+    return Cure(changes, circle_failures=failures)
 
 
 def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
-    """Find the least change after which a profile holds every constraint, or, where it does, has room for a node more.
+    """Find the least change after which a profile fits as a plan does, or, where it does, has room for a node more.
 
-    The circle of a network that is shown to fit stays as it is, and is not run: `circle-test` is for it. A change that
-    gives it another one is advised only if that passes.
+    No circle is simulated: that is another question.
 
     Parameters
     ----------
@@ -73,9 +86,7 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     tuple
         The change, None if there is none; and if so, what stands in the way.
     """
-    fits = now.verdict == FITS and now.safe
-    circle = CircleCheck(most_steps=MOST_STEPS, own=profile, is_taken=fits)
-    own = cure(profile, circle=circle)
+    own = cure(profile)
     if own.changes is None or own.changes:
         return _change(profile, own, nodes=now.nodes), own.why
     if now.safe_nodes is None:
@@ -83,7 +94,7 @@ def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
     nodes = now.safe_nodes + 1
     if nodes > MAX_COUNT:
         return None, f"{MAX_COUNT} nodes are the most of a profile"
-    more = cure(override(profile, dict(with_nodes(nodes))), circle=circle)
+    more = cure(override(profile, dict(with_nodes(nodes))))
     return _change(profile, more, nodes=nodes), more.why
 
 
@@ -91,4 +102,5 @@ def _change(profile: Profile, found: Cure, *, nodes: int) -> Change | None:
     if found.changes is None:
         return None
     after = override(profile, dict(found.changes))
-    return Change(found.changes, nodes, figures(after, model=bus_of(after).deciding_model))
+    decided = figures(after, model=bus_of(after).deciding_model)
+    return Change(found.changes, nodes, decided, circle_is_untested=found.circle_failures is None)

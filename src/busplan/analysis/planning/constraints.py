@@ -5,13 +5,13 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import FIT_ROUNDING, TIME, available_us, fits_in
+from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
 from busplan.analysis.circle.refusal import circle_refusals, step_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
 from busplan.elementwise import plain
-from busplan.sections.base import MIN_STEP_US, with_unchecked
+from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
 
 CIRCLE: Final = "circle"
@@ -74,8 +74,7 @@ def utilisation(profile: Profile) -> Iterator[Need]:
     if most is not None:
         bus = bus_of(profile)
         required_us = float(bus.cycle(network_of(profile), model=bus.deciding_model).required_us)
-        # A slice that gives just this must not be over the limit by rounding.
-        us = required_us * (1 + 2 * FIT_ROUNDING) / most if most * _MOST_SLICE_US > required_us else inf
+        us = required_us / most if most * _MOST_SLICE_US > required_us else inf
         yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
 
 
@@ -102,21 +101,19 @@ def needs(profile: Profile) -> list[Need]:
     return [need for constraint in CONSTRAINTS for need in constraint(profile)]
 
 
-def refused_period(profile: Profile, period_us: float) -> Need | None:
-    """Why a period is none of the bus, or keeps the circle that a profile asks for from being run, if so.
+def refused_period(profile: Profile) -> Need | None:
+    """Why a period is none of the bus, or keeps the circle that the profile asks for from being run, if so.
 
     Parameters
     ----------
     profile
         The network.
-    period_us
-        Communication period [us].
     """
-    network, bus = network_of(profile)._replace(period_us=period_us), bus_of(profile)
+    network, bus = network_of(profile), bus_of(profile)
     broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
     if broken is not None:
         return Need(inf, broken.key, broken.words(network))
-    causes = circle_refusals(with_unchecked(profile, "cycle.period_us", period_us))
+    causes = circle_refusals(profile)
     return Need(inf, causes[0].name, causes[0].message) if causes else None
 
 

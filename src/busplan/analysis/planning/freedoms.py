@@ -1,5 +1,6 @@
 """What a plan may change, in the order of its cost; each is asked for its values again after each change."""
 
+from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from itertools import count
@@ -7,11 +8,13 @@ from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.cycle import fits_in
+from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import goes_with_step
 from busplan.analysis.planning.machine import (
     NODES_KEY,
     Changes,
+    least_cut_bytes,
     payload_keys,
     rooms,
     with_nodes,
@@ -30,6 +33,7 @@ from busplan.buses.parts import Cost
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_TIME_US
+from busplan.servo.checks import dividing_step_us
 
 if TYPE_CHECKING:
     from busplan.analysis.planning.search import Search
@@ -37,7 +41,7 @@ if TYPE_CHECKING:
 
 RATIO: Final = "cycle.slice_ratio"
 PERIOD: Final = "cycle.period_us"
-DEFAULT_COSTS: Final = (Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
+DEFAULT_COSTS: Final = (Cost.SIMULATION, Cost.REGISTER, Cost.HOST_TIME, Cost.PERIOD)
 """What a plan may change where nobody says otherwise."""
 
 
@@ -58,7 +62,7 @@ class Freedom(NamedTuple):
 
 
 def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
-    """Everything that may be changed in a network, the cheapest first."""
+    """Everything that may be changed in a network, the cheapest first; the step of a circle where it must change."""
     network = network_of(profile)
     own = (
         Freedom(one.name, one.label, one.cost, one.keys, partial(_of_bus, one.name))
@@ -66,6 +70,7 @@ def freedoms(profile: "Profile") -> tuple[Freedom, ...]:
     )
     found = (
         *own,
+        *((_STEP_OF_CIRCLE,) if not goes_with_step(profile, profile.cycle.period_us) else ()),
         Freedom("slice_ratio", "slice ratio", Cost.HOST_TIME, (RATIO,), _ratios),
         Freedom("payload", "payload", Cost.PAYLOAD, payload_keys(profile), _payloads),
         Freedom("period", "period", Cost.PERIOD, (PERIOD,), _periods),
@@ -128,6 +133,18 @@ def _of_bus(name: str, search: "Search", changes: Changes, _cheaper: Sequence[Fr
             yield from setting.values
 
 
+def _dividing_steps(search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """The longest step, up to the own one, that divides the period, where that one does not."""
+    profile = search.profile(changes)
+    if not goes_with_step(profile, search.period_us(changes)):
+        one = {STEP: dividing_step_us(search.period_us(changes), most_us=profile.servo.step_us)}
+        if search.allows({**changes, **one}):
+            yield one
+
+
+_STEP_OF_CIRCLE: Final = Freedom("step", "step of the circle", Cost.SIMULATION, (STEP,), _dividing_steps)
+
+
 def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
     """The smallest ratio for each combination of what is cheaper: between two of them nothing new fits."""
     period_us, own = search.period_us(changes), search.ratio(changes)
@@ -139,18 +156,32 @@ def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> I
     yield from ({RATIO: ratio} for ratio in sorted(found) if own < ratio <= MOST_RATIO)
 
 
-def _payloads(search: "Search", changes: Changes, _cheaper: Sequence[Freedom]) -> Iterator[Changes]:
-    """Smaller payloads, in the steps of the bus: the larger one of read and write is cut first."""
+def _payloads(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
+    """Smaller payloads, in the steps of the bus: the larger one of read and write is cut first.
+
+    They begin with the largest that is in time; where none is, there is the smallest alone.
+    """
     profile = search.profile(changes)
     network = network_of(profile)
     payloads = bus_of(profile).payloads(network)
-    before: Changes = {}
-    step, largest = payloads.step_bytes, min(int(network.largest_payload_bytes) - 1, payloads.most_bytes)
-    for most in range(largest // step * step, 0, -step):
-        one = with_payload_within(profile, most, kept=search.kept)
-        if one is None:
-            return
-        if one != before and search.allows({**changes, **one}):
+    step = max(payloads.step_bytes, least_cut_bytes(profile, kept=search.kept))
+    sizes = range(min(int(network.largest_payload_bytes) - 1, payloads.most_bytes) // step * step, 0, -step)
+
+    def cut(size: int) -> Changes | None:
+        one = with_payload_within(profile, size, kept=search.kept)
+        return one if one is not None and search.allows({**changes, **one}) else None
+
+    sizes = sizes[: bisect_left(sizes, x=True, key=lambda size: cut(size) is None)]
+    # Below a point after which a table of execution times falls, a smaller payload may take longer.
+    from_bytes = max(one.node.execution.ascends_from_bytes for one in profile.alike_nodes)
+    rising = bisect_left(sizes, x=True, key=lambda size: size < from_bytes)
+    first = bisect_left(
+        sizes, x=True, hi=rising, key=lambda size: search.reaches({**changes, **(cut(size) or {})}, cheaper)
+    )
+    before: Changes | None = None
+    for size in search.in_strides(sizes[min(first, len(sizes) - 1) :] if sizes else sizes):
+        one = cut(size)
+        if one is not None and one != before:
             yield one
         before = one
 
@@ -186,7 +217,7 @@ def _periods(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> 
 def _fewer_nodes(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> Iterator[Changes]:
     """Fewer nodes, from the most that the bus carries."""
     own = int(network_of(search.profile(changes)).nodes)
-    for nodes in range(most_nodes(search, changes, cheaper, below=own), 0, -1):
+    for nodes in search.in_strides(range(most_nodes(search, changes, cheaper, below=own), 0, -1)):
         yield with_nodes(nodes)
 
 

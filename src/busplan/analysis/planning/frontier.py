@@ -1,6 +1,6 @@
 """What a network could reach with all that is cheap free: the shortest period, the largest payload, the most nodes."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from math import inf
 
@@ -62,24 +62,30 @@ def _largest_payload(goal: Profile, search: Search, cheap: Sequence[Freedom]) ->
     if with_payload(goal, largest) is None:
         return Impossible(title, "each group has its own" if goal.group else "the payload follows the axes of a node")
     execution = goal.alike_nodes[0].node.execution
-    sizes = [size for size in range(step, largest + 1, step) if execution.covers(size)]
+    sizes = range(step, largest + 1, step)
+    least, most = execution.covered_bytes
+    sizes = sizes[bisect_left(sizes, least) : bisect_right(sizes, most)]
 
     def is_out(size: int) -> bool:
         one = with_payload(goal, size) or {}
         return not (search.allows(one) and search.reaches(one, cheap))
 
     first = bisect_left(sizes, execution.ascends_from_bytes)
-    del sizes[bisect_left(sizes, True, lo=first, key=is_out) + 1 :]
-    for size in reversed(sizes):
+    sizes = sizes[: bisect_left(sizes, True, lo=first, key=is_out) + 1]
+    place, failed = len(sizes) - 1, 0
+    while place >= 0:
+        size = sizes[place]
         one = with_payload(goal, size) or {}
-        if not search.allows(one):
-            continue
-        found = search.least(cheap, one) if search.reaches(one, cheap) else None
-        if found is not None:
-            bound = payloads.bound if size == largest else "execution"
-            held_by = bound if tried is None else search.binding(cheap, tried).key
-            return option(search, title, found, held_by=held_by)
-        tried = one
+        if search.allows(one):
+            is_near = search.reaches(one, cheap)
+            found = search.least(cheap, one) if is_near else None
+            if found is not None:
+                bound = payloads.bound if size == largest else "execution"
+                held_by = bound if tried is None else search.binding(cheap, tried).key
+                return option(search, title, found, held_by=held_by)._replace(proven=failed < search.max_circles)
+            tried = one
+            failed += is_near  # in time, and refused for something else
+        place -= 1 if failed < search.max_circles else 2 ** (failed - search.max_circles + 1)
     if tried is None:
         return Impossible(title, "the execution table holds no whole step of the payload")
     return Impossible(title, f"not even the smallest fits: {search.binding(cheap, tried).why}")

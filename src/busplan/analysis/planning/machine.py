@@ -89,6 +89,16 @@ def with_payload_within(profile: Profile, most_bytes: int, *, kept: Collection[s
     return found if all(int(value) > 0 for value in found.values()) else None
 
 
+def least_cut_bytes(profile: Profile, *, kept: Collection[str] = ()) -> int:
+    """The least that any payload is cut by: what a byte of each axis makes of it, where axes add to it [bytes]."""
+    each = (
+        int(alike.node.axes) if alike.payload.key_of(kind).endswith("_per_axis") else 1
+        for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS)
+        if alike.payload_key(kind) not in kept
+    )
+    return min(each, default=1)
+
+
 def with_payload(profile: Profile, size_bytes: int) -> Changes | None:
     """The change to one payload for reads and writes alike [bytes]; None where it follows axes, or is a group's own."""
     if profile.group or profile.alike_nodes[0].payload.follows_axes:

@@ -1,10 +1,13 @@
 """The search: the least change of the dearest freedom with all cheaper ones free, then of the next dearest."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import lru_cache
+from itertools import count
 from math import inf
 from typing import Final
 
 from busplan.analysis.capacity.cycle import fits_in
+from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.network import network_of
 from busplan.analysis.planning.constraints import CIRCLE, Need, keeps_limits, needs, refused_period
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
@@ -19,6 +22,10 @@ FindCircleFailures = Callable[[Profile], tuple[str, ...]]
 """Runs the circle test of a profile that fits its bus: what it does not hold, nothing when it passes."""
 MAX_CIRCLES: Final = 50
 """Periods tested in a row for the nearest one that passes the circle. Chosen: takes some seconds."""
+
+
+_MOST_PROFILES: Final = 256
+"""Profiles that a search keeps: each has a hundred kilobytes."""
 
 
 class Search:
@@ -52,8 +59,7 @@ class Search:
         self.max_circles = max_circles
         self.proven = True
         """Whether no smaller change than the last one exists; False if the search for a period was cut short."""
-        self._profiles: dict[frozenset[tuple[str, Value]], Profile] = {}
-        self._circles: dict[float, tuple[str, ...]] = {}
+        self._profile = lru_cache(maxsize=_MOST_PROFILES)(lambda key: override(profile, dict(key)))
         self._needs: dict[frozenset[tuple[str, Value]], list[Need]] = {}
 
     def least(self, levels: Sequence[Freedom], changes: Changes | None = None) -> Changes | None:
@@ -91,7 +97,7 @@ class Search:
         """Whether every constraint holds after some changes; the circle is asked last."""
         return (
             self._fits(changes)
-            and not refused_period(self.profile(changes), self.period_us(changes))
+            and not refused_period(self.profile(changes))
             # What a limit needs of the slice was asked with the profile's own slice ratio.
             and keeps_limits(network_of(self.profile(changes)))
             and not self.circle_failures(changes)
@@ -101,13 +107,7 @@ class Search:
         """What the circle does not hold after some changes that fit the bus; nothing where it is not run."""
         if self._circle is None:
             return ()
-        servo, period_us = self._own.servo, self.period_us(changes)
-        if servo.loop == "host" and servo.update == "on_arrival":
-            return self._circle(self.profile(changes))
-        # The loop knows nothing of the bus but its period.
-        if period_us not in self._circles:
-            self._circles[period_us] = self._circle(self.profile(changes))
-        return self._circles[period_us]
+        return self._circle(self.profile(changes))
 
     # --- what a network needs, and what its slice gives it --------------------------------------------------
 
@@ -119,10 +119,7 @@ class Search:
         BusplanError
             The profile's schema refuses them.
         """
-        key = frozenset(changes.items())
-        if key not in self._profiles:
-            self._profiles[key] = override(self._own, dict(changes))
-        return self._profiles[key]
+        return self._profile(frozenset(changes.items()))
 
     def allows(self, changes: Changes) -> bool:
         """Whether the profile's schema takes some changes."""
@@ -133,8 +130,8 @@ class Search:
         return True
 
     def needs(self, changes: Changes) -> list[Need]:
-        """What each constraint asks of the slice; neither period nor slice ratio plays a part."""
-        others = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO)}
+        """What each constraint asks of the slice; neither period nor slice ratio nor step plays a part."""
+        others = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO, STEP)}
         key = frozenset(others.items())
         if key not in self._needs:
             self._needs[key] = needs(self.profile(others))
@@ -152,6 +149,19 @@ class Search:
         """Slice ratio after some changes [1]."""
         return float(changes.get(RATIO, self._own.cycle.slice_ratio))
 
+    def in_strides(self, places: Sequence[int]) -> Iterator[int]:
+        """Some of the places in their order: `max_circles` in a row, then with doubling strides, and the last."""
+        at, stride = 0, 1
+        for tried in count(1):
+            if at >= len(places) - 1:
+                break
+            yield places[at]
+            if tried >= self.max_circles and at + 1 < len(places) - 1:
+                stride *= 2
+                self.proven = False
+            at += stride
+        yield from places[-1:]
+
     # --- what is within reach -------------------------------------------------------------------------------
 
     def combinations(self, changes: Changes, levels: Sequence[Freedom]) -> Iterator[Changes]:
@@ -162,13 +172,19 @@ class Search:
         *cheaper, last = levels
         yield from self.combinations(changes, cheaper)
         if not last.gives_time:
+            proven = self.proven
             for one in last.values(self, changes, cheaper):
                 if not self.kept & set(one):
                     yield from self.combinations({**changes, **one}, cheaper)
+            self.proven = proven
 
     def furthest(self, changes: Changes, levels: Sequence[Freedom]) -> Changes:
-        """The combination that needs least, with the largest slice ratio that is free."""
-        least = min(self.combinations(changes, levels), key=self.need_us)
+        """The combination that needs least, with a step that divides the period and the largest ratio that is free."""
+
+        def lacks(one: Changes) -> tuple[float, bool]:
+            return self.need_us(one), bool(refused_period(self.profile(one)))
+
+        least = min(self.combinations(changes, levels), key=lacks)
         ratio = self.most_ratio(changes, levels)
         return {**({} if ratio == self.ratio(changes) else {RATIO: ratio}), **least}
 
@@ -209,7 +225,7 @@ class Search:
         worst = max(self.needs(furthest), key=lambda need: need.us)
         if not fits_in(worst.us, available_us=most_us):
             return worst._replace(why=worst.words(most_us))
-        refused = refused_period(self.profile(furthest), self.period_us(furthest))
+        refused = refused_period(self.profile(furthest))
         if refused and all(one.cost != Cost.PERIOD for one in levels):
             return refused
         failures = self.circle_failures(furthest) if self._fits(furthest) else ()

@@ -5,7 +5,7 @@ from decimal import ROUND_CEILING, Decimal
 from math import ceil, inf
 from typing import Final, NamedTuple, Protocol
 
-from busplan.analysis.capacity.cycle import FIT_ROUNDING
+from busplan.elementwise import FIT_ROUNDING
 
 
 class NumberGrid(Protocol):

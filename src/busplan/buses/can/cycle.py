@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property, partial, reduce
+from itertools import chain
 from math import inf
 from typing import Final, Literal
 
@@ -11,13 +12,12 @@ from busplan.buses.can.streams import frame_sizes, response, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Message, Pdos, Traffic, traffic_of
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, choose, larger, named, plain, pointwise, rounded_up, total
+from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, plain, pointwise, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
-_ROUNDING: Final = 1e-9
 
 
 class CanCycle(BusCycle):
@@ -152,11 +152,11 @@ class CanCycle(BusCycle):
         name, node = NAMES[kind], 0
         own = (one for one, _ in self._pdos if one.kind == kind)
         for group, one in zip(self.network.groups, own, strict=True):
-            nodes, frames = int(plain(group.nodes)), frame_sizes(one)
+            nodes = int(plain(group.nodes))
             pdos = int(plain(one.pdos)) // nodes
             for _ in range(nodes):
                 node += 1
-                for size in pdos * frames:
+                for size in chain.from_iterable(frame_sizes(one) for _ in range(pdos)):
                     us = plain(self._frame_us(size))
                     yield BusEvent(f"{name}_frame", f"cycle_{name}_us", us, f"{name} PDO", node, name)
 
@@ -181,8 +181,7 @@ class CanCycle(BusCycle):
     def load_period_us(self) -> Number:
         """The shortest period that keeps `limits.max_load`; infinite where the other messages take all of it [us]."""
         left = self.network.profile.limits.max_load - self._messages_load
-        # By a billionth longer, so that rounding does not break the limit.
-        return choose(left > 0, (1 + _ROUNDING) * self._in_cycle_us / larger(left, _ROUNDING), inf)
+        return choose(left > 0, self._in_cycle_us / larger(left, FIT_ROUNDING), inf)
 
     def latencies(self) -> tuple[BusLatency, ...]:
         """The worst-case response of SYNC, of each group's last PDO in either direction, and of each other message."""

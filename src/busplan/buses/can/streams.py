@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from itertools import combinations
+from itertools import chain, combinations, islice, repeat
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
@@ -88,7 +88,7 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
         if said != FOLLOWS:
             block[one.kind] = said
         free[one.kind] = first + count
-        sizes = frame_sizes(one)[:_MOST_FRAMES]
+        sizes = tuple(islice(frame_sizes(one), _MOST_FRAMES))
         for number, size in enumerate(sizes):
             step = number * int(PDO_STEP)
             own = sent(one.name, first + step, size)
@@ -101,10 +101,10 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
         yield own._replace(is_message=True, **times)
 
 
-def frame_sizes(one: Pdos) -> list[int]:
-    """Data of each frame of a PDO of plain numbers [bytes]."""
+def frame_sizes(one: Pdos) -> Iterator[int]:
+    """Data of each frame of a PDO of plain numbers, of which there may be billions [bytes]."""
     full, rest = divmod(_int(one.payload_bytes), int(FRAME_BYTES))
-    return [int(FRAME_BYTES)] * full + [rest] * (rest > 0)
+    return chain(repeat(int(FRAME_BYTES), full), repeat(rest, int(rest > 0)))
 
 
 _MOST_FRAMES: Final = int(MOST_PDOS) + 1

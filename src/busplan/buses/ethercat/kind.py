@@ -46,6 +46,7 @@ class Ethercat(Bus):
     planned_figures = ("frames",)
     limits: ClassVar[tuple[Limit, ...]] = LIMITS
     rules: ClassVar[tuple[Rule, ...]] = rules.RULES
+    clock_key = "bus.distributed_clocks"
     starter = Starter(
         """\
 [bus]
