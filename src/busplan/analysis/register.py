@@ -14,7 +14,7 @@ CommandName = Literal["latency", "capacity", "circle-test"]
 
 _HOLDERS: Final[Mapping[str, tuple[CommandName, str]]] = MappingProxyType(
     {
-        "changes": ("capacity", "cheapest_change"),
+        **dict.fromkeys(("changes", "circle_is_untested"), ("capacity", "cheapest_change")),
         **dict.fromkeys(("change", "key", "from", "to", "margin_change_us", "note"), ("capacity", "sensitivity")),
         **dict.fromkeys(
             (

@@ -45,6 +45,8 @@ def _row(option: Option, *, at: str) -> TableRow:
     circle: Cell = MISSING if option.circle_failures is None else "not judged"
     if passed is not None:
         circle = Words("passes", "passes") if passed else Words("FAILS", "fails")
+    if option.deciding.circle_refused_by:
+        circle = Words("cannot be run", "fails")
     cells: tuple[Cell, ...] = (
         option.title,
         "*" * option.recommended + "?" * (not option.proven),

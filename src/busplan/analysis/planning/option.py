@@ -67,7 +67,7 @@ def option(search: Search, title: str, changes: Changes, *, held_by: str | None 
     changed = search.profile(changes)
     model = bus_of(changed).deciding_model
     deciding = figures(changed, model=model)
-    is_run = search.runs_circle and deciding.verdict == FITS
+    is_run = search.runs_circle and deciding.verdict == FITS and not deciding.circle_refused_by
     return Option(
         title=title,
         changes=dict(changes),
