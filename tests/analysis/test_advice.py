@@ -232,18 +232,18 @@ def test_check_never_says_more_of_the_circle_of_a_cure_than_was_tested(
 
 
 def test_a_step_that_does_not_divide_the_period_is_the_cause_and_its_own_cure() -> None:
-    profile = override(load("ethercat-servo-8").profile, {"cycle.period_us": 500.0, "servo.step_us": 200.0})
+    profile = override(load("ethercat-servo-8").profile, {"servo.step_us": 300.0})
     (verdict,) = verdicts(capacity(profile))
     assert not verdict.all_well
     assert verdict.change is not None
-    assert verdict.change.changes == {"servo.step_us": 125.0}
+    assert verdict.change.changes == {"servo.step_us": 250.0}
     assert verdict.change.circle_is_untested
     cause, headline, *_ = map(sentence_text, verdict_sentences(verdict, profile))
-    assert cause.startswith("The circle of ethercat-servo-8 cannot be run at 500 us: servo.step_us = 200")
+    assert cause.startswith("The circle of ethercat-servo-8 cannot be run at 1 ms: servo.step_us = 300")
     assert ", the bus alone: fits." in headline
     best = plan(profile).recommended
     assert best is not None
-    assert best.changes == {"servo.step_us": 125.0}
+    assert best.changes == {"servo.step_us": 250.0}
     kept = plan(profile, wanted={"servo.step_us": 200.0}, free=["slice_ratio"])
     assert kept.binding is not None
     assert kept.binding.key == "servo.step_us"

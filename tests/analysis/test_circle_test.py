@@ -586,7 +586,7 @@ def test_a_failure_without_a_value_is_null_and_says_why() -> None:
 
 def test_a_skew_that_is_too_long_is_refused_at_the_clock_that_is_missing() -> None:
     # Twenty devices with frames of their own: the last frame arrives most of a period behind the first.
-    changes = {"bus.nodes": 20, "payload.write_bytes": 1000, "payload.read_bytes": 1000, "cycle.period_us": 2500.0}
+    changes = {"bus.nodes": 20, "payload.write_bytes": 400, "payload.read_bytes": 1000, "cycle.period_us": 3000.0}
     profile = override(load("ethercat-servo-8").profile, {**changes, "bus.distributed_clocks": False})
     with pytest.raises(ParameterError, match="the last axis then takes its set-points") as raised:
         circle_test(profile)

@@ -200,7 +200,7 @@ def test_no_period_mends_a_payload_or_an_unsafe_bus() -> None:
 
 
 def test_a_machine_has_the_settings_of_the_bus_that_it_needs() -> None:
-    (can,) = compare(GANTRY, kinds=["can"]).compared
+    (can,) = compare(override(GANTRY, {"cycle.slice_ratio": 1.0}), kinds=["can"]).compared
     tried = {one.key: one.value for one in can.assumed if one.source == "setting"}
     assert tried == {"group.drives.pdo_per": "axis", "group.tool.pdo_per": "axis"}
     # Each axis has a PDO of 8 bytes each way, of 9 from the head; inputs and outputs have one each way.

@@ -75,6 +75,6 @@ def test_a_picture_takes_any_name() -> None:
 
 
 def test_a_machine_that_no_bus_carries_is_drawn() -> None:
-    late = compare(override(load("gantry-24").profile, {"cycle.period_us": 1.0}), kinds=["can"])
+    late = compare(override(load("paper-1ms").profile, {"payload.read_bytes": 512}), kinds=["can"])
     assert dots(late) == []
     assert compare_lines(late, width=80)

@@ -33,6 +33,7 @@ Ink = Literal[
     "unsafe",
     "uneven",
     "unjudged",
+    "refused",
 ]
 """What a stretch of time, or a setting of a map, is to the reader of a drawing: its colour."""
 

@@ -40,6 +40,7 @@ INKS: Final[Mapping[Ink, InkColours]] = MappingProxyType(
         "unsafe": InkColours("#ec7fb4", "#e377ad"),
         "uneven": InkColours("#74aef7", "#6ea8f5"),
         "unjudged": InkColours("#bfe3c4", "#a5d0ab"),
+        "refused": InkColours("#b59ae0", "#a78fd4"),
     }
 )
 """Colours by ink; the name of an ink is its CSS class."""

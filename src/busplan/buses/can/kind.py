@@ -109,7 +109,6 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
     evidence_data = ("can", "paper")
     model_error = "this timing model takes 8 to 15% more than frames that were measured"
     loop_key = "bus.pipeline_cycles"
-    host_keys = ("bus.host_us",)
 
     def profile_model(self) -> "type[CanProfile]":
         """The model of its profiles."""

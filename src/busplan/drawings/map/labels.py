@@ -35,7 +35,7 @@ LOOKS: Final[Mapping[State, Look]] = MappingProxyType(
         "fits": Look("#", "fits", "passes"),
         "circle fails": Look("%", "uneven", "fails"),
         "circle not judged": Look("+", "unjudged", "warns"),
-        "circle cannot be run": Look("/", "unjudged", "fails"),
+        "circle cannot be run": Look("/", "refused", "fails"),
         "not shown to fit": Look("?", "unsure", "warns"),
         "unsafe": Look("!", "unsafe", "fails"),
         "does not fit": Look(".", "short", "neutral"),
