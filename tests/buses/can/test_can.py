@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import busplan
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.circle.delays import loop_delays_us
+from busplan.analysis.network import network_of
 from busplan.buses import kind_named
 from busplan.buses.can.limits import shared_identifiers
 from busplan.buses.can.response import Sender, worst_response
@@ -362,3 +363,106 @@ def test_the_smallest_period_keeps_the_load(nodes: int) -> None:
     assert (at.verdict, at.exceeded) == ("fits", ())
     below, _ = busplan.capacity(override(many, {"cycle.period_us": smallest_us * (1 - 1e-6)})).results
     assert below.verdict != "fits"
+
+
+def test_six_nodes_with_service_messages_fit_four_milliseconds(run: Run, tmp_path: Path) -> None:
+    """A usual machine: 21 messages at 500 kbit/s, with a load of 0.79."""
+    line = ("init", "six", "--bus", "can", "--nodes", "6", "--axes", "6", "--period", "4ms", "--bytes-per-axis", "6")
+    assert run(*line, cwd=tmp_path).returncode == 0
+    path = tmp_path / "six.toml"
+    sdo = [("request", 0x601), ("response", 0x581)]
+    service = [(f"sdo-{name}", identifier, 8, 10_000) for name, identifier in sdo]
+    service += [(f"heartbeat-{node}", 0x700 + node, 1, 50_000) for node in range(1, 7)]
+    sections = [
+        f'[[message]]\nname = "{name}"\nidentifier = {identifier:#x}\npayload_bytes = {size}\nperiod_us = {period_us}\n'
+        for name, identifier, size, period_us in service
+    ]
+    text = path.read_text(encoding="utf-8").replace("bit_rate_kbit_s = 1000", "bit_rate_kbit_s = 500")
+    text = text.replace("base_us = 20 ", "base_us = 100").replace("reserve = 0.15", "reserve = 0")
+    path.write_text("\n".join((text, *sections)), encoding="utf-8")
+    found, _ = busplan.capacity(path).results
+    assert found.bus_load == pytest.approx(0.787, abs=1e-3)
+    assert (found.verdict, found.exceeded) == ("fits", ())
+    # Three service frames block: one of a kind may be late by its period, and the next be there.
+    assert {term.name: term.us for term in found.terms}["blocking"] == 3 * 270
+    answers = busplan.latency(path, timing_model=["worst-stuffing"]).transactions
+    assert sum(1 if one.transaction in ("SYNC", *(name for name, *_ in service)) else 6 for one in answers[:-1]) == 21
+    assert all(one.worst_response_us <= one.deadline_us for one in answers[:-1])
+    assert run("check", "six.toml", cwd=tmp_path).returncode == 0
+
+
+def test_a_machine_of_many_axes_starts_with_pdos_of_each_axis(run: Run, tmp_path: Path) -> None:
+    line = "init one --bus can --nodes 2 --axes 10 --period 10ms --bytes-per-axis 8"
+    assert "one at 10 ms: fits" in run(*line.split(), cwd=tmp_path).stderr
+    text = (tmp_path / "one.toml").read_text(encoding="utf-8")
+    assert 'pdo_per = "axis"           # assumed: without it no period carries the machine' in text
+    # So does a plan that begins without it.
+    alone = override(busplan.load_profile(tmp_path / "one.toml"), {"payload.pdo_per": "node"})
+    assert busplan.plan(alone, circle=False).recommended_changes == {"payload.pdo_per": "axis"}
+
+
+def test_settings_are_what_is_not_set_yet() -> None:
+    def tried(**changes: Any) -> dict[str, Any]:
+        network = network_of(profile(**changes))
+        return {one.name: one.values for one in kind_named("can").settings(network)}
+
+    rates = ({"bus.bit_rate_kbit_s": 800}, {"bus.bit_rate_kbit_s": 1000})
+    assert tried() == {"pdo_per": ({"payload.pdo_per": "axis"},), "bit_rate": rates, "identifier_bits": ()}
+    assert tried(payload__pdo_per="axis")["pdo_per"] == ()
+    assert "pdo_per" not in tried(node__axes=1)
+    assert tried(bus__identifier_bits=29)["identifier_bits"] == ({"bus.identifier_bits": 11},)
+    assert tried(bus__identifier_bits=29, message__alarm__identifier=0x800)["identifier_bits"] == ()
+
+
+def test_the_hosts_own_time_is_in_the_cycle_that_it_computes_in() -> None:
+    hosted = profile(bus__host_us=500.0)
+    assert terms(hosted)["host"] == 500
+    assert terms(override(hosted, {"bus.pipeline_cycles": 1}))["host"] == 0
+    (found,) = busplan.capacity(hosted, timing_model=["worst-stuffing"]).results
+    # Half of what nobody has measured is in doubt, beside the execution time.
+    own_us = 2 * 0.1 / 12**0.5
+    assert found.uncertainty_us == pytest.approx(2 * (own_us**2 + 250**2) ** 0.5)
+    measured = override(hosted, {"bus.host_grade": "measured", "bus.host_uncertainty_us": 5.0})
+    (found,) = busplan.capacity(measured, timing_model=["worst-stuffing"]).results
+    assert found.uncertainty_us == pytest.approx(2 * (own_us**2 + 5**2) ** 0.5)
+    loop = busplan.latency(override(hosted, {"bus.pipeline_cycles": 2})).transactions[-1]
+    assert loop.transaction == "loop"
+    assert loop.worst_response_us == terms_sum(override(hosted, {"bus.pipeline_cycles": 2})) + 2 * 6000
+
+
+def terms_sum(one: Profile) -> float:
+    return sum(terms(one).values())
+
+
+def test_the_jitter_of_sync_reaches_the_circle(run: Run) -> None:
+    servo = load("can-servo-8").profile
+    # SYNC ends behind 55 us, or 135 us later: half of that either way.
+    assert busplan.circle_test(servo).results[0].jitter_us == 67.5
+    own = override(servo, {"delivery.jitter_us": 10.0})
+    assert busplan.circle_test(own).results[0].jitter_us == 77.5
+    assert busplan.circle_test(override(servo, {"message.sdo-request.identifier": 0x10})).results[0].jitter_us == 135
+    said = run("explain", "can-servo-8", "circle-test.jitter_us").stdout
+    assert "J = jitter_us + (B + I) / 2" in said
+
+
+def test_the_expected_load_lies_between_no_stuff_bits_and_the_most() -> None:
+    each = {model: busplan.capacity(profile(), timing_model=[model]).results[0] for model in MODELS}
+    least, most = (each[model].bus_load for model in MODELS)
+    for one in each.values():
+        assert one.expected_load == pytest.approx(least + 0.4 * (most - least))
+
+
+MODELS = ("no-stuffing", "worst-stuffing")
+
+
+def test_events_are_the_terms_with_what_blocks_and_what_interferes() -> None:
+    servo = override(load("can-servo-8").profile, {"message.sdo-request.identifier": 0x10, "bus.host_us": 70.0})
+    servo = override(servo, {"bus.pipeline_cycles": 0})
+    sums: dict[str, float] = {}
+    for event in busplan.timeline(servo).cycle_events:
+        if event.term:
+            sums[event.term] = sums.get(event.term, 0.0) + event.duration_us
+    (found,) = busplan.capacity(servo, timing_model=["worst-stuffing"]).results
+    assert {key: us for key, us in sums.items() if us} == {term.key: term.us for term in found.terms if term.us}
+    assert sums["cycle_blocking_us"] == 135 + 2 * 65  # a heartbeat may be late by its period, and one more be there
+    assert sums["cycle_interference_us"] == 135

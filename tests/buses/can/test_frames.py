@@ -118,3 +118,22 @@ def test_the_worst_case_is_that_of_the_worst_bits(identifier_bits: int, size: in
     # Five alike, then four of each value in turn: a stuff bit behind each.
     bits = [0, *islice(cycle([0] * 4 + [1] * 4), STUFFABLE[identifier_bits] + 8 * size - 1)]
     assert len(stuffed(bits)) + NEVER_STUFFED == frame_bits(size, identifier_bits=identifier_bits, is_stuffed=True)
+
+
+@pytest.mark.parametrize(
+    ("identifier", "data", "bits"),
+    [
+        (0x180, "6a00000000000000", 125),
+        (0x221, "c24a058100001510", 117),
+        (0x0F4, "8a1a0df213000007", 118),
+        (0x6F8, "ff000cfe00000000", 124),
+        (0x18EBFF00, "01a00fa6603bd140", 141),
+        (0x18EBFF00, "021fde8025dfc02b", 140),
+        (0x18EBFF00, "03e1004bffff3c0f", 146),
+        (0x18EBFF00, "04004bffffffffff", 146),
+    ],
+)
+def test_frames_have_as_many_bits_as_hardware_counted(identifier: int, data: str, bits: int) -> None:
+    # python-can, test/data/logfile.asc and issue_1299.asc. One more frame there, 6F9 05 0C 00 .., has 124 and not 123.
+    identifier_bits = 29 if identifier > 0x7FF else 11
+    assert written_bits(identifier, bytes.fromhex(data), identifier_bits=identifier_bits) == bits

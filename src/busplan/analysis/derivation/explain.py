@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
 from busplan.analysis.derivation.formulas import formula_text
-from busplan.analysis.derivation.latency import latency_figures, latency_names
+from busplan.analysis.derivation.latency import TracedLatencies, latency_figures, latency_names, traced_latencies
 from busplan.analysis.derivation.origin import Input
 from busplan.analysis.derivation.trace import Traced, inputs, lines
 from busplan.analysis.network import bus_of, leading_model, model_names, network_of
@@ -140,10 +140,14 @@ def explain(
         raise BusplanError(f"{one.key}: not a figure of latency, so it has no transaction")
     found = []
     for where in at_periods(profile, periods_us):
+        latencies = {model: traced_latencies(where, model=model) for model in models if command == "latency"}
         for kind in kinds:
             for model in models:
                 for each in (one, *_BESIDE.get(one.key, ())):
-                    traced = _traced(where, command, each.key, model=model, kind=kind, progress=progress)
+                    known = latencies.get(model)
+                    traced = _traced(
+                        where, command, each.key, model=model, kind=kind, latencies=known, progress=progress
+                    )
                     steps = tuple(_steps(where, traced, command, each))
                     found.append(
                         Derivation(
@@ -218,10 +222,11 @@ def _traced(
     *,
     model: str,
     kind: str | None,
+    latencies: TracedLatencies | None,
     progress: Progress | None,
 ) -> Traced:
     if command == "latency":
-        return latency_figures(profile, model=model, kind=kind or "")[key]
+        return latency_figures(profile, model=model, kind=kind or "", latencies=latencies)[key]
     if command == "capacity":
         if key in VERDICT_KEYS:
             return verdict_figure(profile, key, model=model)

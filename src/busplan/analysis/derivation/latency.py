@@ -1,12 +1,14 @@
 """Derive the figures of `latency` by calling the functions of the bus with traced numbers."""
 
 from math import inf
+from typing import NamedTuple
 
 from busplan.analysis.derivation.inputs import traced_profile
 from busplan.analysis.derivation.origin import Input, short
 from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.derivation.trace import found as result_of
 from busplan.analysis.network import bus_of, network_of
+from busplan.buses.cycle import BusLatency
 from busplan.elementwise import Number
 from busplan.sections.profile import Profile
 from busplan.sourced import Sourced
@@ -18,7 +20,22 @@ def latency_names(profile: Profile) -> tuple[str, ...]:
     return tuple(one.label for one in bus.cycle(network_of(profile), model=bus.deciding_model).latencies())
 
 
-def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Traced]:
+class TracedLatencies(NamedTuple):
+    """Every transaction of `latency` in traced numbers, and of how many nodes."""
+
+    nodes: Number
+    each: tuple[BusLatency, ...]
+
+
+def traced_latencies(profile: Profile, *, model: str) -> TracedLatencies:
+    """Every transaction of `latency` in traced numbers."""
+    network = network_of(traced_profile(profile))
+    return TracedLatencies(network.nodes, bus_of(profile).cycle(network, model=model).latencies())
+
+
+def latency_figures(
+    profile: Profile, *, model: str, kind: str, latencies: TracedLatencies | None = None
+) -> dict[str, Traced]:
     """Derive every figure of one transaction of `latency`.
 
     Parameters
@@ -29,22 +46,27 @@ def latency_figures(profile: Profile, *, model: str, kind: str) -> dict[str, Tra
         Timing model.
     kind
         One of `latency_names`.
+    latencies
+        All of `traced_latencies`, where they are known.
 
     Returns
     -------
     dict
         By key, all figures of `latency`; one that this transaction does not have is None.
     """
-    bus, network = bus_of(profile), network_of(traced_profile(profile))
-    (one,) = (one for one in bus.cycle(network, model=model).latencies() if one.label == kind)
+    latencies = latencies or traced_latencies(profile, model=model)
+    (one,) = (one for one in latencies.each if one.label == kind)
     found: dict[str, Number | None] = {
         "timing_model": chosen(model, "timing_model", "timing model asked for"),
         "transaction": chosen(kind, "transaction", "transaction asked for"),
         "payload_bytes": one.payload_bytes,
-        "nodes": network.nodes,
+        "nodes": latencies.nodes,
         **{key: if_finite(number) for key, number in one.phases.items()},
     }
-    return {figure.key: remembered(found.get(figure.key), figure.key, figure.symbol) for figure in bus.latency_figures}
+    return {
+        figure.key: remembered(found.get(figure.key), figure.key, figure.symbol)
+        for figure in bus_of(profile).latency_figures
+    }
 
 
 def if_finite(number: Number) -> Number:

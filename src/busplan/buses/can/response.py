@@ -78,8 +78,8 @@ def worst_response(
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
     """
-    before, everyone = Arrivals(higher), Arrivals((own, *higher))
-    if everyone.load >= SATURATED:
+    before = Arrivals(higher)
+    if before.load + own.load >= SATURATED:
         return None
     steps, ahead_us = iter(range(int(MOST_STEPS))), blocking_us + first_us
     bound_us, per_us = before.bound_us(ahead_us, bit_us=bit_us), own.frames_us / (1 - before.load)
@@ -90,8 +90,8 @@ def worst_response(
             if worst and late_us + bound_us + instance * per_us <= worst.us:
                 break  # the bound falls from one instance to the next
             if instance == 1:
-                from_us = ahead_us + everyone.frames_us
-                busy_us = everyone.settled_us(ahead_us, steps, from_us=from_us)
+                from_us = ahead_us + own.frames_us + before.frames_us
+                busy_us = Arrivals((own, *higher)).settled_us(ahead_us, steps, from_us=from_us)
             if instance and instance * own.period_us >= busy_us + own.jitter_us:
                 break
             # It waits at least as long as the instance before it, and for that one.
@@ -158,11 +158,16 @@ class Arrivals:
 
     def __init__(self, senders: Sequence[Sender]) -> None:
         self._senders = senders
-        self.load = sum(one.load for one in senders)
+        self.load = 0.0
         """Share of the bus, 0..1 [1]."""
-        self.frames_us = sum(one.frames_us for one in senders)
+        self.frames_us = 0.0
         """One instance of each [us]."""
-        self._of_jitter_us = sum(one.load * one.jitter_us for one in senders)
+        self._of_jitter_us = 0.0
+        for frames_us, period_us, jitter_us in senders:
+            load = frames_us / period_us
+            self.load += load
+            self.frames_us += frames_us
+            self._of_jitter_us += load * jitter_us
 
     @cached_property
     def in_window_us(self) -> Callable[[float], float]:

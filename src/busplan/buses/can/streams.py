@@ -1,8 +1,9 @@
 """Every frame of a network with its identifiers, and which of them collide."""
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from itertools import chain, combinations, islice, repeat
+from itertools import chain, islice, repeat
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
@@ -117,11 +118,16 @@ def _int(number: Number) -> int:
 
 def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
     """Pairs of streams that share identifiers, with the first they share, and how many."""
-    for one, other in combinations(each, 2):
-        first = max(one.first, other.first)
-        shared = min(one.last, other.last) - first + 1
-        if shared > 0:
-            yield one, other, first, shared
+    ordered = sorted(range(len(each)), key=lambda place: each[place].first)
+    firsts = [each[place].first for place in ordered]
+    pairs = (
+        sorted((place, other))
+        for number, place in enumerate(ordered)
+        for other in ordered[number + 1 : bisect_right(firsts, each[place].last)]
+    )
+    for place, other in sorted(pairs):
+        first = max(each[place].first, each[other].first)
+        yield each[place], each[other], first, min(each[place].last, each[other].last) - first + 1
 
 
 def load_before(own: Stream, each: Sequence[Stream]) -> float:

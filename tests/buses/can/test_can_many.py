@@ -1,0 +1,109 @@
+"""CAN networks of many messages: every command answers, soon."""
+
+import csv
+import io
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from time import process_time
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.buses.can.constants import SATURATED
+from busplan.buses.can.response import Sender, worst_response
+from busplan.buses.can.section import CanProfile
+from busplan.elementwise import pointwise
+from busplan.profile.write import profile_text
+
+Run = Callable[..., Any]
+MOST_S = 10.0
+"""CPU time of an answer that takes a second or two on an idle machine [s]."""
+
+BASE = """\
+schema_version = 1
+name = "many"
+bus = { kind = "can", bit_rate_kbit_s = 1000, nodes = 2, identifier_bits = 29 }
+cycle = { period_us = 20000.0 }
+payload = { read_bytes = 8, write_bytes = 8 }
+node = { axes = 1, execution = { kind = "linear", grade = "assumed", base_us = 100, per_byte_us = 0 } }
+"""
+
+
+def messages(count: int, *, load: float, slow: float, random: Random) -> list[dict[str, Any]]:
+    """Some messages that together make a load, a share of them with the longest period."""
+    weights = [0.0 if random.random() < slow else random.uniform(0.1, 1) for _ in range(count)]
+    found = []
+    for number, weight in enumerate(weights):
+        period_us = 160 / (load * weight / sum(weights)) if weight else 1e9
+        jitter_us = random.choice([0.0, random.uniform(0, period_us)])
+        identifier = random.choice([0x10, 0x10000]) + 3 * number
+        keys = {"identifier": identifier, "payload_bytes": 8, "period_us": period_us, "jitter_us": jitter_us}
+        found.append({"name": f"m{number}", **keys})
+    return found
+
+
+def many(count: int, *, load: float, slow: float = 0.5, seed: int = 1) -> CanProfile:
+    sent = messages(count, load=load, slow=slow, random=Random(seed))
+    return CanProfile.model_validate({**tomllib.loads(BASE), "message": sent})
+
+
+@pytest.mark.parametrize("count", [1, 31, 32, 33, 64, 65, 300])
+def test_a_search_takes_any_number_of_arguments(count: int) -> None:
+    others = range(count - 1)
+    found = pointwise(lambda *each: sum(each), np.array([1, 2]), *others, np.array([[10], [20]]), words="")
+    assert np.array_equal(found, np.array([[11, 12], [21, 22]]) + sum(others))
+
+
+@pytest.mark.parametrize(
+    ("line", "count"),
+    [
+        ("map", 100),
+        ("sweep --vary cycle.period_us=20000,40000 --vary message.m3.jitter_us=0,50", 100),
+        ("report --no-circle", 25),
+    ],
+)
+def test_many_messages_are_answered(run: Run, tmp_path: Path, line: str, count: int) -> None:
+    (tmp_path / "many.toml").write_text(profile_text(many(count, load=0.4)), encoding="utf-8")
+    command, *options = line.split()
+    done = run(command, "many.toml", *options, "--format", "json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(("load", "slow", "seed"), [(0.995, 0.9, 1), (0.99, 0.5, 2), (0.9998, 0.8, 4)])
+def test_no_busy_period_near_a_full_bus_takes_long(load: float, slow: float, seed: int) -> None:
+    profile = many(200, load=load, slow=slow, seed=seed)
+    start_s = process_time()
+    busplan.capacity(profile)
+    assert process_time() - start_s < MOST_S
+    start_s = process_time()
+    found = busplan.latency(profile, timing_model=["worst-stuffing"])
+    assert process_time() - start_s < MOST_S
+    assert len(found.transactions) == 204
+
+
+def test_a_response_that_takes_too_many_steps_is_not_computed() -> None:
+    random = Random(3)
+    full = [Sender(135.0, 135.0 * random.uniform(200, 400)) for _ in range(300)]
+    scale = sum(one.load for one in full) / 0.9995
+    full = [one._replace(period_us=one.period_us * scale) for one in full]
+    assert sum(one.load for one in full) < SATURATED
+    assert worst_response(Sender(135.0, 1e6), full, blocking_us=135.0, bit_us=1.0) is None
+    assert worst_response(Sender(135.0, 1e6), full[:250], blocking_us=135.0, bit_us=1.0) is not None
+
+
+def test_groups_have_one_set_of_columns(run: Run, tmp_path: Path) -> None:
+    execution = {"kind": "linear", "grade": "measured", "base_us": 50.0, "per_byte_us": 0.0}
+    sizes = {"write_bytes": 8, "execution": execution, "nodes": 2, "axes": 1}
+    data = tomllib.loads(BASE)
+    data = {key: value for key, value in data.items() if key not in ("payload", "node")}
+    data["bus"].pop("nodes")
+    groups = [{"name": name, "read_bytes": size, **sizes} for name, size in (("left", 8), ("right", 6))]
+    profile = CanProfile.model_validate({**data, "group": groups})
+    (tmp_path / "two.toml").write_text(profile_text(profile), encoding="utf-8")
+    rows = list(csv.DictReader(io.StringIO(run("latency", "two.toml", "--format", "csv", cwd=tmp_path).stdout)))
+    assert {row["group"] for row in rows} == {"", "left", "right"}
+    assert len({tuple(row) for row in rows}) == 1
