@@ -291,8 +291,8 @@ def test_a_limit_of_a_share_of_the_period_says_the_shortest_period(make: Maker) 
         doubt=lambda _network: 7.0,
     )
     network = network_of(make(bus__nodes=3, cycle__slice_ratio=0.7))
-    assert limit.slice_us is not None
-    ends = limit.period_us(network), limit.shown.period_us(network), limit.slice_us(network) / 0.7
+    assert limit.kept_from_us is not None
+    ends = limit.period_us(network), limit.shown.period_us(network), limit.kept_from_us(network)
     assert ends == pytest.approx((286 / 0.3, 314 / 0.3, 314 / 0.3))
     for end, kept, code in ((ends[0], 1, 2), (ends[1], 0, 1)):
         assert limit.verdict_code(network._replace(period_us=end)) == kept

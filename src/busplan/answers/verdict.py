@@ -106,7 +106,8 @@ def _missed_limits(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
     missed = verdict.missed_limits if verdict.deciding.verdict == FITS else ()
     for need in missed:
         subject = (Code(profile.name), " at ", period_value(verdict.period_us), " does not hold its [limits]: ")
-        yield Sentence((*subject, need.words(verdict.deciding.available_us), "."), "fails")
+        words = need.words(ratio=profile.cycle.slice_ratio, most_us=verdict.period_us)
+        yield Sentence((*subject, words, "."), "fails")
 
 
 def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:

@@ -206,7 +206,13 @@ MIN_SLICE_RATIO: Final = Figure(
     "1",
     decimals=4,
 )
-EXCEEDED: Final = Figure("exceeded", "broken", _CYCLE, "limits that the profile breaks", sort="words")
+EXCEEDED: Final = Figure(
+    "exceeded",
+    "broken",
+    _CYCLE,
+    "limits that the profile breaks: time as it is counted, one with a doubt beyond it",
+    sort="words",
+)
 FITS: Final = Figure(
     "fits",
     "fits",

@@ -52,6 +52,8 @@ class Limit(NamedTuple):
     most: Callable[[Network], Number]
     doubt: Callable[[Network], Number] | None = None
     """Standard uncertainty of the value, less that of the most; without it both are exact."""
+    perhaps: Callable[[Network], Number] | None = None
+    """A part of the value that may not be there: it counts where a limit must be shown to be kept, and breaks none."""
     way_out: str = ""
     """What makes room where this limit keeps nodes out."""
     failure: str = ""
@@ -65,9 +67,9 @@ class Limit(NamedTuple):
 
     is_of_period: bool = False
     """The period alone breaks it: a plan takes no period that does."""
-    slice_us: Callable[[Network], float] | None = None
-    """The slice from which on plain numbers are shown to keep it, the slice ratio as it is, where a longer period is a
-    cure [us]; without it no period is."""
+    kept_from_us: Callable[[Network], float] | None = None
+    """The period from which on plain numbers are shown to keep it, where a longer one is a cure [us]; without it none
+    is."""
     share: Callable[[Network], Number] | None = None
     """The share of the period that is its most, of a time that rests on no period: see `share_limit`."""
 
@@ -76,15 +78,22 @@ class Limit(NamedTuple):
         return 0.0 if self.doubt is None else COVERAGE * self.doubt(network)
 
     def least_value(self, network: Network) -> Number:
-        """What its value is at least, value - U."""
-        return self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
+        """What its value is at least: less U, and without what may not count."""
+        least = self.value(network) if self.doubt is None else self.value(network) - self.uncertainty(network)
+        return least if self.perhaps is None else least - self.perhaps(network)
+
+    @property
+    def nominal(self) -> "Limit":
+        """The limit of the value as it is, whatever is not known of it: that of closed forms."""
+        return self if self.doubt is None else self._replace(doubt=None, perhaps=None)
 
     @property
     def shown(self) -> "Limit":
         """The limit that what is shown to keep this one keeps: of value + U."""
         if self.doubt is None:
             return self
-        return self._replace(value=lambda network: self.value(network) + self.uncertainty(network), doubt=None)
+        most = self._replace(value=lambda network: self.value(network) + self.uncertainty(network))
+        return most._replace(doubt=None, perhaps=None)
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
@@ -142,7 +151,7 @@ def share_limit(
         share=share,
         **more,
     )
-    return limit._replace(slice_us=lambda network: plain(limit.shown.period_us(network) * network.slice_ratio))
+    return limit._replace(kept_from_us=lambda network: plain(limit.shown.period_us(network)))
 
 
 class Starter(NamedTuple):

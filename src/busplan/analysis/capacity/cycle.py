@@ -48,10 +48,10 @@ def fits_in(required_us: Number, *, available_us: Number) -> Number:
 
 
 def limits_with_time(network: Network, *, model: str) -> tuple[Limit, ...]:
-    """The limits of a network's kind of bus in the order of reports, time the last; without those of safety."""
+    """The limits of closed forms: those of a network's kind of bus, without safety and doubts, and time the last."""
     bus = bus_of(network.profile)
     time = time_limit(lambda one: bus.cycle(one, model=model).most_required_us)
-    return (*(limit for limit in bus.limits if not limit.is_safety), time)
+    return (*(limit.nominal for limit in bus.limits if not limit.is_safety), time)
 
 
 def time_limit(needed_us: Callable[[Network], Number]) -> Limit:

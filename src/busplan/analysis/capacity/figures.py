@@ -314,11 +314,11 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
     needed_us
         What the cycle needs [us].
     is_shown
-        Whether limits must be shown to be kept.
+        Whether limits must be shown to be kept; otherwise doubts of their values play no part.
     """
     bus = bus_of(network.profile)
     found = bus.shortest_period_us(network, needed_us)
     for limit in bus.limits:
         if limit.share is not None:
-            found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit).period_us(network)))
+            found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network)))
     return found

@@ -1,16 +1,16 @@
 """What a plan must hold: each constraint says what the slice must give, or that no slice is enough."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import TIME, available_us, fits_in
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.circle.refusal import circle_refusals, step_refusals
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.machine import rooms
 from busplan.buses.network import Network
-from busplan.elementwise import plain
+from busplan.elementwise import within
 from busplan.sections.base import MIN_STEP_US
 from busplan.sections.profile import Profile
 
@@ -20,52 +20,78 @@ _MOST_SLICE_US: Final = 1e12
 
 
 class Need(NamedTuple):
-    """What one constraint asks of the slice."""
+    """What one constraint asks of the slice, or of the period itself."""
 
-    us: float
+    slice_us: float
     """What the slice must give; infinite where none is enough [us]."""
     key: str
     """What asks: time, the key of a limit of the bus, or a key of the profile."""
     why: str = ""
-    """What no slice mends, in words."""
+    """What no slice and no period mends, in words."""
+    least_us: float = 0.0
+    """The shortest period, whatever the slice ratio; 0 where any will do [us]."""
 
-    def words(self, most_us: float) -> str:
-        """Say what is asked, and what the slice can give at most [us]."""
-        needs = f"needs a slice of {self.us:.3f} us"
+    def period_us(self, ratio: float) -> float:
+        """The shortest period that gives what is asked, with a slice ratio [us]."""
+        return max(self.slice_us / ratio, self.least_us)
+
+    def words(self, *, ratio: float, most_us: float) -> str:
+        """Say what is asked, and the longest period there is.
+
+        Parameters
+        ----------
+        ratio
+            Slice ratio [1].
+        most_us
+            The longest period [us].
+        """
+        if self.least_us > self.slice_us / ratio:
+            needs = f"needs a period of {self.least_us:.3f} us"
+            return self.why or f"{self.key} {needs}, and {most_us:.3f} us is the longest"
+        needs = f"needs a slice of {self.slice_us:.3f} us"
         who = f"the cycle {needs} to be shown to fit" if self.key == TIME else f"{self.key} {needs}"
-        return self.why or f"{who}, and at most {most_us:.3f} us can be given"
+        return self.why or f"{who}, and at most {ratio * most_us:.3f} us can be given"
 
 
-def shown(network: Network) -> Need:
-    """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely."""
+def shown(network: Network) -> Iterator[Need]:
+    """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely.
+
+    Time first, and then each limit that asks for a longer period than all before it.
+    """
     bus = bus_of(network.profile)
-    found = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
+    time = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
+    yield time
+    least_us = 0.0
     for limit in bus.limits:
         if limit.is_of_period:
             continue
-        # A limit that a period cures is asked at the one that all before it need, whatever the profile's own is.
-        at = network if limit.slice_us is None else network._replace(period_us=_period_us(network, found.us))
+        # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
+        at_us = max(time.slice_us, least_us, MIN_STEP_US)
+        at = network if limit.kept_from_us is None else network._replace(period_us=at_us)
         if limit.shown.is_broken(at):
-            slice_us = inf if limit.slice_us is None else limit.slice_us(at)
-            if slice_us == inf:
+            kept_us = inf if limit.kept_from_us is None else limit.kept_from_us(at)
+            if kept_us == inf:
                 way_out = f" ({limit.way_out})" if limit.way_out else ""
-                return Need(inf, limit.key, f"{limit.words(at)}{way_out}")
-            found = Need(slice_us, limit.key)
-    return found
+                yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
+                return
+            least_us = max(least_us, kept_us)
+            yield Need(0.0, limit.key, least_us=kept_us)
 
 
-def _period_us(network: Network, slice_us: float) -> float:
-    return max(slice_us / float(plain(network.slice_ratio)), MIN_STEP_US)
+def most_asking(needs: Iterable[Need], *, ratio: float) -> Need:
+    """The need that asks for the longest period with a slice ratio, the first of equals."""
+    return max(needs, key=lambda need: need.period_us(ratio))
 
 
 def keeps_limits(network: Network) -> bool:
     """Whether a network keeps the limits that its period plays a part in, at its own period and slice ratio."""
-    return not any(one.slice_us is not None and one.shown.is_broken(network) for one in bus_of(network.profile).limits)
+    limits = bus_of(network.profile).limits
+    return not any(one.kept_from_us is not None and one.shown.is_broken(network) for one in limits)
 
 
 def verdict(profile: Profile) -> Iterator[Need]:
     """The network itself."""
-    yield shown(network_of(profile))
+    yield from shown(network_of(profile))
 
 
 def utilisation(profile: Profile) -> Iterator[Need]:
@@ -81,9 +107,9 @@ def utilisation(profile: Profile) -> Iterator[Need]:
 def spare(profile: Profile) -> Iterator[Need]:
     """[limits] min_spare_nodes and min_spare_axes: more nodes must be shown to fit, too."""
     for room in rooms(profile):
-        found = shown(room.network)
-        why = found.why and f"{room.key} asks for room for {room.words}: {found.why}"
-        yield found._replace(key=room.key, why=why)
+        for found in shown(room.network):
+            why = found.why and f"{room.key} asks for room for {room.words}: {found.why}"
+            yield found._replace(key=room.key, why=why)
 
 
 CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, utilisation, spare)
@@ -91,13 +117,14 @@ CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, 
 
 def missed_limits(profile: Profile) -> tuple[Need, ...]:
     """What each key of [limits] asks that the slice of a profile does not give; the verdict is not among it."""
-    given_us = available_us(network_of(profile))
+    cycle = profile.cycle
     asked = (need for constraint in CONSTRAINTS[1:] for need in constraint(profile))
-    return tuple(need for need in asked if not fits_in(need.us, available_us=given_us))
+    missed = (need for need in asked if not within(need.period_us(cycle.slice_ratio), cycle.period_us))
+    return tuple({need.key: need for need in missed}.values())
 
 
 def needs(profile: Profile) -> list[Need]:
-    """What every constraint asks of the slice; the verdict's is the first."""
+    """What every constraint asks, those of the verdict first."""
     return [need for constraint in CONSTRAINTS for need in constraint(profile)]
 
 

@@ -30,7 +30,7 @@ from busplan.analysis.planning.short_numbers import (
     ShortNumbers,
 )
 from busplan.buses.parts import Cost
-from busplan.elementwise import plain
+from busplan.elementwise import plain, within
 from busplan.errors import BusplanError
 from busplan.sections.base import MAX_TIME_US
 from busplan.servo.checks import dividing_step_us
@@ -150,8 +150,8 @@ def _ratios(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> I
     period_us, own = search.period_us(changes), search.ratio(changes)
     found = set()
     for one in search.combinations(changes, cheaper):
-        needed_us = search.need_us(one)
-        if fits_in(needed_us, available_us=MOST_RATIO * period_us):
+        if within(search.needed_us(one, ratio=MOST_RATIO), period_us):
+            needed_us = max(need.slice_us for need in search.needs(one))
             found.add(RATIOS.number(place_of(RATIOS, needed_us, each_us=period_us)))
     yield from ({RATIO: ratio} for ratio in sorted(found) if own < ratio <= MOST_RATIO)
 
@@ -191,11 +191,11 @@ def _periods(search: "Search", changes: Changes, cheaper: Sequence[Freedom]) -> 
 
     After some of them the strides double, and what is found then is not proven to be the nearest.
     """
-    needed_us, ratio = search.least_need_us(changes, cheaper), search.most_ratio(changes, cheaper)
+    needed_us = search.least_needed_us(changes, cheaper)
     if needed_us == inf:
         return
     grid, own_us = period_grid(search.profile(changes)), search.period_us(changes)
-    least = place_of(grid, needed_us, each_us=ratio)
+    least = place_of(grid, needed_us, each_us=1)
     at = grid.place(own_us)
     below, above = at - 1, max(at + (grid.number(at) <= own_us), least)
     stride = 1

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from math import inf
 
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.constraints import CIRCLE
+from busplan.analysis.planning.constraints import CIRCLE, most_asking
 from busplan.analysis.planning.freedoms import PERIOD, Freedom, longest_period_us, most_nodes, period_grid, place_of
 from busplan.analysis.planning.machine import with_nodes, with_payload
 from busplan.analysis.planning.option import Impossible, Option, option
@@ -36,16 +36,16 @@ def frontier(goal: Profile, search: Search, levels: Sequence[Freedom]) -> Iterat
 
 def _shortest_period(goal: Profile, search: Search, cheap: Sequence[Freedom]) -> Option | Impossible:
     title, grid = "smallest period", period_grid(goal)
-    needed_us = search.least_need_us({}, cheap)
+    needed_us = search.least_needed_us({}, cheap)
     if needed_us == inf:
         return Impossible(title, search.binding(cheap).why)
-    first = place = place_of(grid, needed_us, each_us=search.most_ratio({}, cheap))
+    first = place = place_of(grid, needed_us, each_us=1)
     tried = 0
     while grid.number(place) <= MAX_TIME_US:
         found = search.least(cheap, {PERIOD: grid.number(place)})
         proven = tried < search.max_circles
         if found is not None:
-            held_by = CIRCLE if place > first else max(search.needs(found), key=lambda need: need.us).key
+            held_by = CIRCLE if place > first else most_asking(search.needs(found), ratio=search.ratio(found)).key
             return option(search, title, found, held_by=held_by)._replace(proven=proven)
         tried += 1
         place += 1 if tried < search.max_circles else 2 ** (tried - search.max_circles + 1)

@@ -6,14 +6,14 @@ from itertools import count
 from math import inf
 from typing import Final
 
-from busplan.analysis.capacity.cycle import fits_in
 from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.network import network_of
-from busplan.analysis.planning.constraints import CIRCLE, Need, keeps_limits, needs, refused_period
+from busplan.analysis.planning.constraints import CIRCLE, Need, keeps_limits, most_asking, needs, refused_period
 from busplan.analysis.planning.freedoms import PERIOD, RATIO, Freedom, longest_period_us
 from busplan.analysis.planning.machine import Changes
 from busplan.analysis.planning.short_numbers import MOST_RATIO
 from busplan.buses.parts import Cost, Value
+from busplan.elementwise import within
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
@@ -130,16 +130,16 @@ class Search:
         return True
 
     def needs(self, changes: Changes) -> list[Need]:
-        """What each constraint asks of the slice; neither period nor slice ratio nor step plays a part."""
+        """What each constraint asks; neither period nor slice ratio nor step plays a part."""
         others = {key: value for key, value in changes.items() if key not in (PERIOD, RATIO, STEP)}
         key = frozenset(others.items())
         if key not in self._needs:
             self._needs[key] = needs(self.profile(others))
         return self._needs[key]
 
-    def need_us(self, changes: Changes) -> float:
-        """What all constraints together ask of the slice [us]."""
-        return max(need.us for need in self.needs(changes))
+    def needed_us(self, changes: Changes, *, ratio: float) -> float:
+        """The shortest period that gives all constraints what they ask, with a slice ratio [us]."""
+        return max(need.period_us(ratio) for need in self.needs(changes))
 
     def period_us(self, changes: Changes) -> float:
         """Communication period after some changes [us]."""
@@ -180,35 +180,36 @@ class Search:
 
     def furthest(self, changes: Changes, levels: Sequence[Freedom]) -> Changes:
         """The combination that needs least, with a step that divides the period and the largest ratio that is free."""
+        ratio = self.most_ratio(changes, levels)
 
         def lacks(one: Changes) -> tuple[float, bool]:
-            return self.need_us(one), bool(refused_period(self.profile(one)))
+            return self.needed_us(one, ratio=ratio), bool(refused_period(self.profile(one)))
 
         least = min(self.combinations(changes, levels), key=lacks)
-        ratio = self.most_ratio(changes, levels)
         return {**({} if ratio == self.ratio(changes) else {RATIO: ratio}), **least}
 
-    def least_need_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
-        """The least that the slice must give with some freedoms [us]."""
-        return min(map(self.need_us, self.combinations(changes, levels)))
+    def least_needed_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
+        """The shortest period that gives all constraints what they ask, with some freedoms [us]."""
+        ratio = self.most_ratio(changes, levels)
+        return min(self.needed_us(one, ratio=ratio) for one in self.combinations(changes, levels))
 
     def most_ratio(self, changes: Changes, levels: Sequence[Freedom]) -> float:
         """The largest slice ratio with some freedoms [1]."""
         own = self.ratio(changes)
         return max(own, MOST_RATIO) if any(one.cost == Cost.HOST_TIME for one in levels) else own
 
-    def most_slice_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
-        """The longest slice with some freedoms [us]."""
+    def most_period_us(self, changes: Changes, levels: Sequence[Freedom]) -> float:
+        """The longest period with some freedoms [us]."""
         is_free = any(one.cost == Cost.PERIOD for one in levels)
-        return self.most_ratio(changes, levels) * (longest_period_us(self._own) if is_free else self.period_us(changes))
+        return longest_period_us(self._own) if is_free else self.period_us(changes)
 
     def is_bounded(self, levels: Sequence[Freedom]) -> bool:
         """Whether some freedoms have an end: no period is free, and no limit of the bus is broken."""
-        return all(one.cost != Cost.PERIOD for one in levels) and self.least_need_us({}, levels) < inf
+        return all(one.cost != Cost.PERIOD for one in levels) and self.least_needed_us({}, levels) < inf
 
     def reaches(self, changes: Changes, levels: Sequence[Freedom]) -> bool:
         """Whether the bus fits with some freedoms, whatever its circle."""
-        return bool(fits_in(self.least_need_us(changes, levels), available_us=self.most_slice_us(changes, levels)))
+        return bool(within(self.least_needed_us(changes, levels), self.most_period_us(changes, levels)))
 
     def binding(self, levels: Sequence[Freedom], changes: Changes | None = None) -> Need:
         """The constraint that no change of some freedoms holds.
@@ -221,10 +222,10 @@ class Search:
             What is changed already.
         """
         furthest = self.furthest(changes or {}, levels)
-        most_us = self.most_slice_us(furthest, levels)
-        worst = max(self.needs(furthest), key=lambda need: need.us)
-        if not fits_in(worst.us, available_us=most_us):
-            return worst._replace(why=worst.words(most_us))
+        most_us, ratio = self.most_period_us(furthest, levels), self.most_ratio(furthest, levels)
+        worst = most_asking(self.needs(furthest), ratio=ratio)
+        if not within(worst.period_us(ratio), most_us):
+            return worst._replace(why=worst.words(ratio=ratio, most_us=most_us))
         refused = refused_period(self.profile(furthest))
         if refused and all(one.cost != Cost.PERIOD for one in levels):
             return refused
@@ -232,4 +233,4 @@ class Search:
         return Need(inf, CIRCLE, failures[0] if failures else "no period that was tried passes the circle")
 
     def _fits(self, changes: Changes) -> bool:
-        return bool(fits_in(self.need_us(changes), available_us=self.ratio(changes) * self.period_us(changes)))
+        return bool(within(self.needed_us(changes, ratio=self.ratio(changes)), self.period_us(changes)))

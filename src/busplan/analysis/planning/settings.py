@@ -5,6 +5,7 @@ from math import inf
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import shown
 from busplan.analysis.planning.machine import Changes
+from busplan.buses.network import Network
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
 
@@ -23,8 +24,13 @@ def needed_settings(profile: Profile) -> Changes:
         New value by dotted key; empty where none is needed, or none is enough.
     """
     network = network_of(profile)
-    if shown(network).us < inf:
+    if _is_carried(network):
         return {}
     each = sorted(bus_of(profile).settings(network), key=lambda setting: setting.cost)
     changes = (dict(values) for setting in each for values in setting.values)
-    return next((one for one in changes if shown(network_of(override(profile, dict(one)))).us < inf), {})
+    return next((one for one in changes if _is_carried(network_of(override(profile, dict(one))))), {})
+
+
+def _is_carried(network: Network) -> bool:
+    """Whether some period carries a network."""
+    return all(need.period_us(1.0) < inf for need in shown(network))

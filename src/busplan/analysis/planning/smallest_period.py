@@ -4,12 +4,11 @@ from math import inf
 from typing import Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
-from busplan.analysis.capacity.cycle import available_us, fits_in
 from busplan.analysis.network import bus_of, network_of
-from busplan.analysis.planning.constraints import Need, keeps_limits, shown
+from busplan.analysis.planning.constraints import Need, keeps_limits, most_asking, shown
 from busplan.analysis.planning.freedoms import PERIOD, longest_period_us
 from busplan.buses.bus import Bus
-from busplan.elementwise import plain
+from busplan.elementwise import plain, within
 from busplan.forms.numbers import period
 from busplan.profile.toml import override
 from busplan.sections.base import MIN_STEP_US
@@ -50,9 +49,9 @@ def smallest_period(profile: Profile) -> SmallestPeriod:
         need = _need(profile, found_us)
         if need is None:
             return SmallestPeriod(_known_us(bus, _between(profile, short_us, found_us)))
-        if need.us == inf:
+        if need.period_us(ratio) == inf:
             return SmallestPeriod(None, need.why)
-        short_us, found_us = found_us, _known_us(bus, max(need.us / ratio, found_us * _NEXT))
+        short_us, found_us = found_us, _known_us(bus, max(need.period_us(ratio), found_us * _NEXT))
     return SmallestPeriod(None, f"it would be over {period(longest_us)}")
 
 
@@ -64,8 +63,9 @@ def _known_us(bus: Bus, least_us: float) -> float:
 def _need(profile: Profile, period_us: float) -> Need | None:
     """What a profile lacks at a period; None where it is shown to fit."""
     network = network_of(override(profile, {PERIOD: period_us}))
-    need = shown(network)
-    return None if fits_in(need.us, available_us=available_us(network)) and keeps_limits(network) else need
+    need = most_asking(shown(network), ratio=profile.cycle.slice_ratio)
+    is_given = within(need.period_us(profile.cycle.slice_ratio), period_us)
+    return None if is_given and keeps_limits(network) else need
 
 
 def _between(profile: Profile, short_us: float, long_us: float) -> float:

@@ -131,7 +131,7 @@ def _largest_pdo(network: Network) -> Number:
 
 
 def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> float:
-    """The slice from which on a limit holds, the slice ratio as it is; infinite where no period is long enough [us]."""
+    """The period from which on a limit holds; infinite where none is long enough [us]."""
     broken_us = kept_us = plain(network.period_us)
     while is_broken(network._replace(period_us=kept_us)):
         broken_us, kept_us = kept_us, 2 * kept_us
@@ -143,7 +143,7 @@ def _kept_from_us(is_broken: Callable[[Network], Number], network: Network) -> f
             broken_us = middle_us
         else:
             kept_us = middle_us
-    return kept_us * plain(network.slice_ratio)
+    return kept_us
 
 
 _HALVINGS: Final = 20
@@ -205,7 +205,7 @@ LIMITS: Final = (
         way_out="a longer period, fewer bytes or a faster bus takes load off",
         has_rule=True,
         says=_load_words,
-        slice_us=lambda network: plain(CanCycle(network, WORST).load_period_us * network.slice_ratio),
+        kept_from_us=lambda network: plain(CanCycle(network, WORST).load_period_us),
     ),
     Limit(
         "deadline",
@@ -215,6 +215,6 @@ LIMITS: Final = (
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         has_rule=True,
         says=lambda network: _all_late(traffic_of(network)),
-        slice_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
+        kept_from_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
     ),
 )

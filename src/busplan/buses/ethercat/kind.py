@@ -13,7 +13,7 @@ from busplan.buses.ethercat.limits import LIMITS
 from busplan.buses.ethercat.traffic import arrivals_us, datagrams, layout
 from busplan.buses.figure import NONPERIODIC, Figure
 from busplan.buses.network import Network
-from busplan.buses.parts import EventKind, Limit, PayloadRange, Perturbation, Starter, TimingModel
+from busplan.buses.parts import Cost, EventKind, Limit, PayloadRange, Perturbation, Setting, Starter, TimingModel
 from busplan.buses.rule import Rule
 from busplan.elementwise import plain
 from busplan.sourced import Sourced
@@ -105,7 +105,11 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
         "node.execution.worst_extra_us": "T_extra",
     }
     loop_key = "bus.pipeline_cycles"
-    change_meanings: ClassVar[Mapping[str, str]] = {"bus.nodes": "the others on a second segment"}
+    change_meanings: ClassVar[Mapping[str, str]] = {
+        "bus.nodes": "the others on a second segment",
+        "bus.sync_shift": "drives act, and sample, later",
+    }
+    change_words: ClassVar[Mapping[str, str]] = {"bus.sync_shift": "SYNC0 at {}"}
     cable_key = "node.cable_m"
     host_keys = ("bus.master_us",)
     term_removals: ClassVar[tuple[Mapping[str, str | float], ...]] = (
@@ -157,6 +161,14 @@ distributed_clocks = true  # assumed: the drives act at SYNC0, at bus.sync_shift
     def acts_at_once(self, network: Network) -> bool:
         """Whether it has distributed clocks."""
         return bool(network.profile.bus.distributed_clocks)
+
+    def settings(self, network: Network) -> tuple[Setting, ...]:
+        """SYNC0 later in the cycle, for commands that come behind it."""
+        bus = network.profile.bus
+        if not (bus.distributed_clocks and bus.sync_shift):
+            return ()
+        later = ({"bus.sync_shift": tenths / 10} for tenths in range(1, 10) if tenths / 10 > bus.sync_shift)
+        return (Setting("sync_shift", "shift of SYNC0", Cost.REGISTER, ("bus.sync_shift",), tuple(later)),)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
         """A mailbox poll more, a slower master, bytes that are not shared, and distributed clocks."""

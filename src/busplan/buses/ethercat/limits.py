@@ -32,10 +32,12 @@ def _late_command_us(network: Network) -> Number:
 
 SYNC0: Final = share_limit(
     "sync0",
-    "the last command comes at {value:.1f} +/- {uncertainty:.1f} us, SYNC0 at {most:.1f} us",
+    "the last command comes at {value:.1f} +/- {uncertainty:.1f} us where all of bus.master_us comes before the wire, "
+    "SYNC0 at {most:.1f} us",
     _late_command_us,
     share=sync0_share,
     doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
+    perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
     way_out="a larger bus.sync_shift moves SYNC0 back",
     has_rule=True,
 )
