@@ -226,10 +226,11 @@ class Search:
         if not fits_in(worst.us, available_us=most_us):
             return worst._replace(why=worst.words(most_us))
         refused = refused_period(self.profile(furthest))
-        if refused and all(one.cost != Cost.PERIOD for one in levels):
+        if refused:
             return refused
         failures = self.circle_failures(furthest) if self._fits(furthest) else ()
-        return Need(inf, CIRCLE, failures[0] if failures else "no period that was tried passes the circle")
+        words = "passes the circle" if self.runs_circle else "is one that the circle can be run at"
+        return Need(inf, CIRCLE, failures[0] if failures else f"no period that was tried {words}")
 
     def _fits(self, changes: Changes) -> bool:
         return bool(fits_in(self.need_us(changes), available_us=self.ratio(changes) * self.period_us(changes)))
