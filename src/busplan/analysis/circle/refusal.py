@@ -157,13 +157,15 @@ def _out_of_order(profile: Profile) -> Iterator[Refused]:
             yield Refused("cycle.period_us", period_us, right)
 
 
-def _move(profile: Profile, axes: Sequence[Axis]) -> Iterator[Refused]:
-    """Refuse a move that is too short for its feed or too long for memory."""
+def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
+    """Refuse a move that is too short for its feed or too long for memory; a lead-in makes it longer."""
     is_turn = profile.circle.path != "trapezoid"
-    if any(_unfit(profile, axes, LONGEST_SETTLING_US if is_turn else None)):
-        from busplan.analysis.circle.setup import path_settling_us  # only so long a circle loads numpy
+    least = [*_unfit(profile, axes, 0.0 if is_turn else None)]
+    if least or not is_turn or not any(_unfit(profile, axes, LONGEST_SETTLING_US)):
+        return least
+    from busplan.analysis.circle.setup import path_settling_us  # only what the lead-in decides loads numpy
 
-        yield from _unfit(profile, axes, path_settling_us(profile))
+    return [*_unfit(profile, axes, path_settling_us(profile))]
 
 
 def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:

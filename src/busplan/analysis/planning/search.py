@@ -227,10 +227,11 @@ class Search:
         if not within(worst.period_us(ratio), most_us):
             return worst._replace(why=worst.words(ratio=ratio, most_us=most_us))
         refused = refused_period(self.profile(furthest))
-        if refused and all(one.cost != Cost.PERIOD for one in levels):
+        if refused:
             return refused
         failures = self.circle_failures(furthest) if self._fits(furthest) else ()
-        return Need(inf, CIRCLE, failures[0] if failures else "no period that was tried passes the circle")
+        words = "passes the circle" if self.runs_circle else "is one that the circle can be run at"
+        return Need(inf, CIRCLE, failures[0] if failures else f"no period that was tried {words}")
 
     def _fits(self, changes: Changes) -> bool:
         return bool(within(self.needed_us(changes, ratio=self.ratio(changes)), self.period_us(changes)))
