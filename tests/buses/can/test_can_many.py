@@ -54,7 +54,7 @@ def many(count: int, *, load: float, slow: float = 0.5, seed: int = 1) -> CanPro
 @pytest.mark.parametrize("count", [1, 31, 32, 33, 64, 65, 300])
 def test_a_search_takes_any_number_of_arguments(count: int) -> None:
     others = range(count - 1)
-    found = pointwise(lambda *each: sum(each), np.array([1, 2]), *others, np.array([[10], [20]]), words="")
+    found: Any = pointwise(lambda *each: sum(each), np.array([1, 2]), *others, np.array([[10], [20]]), words="")
     assert np.array_equal(found, np.array([[11, 12], [21, 22]]) + sum(others))
 
 
