@@ -78,8 +78,8 @@ def test_a_picture_is_the_same_twice_and_takes_any_name() -> None:
 
 def test_a_machine_that_no_bus_carries_is_drawn() -> None:
     # Inputs of 40 bytes are over the four frames of a PDO, and no axis has one of its own for them.
-    changes = {"cycle.period_us": 1.0, "group.io.read_bytes": 40}
-    late = compare(override(load("gantry-24").profile, changes), kinds=["can"])
+    inputs = override(load("gantry-24").profile, {"cycle.period_us": 1.0, "group.io.read_bytes": 40})
+    late = compare(inputs, kinds=["can"])
     assert dots(late) == []
     assert compare_png(late, title="none").startswith(b"\x89PNG")
     assert compare_lines(late, width=80)
