@@ -41,9 +41,9 @@ def latency_command(
     """Show how long data takes to arrive, phase by phase, under each timing model.
 
     On IEEE 1394 it is one read and one write of the farthest node, by the broadcast schedule the data of all nodes and
-    the commands to them; on CAN the worst-case response time of every message; on EtherCAT a command, feedback, and a
-    loop over both; on SERCOS feedback and commands of all nodes. Times are in us, sizes in bytes; each
-    phase has its equation or source. A report: it exits 0 whatever the figures are.
+    the commands to them; on CAN the worst-case response time of every message, and a loop over feedback and commands;
+    on EtherCAT a command, feedback, and a loop over both; on SERCOS feedback and commands of all nodes. Times are in
+    us, sizes in bytes; each phase has its equation or source. A report: it exits 0 whatever the figures are.
 
     Example: busplan latency paper-two-node --payload 4,16,1024
     """

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from busplan.buses.published import EvidenceSection
 
 _DAVIS: Final = figures.BUS_LOAD.reference
+_HOST_STEP_US: Final = 10.0
 
 
 class Can(Bus):
@@ -106,6 +107,7 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         "payload.pdo_per": "PDOs of each {}",
         "pdo_per": "PDOs of each {}",
     }
+    term_removals: ClassVar[tuple[Mapping[str, float], ...]] = ({"bus.host_us": 0.0},)
     evidence_data = ("can", "paper")
     model_error = "this timing model takes 8 to 15% more than frames that were measured"
     loop_key = "bus.pipeline_cycles"
@@ -144,11 +146,15 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         return settings(network)
 
     def perturbations(self, network: Network) -> tuple[Perturbation, ...]:
-        """SYNC with its counter, and identifiers of 29 bits."""
+        """A slower host, SYNC with its counter, and identifiers of 29 bits."""
         bus = network.profile.bus
         counted = "SYNC has its counter already" if bus.sync_counter else ""
         extended = "they have 29 bits already" if bus.identifier_bits > BASE_BITS else ""
+        elsewhere = "the host computes in cycles of its own" if bus.pipeline_cycles else ""
         return (
+            Perturbation(
+                f"host +{_HOST_STEP_US:g} us", {"bus.host_us": bus.host_us + _HOST_STEP_US}, why_not=elsewhere
+            ),
             Perturbation("SYNC with counter", {"bus.sync_counter": True}, why_not=counted),
             Perturbation("identifiers of 29 bits", {"bus.identifier_bits": 29}, why_not=extended),
         )

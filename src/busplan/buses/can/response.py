@@ -76,7 +76,7 @@ def worst_response(
     The second instance is the worst one:
 
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
-    Response(blocking_us=0, instance=1, interference_us=5000, us=3500.0)
+    Response(blocking_us=0, instance=1, interference_us=5000.0, us=3500.0)
     """
     before = Arrivals(higher)
     if before.load + own.load >= SATURATED:
