@@ -247,15 +247,19 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
 
 
 def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
-    """Say by part what of a kind figures of others test; nothing where they test all of it."""
+    """Say by part what of a kind figures of others set and test; nothing where they test all of it."""
     found = parts_tested(bus.evidence_data)
     kind = f"{bus.title} (kind {bus.kind})"
     if not found.parts:
         yield Sentence((f"No figure that others have published or measured tests the model of {kind}.",))
     elif found.untested:
-        parts = ", ".join(f"{part} ({words})" for part, words in found.parts.items())
-        words = f"Tested of {kind} by figures of others: {parts}; not tested: {', '.join(found.untested)}."
-        yield Sentence((words,))
+        said = {"set by figures of others": found.set_by, "tested by others": found.parts}
+        each = (
+            f"{how}: {', '.join(f'{part} ({by})' for part, by in parts.items())}"
+            for how, parts in said.items()
+            if parts
+        )
+        yield Sentence((f"Of {kind} {'; '.join(each)}; not tested: {', '.join(found.untested)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:
