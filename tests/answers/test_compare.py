@@ -69,6 +69,20 @@ def test_a_kind_whose_host_is_assumed_is_not_ranked() -> None:
     assert "bus.master_us = 40" in " ".join(row(found, "EtherCAT"))
 
 
+@pytest.mark.parametrize(
+    ("changes", "keys"),
+    [({}, ["bus.master_us"]), ({"bus.master_grade": "measured"}, []), ({"bus.master_us": 0}, [])],
+)
+def test_a_host_that_the_profile_itself_assumes_is_not_ranked_either(
+    changes: dict[str, object], keys: list[str]
+) -> None:
+    own = override(load("ethercat-servo-8").profile, changes)
+    found = compare(own, kinds=["ethercat"])
+    assert plain(found)["buses"][0]["assumed_host"] == keys
+    assert any(line.startswith("The smallest period is ") for line in said(found)) == (not keys)
+    assert any("Not ranked" in line and "EtherCAT (bus.master_us = 40)" in line for line in said(found)) == bool(keys)
+
+
 def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None:
     (note,) = [line for line in said(GANTRY) if line.startswith("CAN: ")]
     assert "At 1 ms a PDO of 40 bytes is over the 32 bytes of four frames; the bus load is 744.0%" in note
