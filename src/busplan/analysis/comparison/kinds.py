@@ -81,7 +81,7 @@ class MachineOnKind(NamedTuple):
 
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
-        """What is assumed of the host's own time, by the profile itself, too: then its figures rank with no kind whose host is known."""
+        """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
         keys = kind_named(self.profile.bus.kind).host_keys
         inputs = [given(self.profile, key) for key in keys] if self.is_own else []
         own = (AssumedKey(one.name, one.value, "profile") for one in inputs if one.grade == "assumed" and one.value)
