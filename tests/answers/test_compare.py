@@ -46,14 +46,14 @@ def test_the_first_lines_say_where_it_fits_and_which_kind_is_best() -> None:
     ]
 
 
-def test_a_row_has_the_verdict_margin_smallest_period_axes_and_what_binds() -> None:
-    own = "IEEE 1394, as it is fits 230.064 6.311 552.494 execution 12 time - PASSED 92.082"
+def test_a_row_has_the_verdict_margin_smallest_period_axes_and_the_largest_term() -> None:
+    own = "IEEE 1394, as it is fits 230.064 6.311 execution 552.494 12 time - PASSED 92.082"
     # The host keeps its half of the period on CAN, too.
     new = "bus.bit_rate_kbit_s = 1000, bus.pipeline_cycles = 1, 6 defaults"
-    other = f"CAN does not fit -548.467 14.693 2126.320 load 0 time {new} PASSED 75.940"
+    other = f"CAN does not fit -548.467 14.693 feedback 2126.320 0 time {new} PASSED 75.940"
     assert " ".join(row(PAPER, "IEEE 1394, as it is")) == own
     assert " ".join(row(PAPER, "CAN")) == other
-    assert row(GANTRY, "CAN")[6:11] == ["-", "payload,", "load", "0", "payload"]
+    assert row(GANTRY, "CAN")[6:9] == ["feedback", "-", "0"]
 
 
 def test_a_kind_whose_host_is_assumed_is_not_ranked() -> None:
@@ -69,13 +69,28 @@ def test_a_kind_whose_host_is_assumed_is_not_ranked() -> None:
     assert "bus.master_us = 40" in " ".join(row(found, "EtherCAT"))
 
 
+@pytest.mark.parametrize(
+    ("changes", "keys"),
+    [({}, ["bus.master_us"]), ({"bus.master_grade": "measured"}, []), ({"bus.master_us": 0}, [])],
+)
+def test_a_host_that_the_profile_itself_assumes_is_not_ranked_either(
+    changes: dict[str, object], keys: list[str]
+) -> None:
+    own = override(load("ethercat-servo-8").profile, changes)
+    found = compare(own, kinds=["ethercat"])
+    assert plain(found)["buses"][0]["assumed_host"] == keys
+    assert any(line.startswith("The smallest period is ") for line in said(found)) == (not keys)
+    assert any("Not ranked" in line and "EtherCAT (bus.master_us = 40)" in line for line in said(found)) == bool(keys)
+
+
 def test_what_is_left_out_untested_and_in_the_way_is_said_of_each_kind() -> None:
     (note,) = [line for line in said(GANTRY) if line.startswith("CAN: ")]
     assert "At 1 ms a PDO of 40 bytes is over the 32 bytes of four frames; the bus load is 744.0%" in note
     assert "No period is shown to fit: a PDO of 40 bytes" in note
     assert "Left out on CAN: bus.speed, bus.gap_count, bus.charge_hops, group.io.write_response." in said(GANTRY)
     assert "Execution times are assumed to be as long as on IEEE 1394; here they are: from SYNC to a queued" in note
-    assert "Tested of CAN (kind can) by figures of others: lengths of frames (2 sizes), response times" in note
+    assert "Of CAN (kind can) set by figures of others: expected load (8 frames that hardware" in note
+    assert "; tested by others: lengths of frames (2 sizes), response times" in note
     assert note.endswith("; not tested: the cycle.")
     reset = "After a bus reset, with bus.gap_count = 63 until it is set again, the verdict is: not shown to fit."
     assert any(line.startswith(f"IEEE 1394: {reset}") for line in said(GANTRY))

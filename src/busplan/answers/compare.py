@@ -4,16 +4,15 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
-from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, limits_behind
+from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind, fitting
 from busplan.analysis.network import bus_of
 from busplan.answers.compare_document import compare_document, compare_records
 from busplan.answers.compare_notes import notes
 from busplan.answers.verdict import execution_sentence, refused_circle
 from busplan.buses import kind_named
-from busplan.buses.figure import SAFE_AXES, VERDICT, by_key
+from busplan.buses.figure import SAFE_AXES, VERDICT
 from busplan.drawings.compare.drawing import KindsDrawing
-from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Block,
@@ -41,8 +40,8 @@ _COLUMNS: Final = (
     TableColumn(VERDICT.label, kind="words", wraps=True),
     TableColumn("margin", "us"),
     TableColumn("U", "us"),
+    TableColumn("largest term", kind="words", rank=1, leaves="below", wraps=True),
     TableColumn("smallest period", "us"),
-    TableColumn("binds", kind="words", rank=1, leaves="below", wraps=True),
     TableColumn("most", group="safe axes"),
     TableColumn("limited by", kind="words", group="safe axes", rank=3, leaves="below", wraps=True),
     TableColumn("assumed", kind="words", rank=2, leaves="below", wraps=True),
@@ -176,8 +175,8 @@ def _row(found: KindComparison, number: int, *, columns: int) -> TableRow:
             ShownValue(getattr(figures, key), key, "us", 3, at=f"{at}/{key}")
             for key in ("margin_corrected_us", "uncertainty_us")
         ),
+        bus_of(one.profile).term_label(figures.binding_term),
         ShownValue(one.smallest.us, "smallest_period_us", "us", 3, at=f"{at}/smallest_period_us"),
-        _binds(one),
         ShownValue(one.safe.axes, SAFE_AXES.key, at=f"{at}/{SAFE_AXES.key}"),
         one.safe.limited_by,
         _assumed(one),
@@ -192,15 +191,6 @@ def _verdict(one: MachineOnKind) -> Words:
     refused = ", circle cannot be run" if figures.circle_refused_by else ""
     is_well = figures.verdict == FITS and figures.safe and not refused
     return Words(f"{figures.verdict}{unsafe}{refused}", state_of(is_well))
-
-
-def _binds(one: MachineOnKind) -> str:
-    """The limits that are broken; without one the largest term."""
-    behind = limits_behind(one.figures)
-    if behind:
-        return ", ".join(behind)
-    largest = max(one.figures.terms, key=lambda term: plain(term.us))
-    return by_key(bus_of(one.profile).term_figures)[largest.key].label
 
 
 def _circle(one: MachineOnKind, *, at: str) -> tuple[Cell, ...]:

@@ -4,7 +4,7 @@ from typing import Any
 
 from busplan.analysis.comparison.kinds import CircleAtSmallest, KindComparison, MachineOnKind, NotOnKind, SafeAxes
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.documents import document, tested_parts, with_profile
+from busplan.answers.documents import document, parts_by, with_profile
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.published import parts_tested
@@ -45,7 +45,7 @@ def _row(record: Record) -> Record:
     flat = {key: value for key, value in record.items() if key not in {"circle", "curve", "assumed"}}
     return {
         **flat,
-        "tested": [one["part"] for one in record["tested"]],
+        **{key: [one["part"] for one in record[key]] for key in ("set_by", "tested")},
         "assumed": [one["key"] for one in record["assumed"]],
         "circle_passed": circle["passed"],
         "circle_step_us": circle["step_us"],
@@ -77,9 +77,10 @@ def _bus_record(one: MachineOnKind | NotOnKind) -> Record:
 
 
 def tested_record(bus: Bus) -> Record:
-    """Which parts of a kind figures of others test, and which they do not."""
+    """Which parts of a kind figures of others set, which they test, and which they do not test."""
     found = parts_tested(bus.evidence_data)
-    return {"tested": tested_parts(found), "not_tested": list(found.untested)}
+    set_by, tested = map(parts_by, (found.set_by, found.parts))
+    return {"set_by": set_by, "tested": tested, "not_tested": list(found.untested)}
 
 
 def _head(kind: str, *, is_own: bool, why_not: list[str]) -> Record:

@@ -6,7 +6,6 @@ Keys carry their units and are stable between releases; new ones may be added.
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from busplan.buses.published import Tested
 from busplan.forms.blocks import Code, JsonDocument, Record, Report, Sentence, joined
 from busplan.profile.changes import KeyChanges
 
@@ -23,9 +22,9 @@ def with_profile(name: str, records: Sequence[Record]) -> list[Record]:
     return [{"profile": name, **record} for record in records]
 
 
-def tested_parts(found: Tested) -> list[Record]:
-    """Each part of a kind that figures of others test, with what tests it."""
-    return [{"part": part, "by": words} for part, words in found.parts.items()]
+def parts_by(parts: Mapping[str, str]) -> list[Record]:
+    """Each part of a kind that figures of others set or test, with what does."""
+    return [{"part": part, "by": words} for part, words in parts.items()]
 
 
 def changed_document(content: Mapping[str, Any], changes: KeyChanges) -> JsonDocument:

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from busplan.analysis.evidence import KindEvidence
-from busplan.answers.documents import document, tested_parts
+from busplan.answers.documents import document, parts_by
 from busplan.answers.verdict import evidence_sentence
 from busplan.buses import kind_named
 from busplan.buses.published import Comparison, EvidenceSection
@@ -105,7 +105,8 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
         "evidence",
         kinds=[one.kind for one in kinds],
         without=[one.kind for one in kinds if not one.sections],
-        tested=[{"kind": one.kind, **part} for one in kinds for part in tested_parts(one.tested)],
+        set_by=[{"kind": one.kind, **part} for one in kinds for part in parts_by(one.tested.set_by)],
+        tested=[{"kind": one.kind, **part} for one in kinds for part in parts_by(one.tested.parts)],
         not_tested=[{"kind": one.kind, "part": part} for one in kinds for part in one.tested.untested],
         notes={section.title: section.note for one in kinds for section in one.sections},
         figures=evidence_records(kinds),

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from busplan.analysis.capacity.assumed import heavy_assumptions
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, FITS, limits_behind
 from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.capacity.figures import CapacityFigures, GroupCapacity
@@ -86,7 +87,7 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
     yield _carries(figures, at=at)
     if verdict.change is not None or not (verdict.all_well and profile.group):
         yield _advice(verdict, profile, places)
-    yield from execution_sentence(profile)
+    yield from _assumed(figures, profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
 
 
@@ -128,6 +129,16 @@ def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
 def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Sentence]:
     """Warnings as sentences; see `warnings`."""
     return (Sentence((words,), "warns") for words in warnings(profile, nodes=nodes, most=most))
+
+
+def _assumed(figures: CapacityFigures, profile: Profile) -> Iterator[Sentence]:
+    """Say which assumptions carry much of the cycle or of its doubt, and how its execution time is known."""
+    heavy = heavy_assumptions(figures, profile)
+    if heavy:
+        said = (f"{listed(one.keys, 'and')}, which {one.carries}" for one in heavy)
+        yield Sentence((f"Assumed: {'; '.join(said)}.",), "warns")
+    if not (any(one.is_execution for one in heavy) and execution_grades(profile) == "assumed"):
+        yield from execution_sentence(profile)
 
 
 def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterator[Sentence]:
@@ -248,15 +259,19 @@ def not_in_it(profile: Profile) -> Iterator[Sentence]:
 
 
 def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
-    """Say by part what of a kind figures of others test; nothing where they test all of it."""
+    """Say by part what of a kind figures of others set and test; nothing where they test all of it."""
     found = parts_tested(bus.evidence_data)
     kind = f"{bus.title} (kind {bus.kind})"
     if not found.parts:
         yield Sentence((f"No figure that others have published or measured tests the model of {kind}.",))
     elif found.untested:
-        parts = ", ".join(f"{part} ({words})" for part, words in found.parts.items())
-        words = f"Tested of {kind} by figures of others: {parts}; not tested: {', '.join(found.untested)}."
-        yield Sentence((words,))
+        said = {"set by figures of others": found.set_by, "tested by others": found.parts}
+        each = (
+            f"{how}: {', '.join(f'{part} ({by})' for part, by in parts.items())}"
+            for how, parts in said.items()
+            if parts
+        )
+        yield Sentence((f"Of {kind} {'; '.join(each)}; not tested: {', '.join(found.untested)}.",))
 
 
 def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:

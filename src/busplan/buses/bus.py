@@ -106,7 +106,7 @@ class Bus(ABC):
     cable_key: ClassVar[str] = ""
     """Key of the length of a cable [m]: of the bus, or of each node; empty where the kind has none."""
     host_keys: ClassVar[tuple[str, ...]] = ()
-    """Keys of the host's own time in the cycle: what a comparison assumes of it is no ground to rank a kind."""
+    """Keys of the host's own time in the cycle: what is assumed of it is no ground to rank a kind."""
     term_removals: ClassVar[tuple[Mapping[str, Value], ...]] = ()
     """What would take a term of its own out of the cycle, each new values by dotted key."""
     change_words: ClassVar[Mapping[str, str]] = {}

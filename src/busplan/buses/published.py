@@ -50,16 +50,18 @@ Unit = Literal["us", "1", "s", "mm", "bytes", "bits"]
 
 
 class Tested(NamedTuple):
-    """Which parts of a kind of bus figures of others test."""
+    """Which parts of a kind of bus figures of others set, and which they test."""
 
+    set_by: Mapping[str, str]
+    """What sets constants, bias or U of each part, in a few words: it tests none of them."""
     parts: Mapping[str, str]
-    """What tests each part, in a few words."""
+    """What tests each part, and sets nothing of it."""
     untested: tuple[str, ...]
     """Parts that no figure tests."""
 
 
 def parts_tested(names: Sequence[str]) -> Tested:
-    """The parts that some data files test, by their tables [tested], and those that they do not.
+    """The parts that some data files set and test, by their tables [set_by] and [tested], and those not tested.
 
     Parameters
     ----------
@@ -67,8 +69,11 @@ def parts_tested(names: Sequence[str]) -> Tested:
         The files.
     """
     files = [published(name) for name in names]
-    parts = {part: _words(part, one, file) for file in files for part, one in file.get("tested", {}).items()}
-    return Tested(parts, tuple(part for file in files for part in file.get("untested", ())))
+
+    def parts(table: str) -> dict[str, str]:
+        return {part: _words(part, one, file) for file in files for part, one in file.get(table, {}).items()}
+
+    return Tested(parts("set_by"), parts("tested"), tuple(part for file in files for part in file.get("untested", ())))
 
 
 def _words(part: str, one: Mapping[str, Any], file: Mapping[str, Any]) -> str:

@@ -35,6 +35,10 @@ class RuleFigures(Protocol):
         """Name of the timing model."""
 
     @property
+    def period_us(self) -> float:
+        """The period [us]."""
+
+    @property
     def exceeded(self) -> tuple[str, ...]:
         """Keys of the limits that are broken."""
 

@@ -26,8 +26,9 @@ class AssumedKey(NamedTuple):
 
     key: str
     value: Any
-    source: Literal["new profile", "default", "setting"]
-    """Where its value comes from: what `init` writes, the default of the kind, or a setting that the machine needs."""
+    source: Literal["new profile", "default", "setting", "profile"]
+    """Where its value comes from: what `init` writes, the default of the kind, a setting that the machine needs, or the
+    profile, which grades it assumed."""
 
 
 class Conversion(NamedTuple):

@@ -3,16 +3,13 @@
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
+from busplan.analysis.capacity.assumed import heavy_assumptions
 from busplan.analysis.capacity.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind
 from busplan.analysis.capacity.cycle import TIME, fits_in
-from busplan.analysis.derivation.inputs import given
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.node_time import NODE, busy_words, slow_groups
 from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
-from busplan.elementwise import plain
-from busplan.sections.base import value_at
 from busplan.sections.execution import TableExecution
-from busplan.sourced import Sourced
 
 
 def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
@@ -101,42 +98,13 @@ def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
             yield RuleProblem(group.key(f"execution.{name}"), said, *subject.cure())
 
 
-_MUCH: Final = Sourced(
-    0.25,
-    unit="1",
-    grade="assumed",
-    source="chosen",
-    meaning="share of U squared, or of the required time, from which on a verdict rests on a key",
-)
-
-
 def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
     """Much of the required time, or of what is not known of it, is an assumption."""
-    one, profile = subject.deciding, subject.profile
-    variance = sum(float(doubt.us) ** 2 for doubt in one.doubts)
-    shares = [(doubt.key, float(doubt.us) ** 2 / variance, "U squared") for doubt in one.doubts if variance]
-    shares += [(term.rests_on, plain(term.us) / one.required_us, "the required time") for term in one.terms]
-    said: dict[str, list[str]] = {}
-    for key, share, whole in shares:
-        if share > _MUCH:
-            said.setdefault(key, []).append(f"{share:.0%} of {whole}")
-    for key, carried in said.items():
-        # What is no key has no grade, and execution times have a section of their own.
-        if isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed":
-            yield RuleProblem(key, f"an assumption, and it carries {' and '.join(carried)}", "measure it")
-    yield from _assumed_execution(subject)
-
-
-def _assumed_execution(subject: RuleSubject) -> Iterator[RuleProblem]:
-    network, bus = network_of(subject.profile), bus_of(subject.profile)
-    for group in network.groups:
-        if group.node.execution.grade != "assumed" or not bus.has_execution(network._replace(groups=(group,))):
-            continue
-        yield RuleProblem(
-            group.key("execution.grade"),
-            "the execution time is an assumption, and the largest terms rest on it",
-            "measure it on the node",
-        )
+    for one in heavy_assumptions(subject.deciding, subject.profile):
+        what = "an assumption" if len(one.keys) == 1 else "an assumption of several"
+        for key in one.keys:
+            at = f"{key}.grade" if one.is_execution else key
+            yield RuleProblem(at, f"{what}, which {one.carries}", "measure it")
 
 
 RULES: Final = (
@@ -203,8 +171,8 @@ RULES: Final = (
         "warning",
         "the verdict rests on an assumption",
         "A key that its comment or its grade calls assumed carries more than a quarter of the required time or of U "
-        'squared, or node.execution has grade = "assumed": the execution time is the largest term of most cycles, and '
-        "no equation gives it. Measure it, and say so in its grade or comment.",
+        "squared; of execution times, which no equation gives, all that are assumed count together. Measure it, and "
+        "say so in its grade or comment.",
         assumed_key,
     ),
 )

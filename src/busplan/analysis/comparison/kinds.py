@@ -11,6 +11,7 @@ from busplan.analysis.capacity.verdict import after_reset
 from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.comparison.circle_tests import circle_tests
 from busplan.analysis.comparison.difference import ComputeCircleFigures
+from busplan.analysis.derivation.inputs import given
 from busplan.analysis.network import varied_nodes
 from busplan.analysis.planning.freedoms import PERIOD
 from busplan.analysis.planning.settings import needed_settings
@@ -80,9 +81,11 @@ class MachineOnKind(NamedTuple):
 
     @property
     def assumed_host(self) -> tuple[AssumedKey, ...]:
-        """What is assumed of the host's own time: then its figures rank with no kind whose host is known."""
+        """What is assumed of the host's own time, by its own profile, too: then it has no rank among known hosts."""
         keys = kind_named(self.profile.bus.kind).host_keys
-        return tuple(one for one in self.assumed if one.key in keys)
+        inputs = [given(self.profile, key) for key in keys] if self.is_own else []
+        own = (AssumedKey(one.name, one.value, "profile") for one in inputs if one.grade == "assumed" and one.value)
+        return (*own, *(one for one in self.assumed if one.key in keys))
 
 
 class NotOnKind(NamedTuple):

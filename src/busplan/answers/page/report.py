@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 from busplan.analysis.all_answers import AllAnswers
+from busplan.analysis.capacity.assumed import heavy_assumptions
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
-from busplan.analysis.derivation.origin import Input
 from busplan.analysis.network import bus_of
 from busplan.answers.assumptions import assumptions_table
 from busplan.answers.circle_verdict import verdict_words
@@ -139,7 +139,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.no_circle:
         questions = questions[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
-    yield Chapter(Sentence(("Verdict",)), (*_assumed(answer.assumptions), *questions, *lines), "verdict")
+    yield Chapter(Sentence(("Verdict",)), (*_assumed(answer), *questions, *lines), "verdict")
     yield models_part(answer, found)
     yield timeline_part(answer, found)
     yield terms_part(answer, found)
@@ -159,9 +159,11 @@ _MOST_NAMED: Final = 6
 """Keys that are named before the verdict; the table at the end has all."""
 
 
-def _assumed(assumptions: Sequence[Input]) -> Iterator[Sentence]:
-    """Say which keys of the profile are assumed, before any figure that rests on them."""
-    names = [one.name for one in assumptions if one.grade == "assumed" and "." in one.name]
+def _assumed(answer: AllAnswers) -> Iterator[Sentence]:
+    """Say which keys of the profile are assumed, before any figure that rests on them; those that carry most first."""
+    heavy = heavy_assumptions(answer.verdict.deciding, answer.profile)
+    names = [one.name for one in answer.assumptions if one.grade == "assumed" and "." in one.name]
+    names.sort(key=lambda name: not any(one.covers(name) for one in heavy))
     if names:
         parts = [part for name in names[:_MOST_NAMED] for part in (Code(name), ", ")][:-1]
         more = len(names) - _MOST_NAMED
