@@ -54,7 +54,9 @@ def test_execution_times_of_some_groups_have_their_part_of_the_common_doubt() ->
     profile = override(load("gantry-24").profile, slow)
     ((keys, carries),) = heavy(profile).items()
     assert keys == ("group.tool.execution", "group.io.execution")
-    none = {f"group.{one}.execution.{key}": 0 for one in ("tool", "io") for key in ("base_us", "per_byte_us")}
+    none: dict[str, object] = {
+        f"group.{one}.execution.{key}": 0 for one in ("tool", "io") for key in ("base_us", "per_byte_us")
+    }
     both, all_of_it = (figures(one, model="standard", with_counts=False) for one in (override(profile, none), profile))
     left_us, whole_us = (next(d.us for d in one.doubts if d.key == "group.execution") for one in (both, all_of_it))
     variance = sum(one.us**2 for one in all_of_it.doubts)

@@ -19,6 +19,8 @@ _MUCH: Final = Sourced(
     meaning="share of U squared, or of the required time, from which on a verdict rests on a key",
 )
 _EXECUTION: Final = "execution"
+_Share = tuple[tuple[str, ...], float, str]
+"""Keys, what they carry [1], and of what."""
 
 
 class HeavyAssumption(NamedTuple):
@@ -74,10 +76,12 @@ def heavy_assumptions(figures: Carrying, profile: Profile) -> tuple[HeavyAssumpt
         The network.
     """
     variance = sum(float(one.us) ** 2 for one in figures.doubts)
-    shares = [((one.key,), float(one.us) ** 2 / variance, "U squared") for one in figures.doubts if variance]
+    shares: list[_Share] = [
+        ((one.key,), float(one.us) ** 2 / variance, "U squared") for one in figures.doubts if variance
+    ]
     shares += [((one.rests_on,), plain(one.us) / figures.required_us, "the required time") for one in figures.terms]
     # What is no key has no grade, and execution times are no term or doubt of one key.
-    shares = [one for one in shares if one[1] > _MUCH and _is_assumed(profile, *one[0])]
+    shares = [one for one in shares if one[1] > _MUCH and _is_assumed(profile, one[0][0])]
     shares += _of_execution(figures, profile, variance)
     said: dict[tuple[str, ...], list[str]] = {}
     for keys, share, whole in shares:
@@ -91,7 +95,7 @@ def _is_assumed(profile: Profile, key: str) -> bool:
     return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
 
 
-def _of_execution(figures: Carrying, profile: Profile, variance: float) -> list[tuple[tuple[str, ...], float, str]]:
+def _of_execution(figures: Carrying, profile: Profile, variance: float) -> list[_Share]:
     """The shares of the assumed execution times: what of its terms goes without them, and their part of U squared."""
     network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
     assumed = [one for one in network.groups if _counts(one, network)]
