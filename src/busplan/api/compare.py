@@ -96,7 +96,7 @@ def compare(
     >>> [(one.figures.verdict, one.safe.axes, round(one.smallest.us)) for one in answer.kinds]
     [('fits', 52, 552), ('fits', 16, 2126)]
     >>> [one.key for one in answer.on("can").assumed if one.source == "new profile"]
-    ['bus.bit_rate_kbit_s']
+    ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
     """
     network = load_profile(profile)
     kinds = None

@@ -9,8 +9,8 @@ from busplan.buses.ethercat.latency import command_doubt_us, last_command_us, sy
 from busplan.buses.ethercat.traffic import datagrams, devices
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
-from busplan.buses.parts import Limit, share_limit
-from busplan.elementwise import Number, larger, total
+from busplan.buses.parts import NOT_SHOWN_KEPT, Limit, share_limit
+from busplan.elementwise import Number, larger, plain, total
 
 
 def _largest_device(network: Network) -> Number:
@@ -30,16 +30,26 @@ def _late_command_us(network: Network) -> Number:
     return last_command_us(network) + process_bytes * BYTE_BIAS_US
 
 
+def _words(network: Network) -> str:
+    """Say when the last command comes, and whether it is late only if all of the master's time is before the wire."""
+    value_us, doubt_us, most_us = (
+        plain(one) for one in (_late_command_us(network), SYNC0.uncertainty(network), SYNC0.most(network))
+    )
+    is_split = SYNC0.verdict_code(network) == NOT_SHOWN_KEPT and value_us - doubt_us > most_us
+    where = ", all of bus.master_us before the wire" if is_split else ""
+    return f"the last command comes at {value_us:.1f} +/- {doubt_us:.1f} us{where}, SYNC0 at {most_us:.1f} us"
+
+
 SYNC0: Final = share_limit(
     "sync0",
-    "the last command comes at {value:.1f} +/- {uncertainty:.1f} us where all of bus.master_us comes before the wire, "
-    "SYNC0 at {most:.1f} us",
+    "",
     _late_command_us,
     share=sync0_share,
     doubt=lambda network: command_doubt_us(network) if network.profile.bus.distributed_clocks else 0.0,
     perhaps=lambda network: network.profile.bus.master_us if network.profile.bus.distributed_clocks else 0.0,
     way_out="a larger bus.sync_shift moves SYNC0 back",
     has_rule=True,
+    says=_words,
 )
 """A command must be in every device before SYNC0."""
 LIMITS: Final = (
