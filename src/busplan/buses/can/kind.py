@@ -70,8 +70,8 @@ pipeline_cycles = 1        # assumed: the host computes in the next cycle; 0: in
         EventKind("feedback_frame", "feedback PDO", _DAVIS, "<", "response"),
         EventKind("command_frame", "command PDO", _DAVIS, ">", "request"),
         EventKind("host", "host", "profile", "h", "idle"),
-        EventKind("blocking", "message of a lower priority", _DAVIS, "b", "gap"),
-        EventKind("message", "message of a higher priority", _DAVIS, "m", "contention"),
+        EventKind("blocking", "lower-priority frame", _DAVIS, "b", "gap"),
+        EventKind("message", "higher-priority frame", _DAVIS, "m", "contention"),
         EventKind("nonperiodic", "non-periodic window", NONPERIODIC.reference, "N", "reserve"),
     )
     stretch_kinds = (
