@@ -443,3 +443,13 @@ def test_every_setting_of_the_bus_is_safe_and_saves_time(
                 assume(network.profile.node.response_us <= 1.63)
                 cycles = [bus_of(profile).cycle(one, model="standard").required_us for one in (changed, network)]
                 assert cycles[0] <= cycles[1]
+
+
+def test_a_search_that_has_tried_enough_gives_up_and_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    profile = load("paper-1ms").profile
+    levels = freed(profile, None)
+    assert Search(profile).least(levels) == {}
+    monkeypatch.setattr("busplan.analysis.planning.search._MOST_TRIES", 0)
+    search = Search(profile)
+    assert search.least(levels) is None
+    assert not search.proven

@@ -26,6 +26,8 @@ MAX_CIRCLES: Final = 50
 
 _MOST_PROFILES: Final = 256
 """Profiles that a search keeps: each has a hundred kilobytes."""
+_MOST_TRIES: Final = 1500
+"""Changes that a search tries, a millisecond each, before it gives up."""
 
 
 class Search:
@@ -58,7 +60,8 @@ class Search:
         self.kept = frozenset(kept)
         self.max_circles = max_circles
         self.proven = True
-        """Whether no smaller change than the last one exists; False if the search for a period was cut short."""
+        """Whether no smaller change than the last one exists; False if the search for it was cut short."""
+        self._left = _MOST_TRIES
         self._profile = lru_cache(maxsize=_MOST_PROFILES)(lambda key: override(profile, dict(key)))
         self._needs: dict[frozenset[tuple[str, Value]], list[Need]] = {}
 
@@ -94,7 +97,11 @@ class Search:
         return None
 
     def passes(self, changes: Changes) -> bool:
-        """Whether every constraint holds after some changes; the circle is asked last."""
+        """Whether every constraint holds after some changes, the circle last; none does once too many were tried."""
+        self._left -= 1
+        if self._left < 0:
+            self.proven = False
+            return False
         return (
             self._fits(changes)
             and not refused_period(self.profile(changes))
