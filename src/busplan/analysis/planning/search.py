@@ -26,7 +26,7 @@ MAX_CIRCLES: Final = 50
 
 _MOST_PROFILES: Final = 256
 """Profiles that a search keeps: each has a hundred kilobytes."""
-_MOST_TRIES: Final = 1500
+_MOST_TRIES: Final = 1000
 """Changes that a search tries, a millisecond each, before it gives up."""
 
 
