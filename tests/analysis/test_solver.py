@@ -17,6 +17,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.advice import cure
 from busplan.analysis.planning.constraints import needs
 from busplan.analysis.planning.freedoms import freed
+from busplan.analysis.planning.machine import with_payload_within
 from busplan.analysis.planning.plan import plan
 from busplan.analysis.planning.search import Search
 from busplan.analysis.planning.short_numbers import ShortNumbers
@@ -453,3 +454,12 @@ def test_a_search_that_has_tried_enough_gives_up_and_proves_nothing(monkeypatch:
     search = Search(profile)
     assert search.least(levels) is None
     assert not search.proven
+
+
+def test_a_payload_that_no_axis_adds_to_is_cut_at_its_fixed_part() -> None:
+    changes = {"group.io.read_bytes": 400, "group.io.read_bytes_per_axis": 5, "cycle.period_us": 500.0}
+    wide = override(load("gantry-24").profile, changes)
+    cut = with_payload_within(wide, 100)
+    assert cut is not None
+    assert cut["group.io.read_bytes"] == 100
+    assert plan(wide, free=["payload"]).profile is not None

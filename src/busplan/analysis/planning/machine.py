@@ -9,8 +9,9 @@ from busplan.analysis.network import network_of
 from busplan.buses.network import Network
 from busplan.buses.parts import Value
 from busplan.errors import BusplanError
+from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.profile import Profile
-from busplan.sections.transactions import TRANSACTION_KINDS
+from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 Changes = Mapping[str, Value]
 """New values of a profile by dotted key."""
@@ -82,21 +83,22 @@ def with_payload_within(profile: Profile, most_bytes: int, *, kept: Collection[s
     """
     found: dict[str, Value] = {}
     for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS):
-        over, key, name = int(alike.bytes_of(kind)) - most_bytes, alike.payload_key(kind), alike.payload.key_of(kind)
+        over, (key, each) = int(alike.bytes_of(kind)) - most_bytes, _cut(alike, kind)
         if over > 0 and key not in kept:
-            each = int(alike.node.axes) if name.endswith("_per_axis") else 1
-            found[key] = getattr(alike.payload, name) - ceil(over / each)
+            found[key] = getattr(alike.payload, key.rpartition(".")[2]) - ceil(over / each)
     return found if all(int(value) > 0 for value in found.values()) else None
 
 
 def least_cut_bytes(profile: Profile, *, kept: Collection[str] = ()) -> int:
     """The least that any payload is cut by: what a byte of each axis makes of it, where axes add to it [bytes]."""
-    each = (
-        int(alike.node.axes) if alike.payload.key_of(kind).endswith("_per_axis") else 1
-        for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS)
-        if alike.payload_key(kind) not in kept
-    )
-    return min(each, default=1)
+    cuts = (_cut(alike, kind) for alike, kind in product(profile.alike_nodes, TRANSACTION_KINDS))
+    return min((each for key, each in cuts if key not in kept), default=1)
+
+
+def _cut(alike: AlikeNodes, kind: TransactionKind) -> tuple[str, int]:
+    """The key that a payload is cut by, and what a byte of it takes away [bytes]; without axes it is the fixed part."""
+    key, axes = alike.payload_key(kind), int(alike.node.axes)
+    return (key, axes) if axes and key.endswith("_per_axis") else (key.removesuffix("_per_axis"), 1)
 
 
 def with_payload(profile: Profile, size_bytes: int) -> Changes | None:
