@@ -457,7 +457,7 @@ def test_a_search_that_has_tried_enough_gives_up_and_proves_nothing(monkeypatch:
 
 
 def test_a_payload_that_no_axis_adds_to_is_cut_at_its_fixed_part() -> None:
-    changes = {"group.io.read_bytes": 400, "group.io.read_bytes_per_axis": 5, "cycle.period_us": 500.0}
+    changes: dict[str, Any] = {"group.io.read_bytes": 400, "group.io.read_bytes_per_axis": 5, "cycle.period_us": 500.0}
     wide = override(load("gantry-24").profile, changes)
     cut = with_payload_within(wide, 100)
     assert cut is not None
