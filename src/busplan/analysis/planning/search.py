@@ -26,8 +26,8 @@ MAX_CIRCLES: Final = 50
 
 _MOST_PROFILES: Final = 256
 """Profiles that a search keeps: each has a hundred kilobytes."""
-_MOST_TRIES: Final = 1000
-"""Changes that a search tries, a millisecond each, before it gives up."""
+_MOST_TRIES: Final = 600
+"""Changes that a search tries, some milliseconds each, before it gives up."""
 
 
 class Search:
