@@ -136,17 +136,18 @@ TABLE = Table(
 
 
 @pytest.mark.parametrize("is_whole", [False, True])
-@pytest.mark.parametrize("width", range(40, 201))
-def test_a_table_is_whole_at_every_width(width: int, is_whole: bool) -> None:
-    lines = [line.text for line in block_lines([TABLE], width=width, is_whole=is_whole)]
-    assert max(map(len, lines)) <= width
-    told = " ".join(lines)
-    for row in TABLE.rows:
-        assert all(word in told.split() for word in str(row.cells[1]).split())
-        for column, cell in zip(TABLE.columns[3:], row.cells[3:], strict=True):
-            is_left_out = f" {column.name}" in told.partition("Not shown:")[2].partition("--all")[0]
-            assert is_left_out != any(str(cell) in line.split() for line in lines)
-    assert not is_whole or "Not shown" not in told
+def test_a_table_is_whole_at_every_width(is_whole: bool) -> None:
+    for width in range(40, 201):
+        lines = [line.text for line in block_lines([TABLE], width=width, is_whole=is_whole)]
+        assert max(map(len, lines)) <= width
+        told = " ".join(lines)
+        words = set(told.split())
+        left_out = told.partition("Not shown:")[2].partition("--all")[0]
+        for row in TABLE.rows:
+            assert words.issuperset(str(row.cells[1]).split()), width
+            for column, cell in zip(TABLE.columns[3:], row.cells[3:], strict=True):
+                assert (f" {column.name}" in left_out) != (str(cell) in words), (width, column.name)
+        assert not is_whole or "Not shown" not in told
 
 
 def test_the_largest_rank_leaves_first() -> None:
