@@ -100,7 +100,7 @@ def rows(path: Path) -> int:
 @pytest.mark.parametrize(
     ("name", "code", "whole_group"),
     # A terminal signals the whole group: the workers are to leave each signal to the parent.
-    [("SIGTERM", 143, False), ("SIGTERM", 143, True), ("SIGHUP", 129, True), ("SIGINT", 130, True)],
+    [("SIGTERM", 143, False), ("SIGHUP", 129, True), ("SIGINT", 130, True)],
 )
 def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int, whole_group: bool) -> None:
     with running(*SWEEP, "-o", "c.csv", folder=folder) as process:
