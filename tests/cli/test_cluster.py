@@ -71,7 +71,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str
 def test_a_worker_that_is_killed_loses_nothing_and_is_said(
     cluster: Cluster, environment: dict[str, str], run: Run, tmp_path: Path
 ) -> None:
-    gains = (*SWEEP[:-1], f"{SWEEP[-1]}219")
+    gains = (*SWEEP[:-1], f"{SWEEP[-1]}179")
     with subprocess.Popen(
         [sys.executable, "-m", "busplan", *gains, "--cluster", cluster.address, "-o", "there.jsonl"],
         cwd=tmp_path,
