@@ -9,6 +9,7 @@ from busplan.analysis.register import figures_of
 from busplan.answers.assumptions import assumptions_report, assumptions_table
 from busplan.answers.explain import explain_report
 from busplan.buses import kind_named
+from busplan.buses.figure import Figure
 from busplan.forms import render
 from busplan.forms.blocks import Calculation, Chapter, Code, Report, ShownValue, Table, Words, values_in
 from busplan.forms.columns import sentence_text
@@ -25,10 +26,12 @@ def sections(figure: str, **changes: object) -> list[Chapter]:
     return [block for block in found if isinstance(block, Chapter)]
 
 
-@pytest.mark.parametrize("command", FIGURES)
-def test_every_figure_stands_at_its_place(command: str, values_in_their_places: Callable[[Report], int]) -> None:
+@pytest.mark.parametrize(("command", "figures"), FIGURES.items())
+def test_every_figure_stands_at_its_place(
+    command: str, figures: dict[str, Figure], values_in_their_places: Callable[[Report], int]
+) -> None:
     profile = load("paper-1ms").profile
-    for key in FIGURES[command]:
+    for key in figures:
         found = explain(profile, f"{command}.{key}")
         least = sum(1 + len(one.inputs) for one in found.derivations)
         most = sum(2 + len(one.inputs) + len(one.steps) for one in found.derivations)
