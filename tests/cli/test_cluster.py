@@ -27,7 +27,7 @@ class Cluster(NamedTuple):
     workers: list["subprocess.Popen[bytes]"]
 
 
-def until(holds: Callable[[], object], *, seconds: float = 20) -> bool:
+def until(holds: Callable[[], object], *, seconds: float = 60) -> bool:
     deadline = time.monotonic() + seconds
     while not holds():
         if time.monotonic() > deadline:
@@ -113,7 +113,7 @@ def test_workers_with_another_version_are_refused_by_its_name(
         capture_output=True,
         text=True,
         check=False,
-        timeout=30,
+        timeout=60,
     )
     assert done.returncode == 2
     assert f" has busplan {__version__} where 99.1 is here; give it the same version\n" in done.stderr
