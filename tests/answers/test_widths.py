@@ -38,8 +38,8 @@ from busplan.sections.profile import Profile
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 # One of each class of bus, the one of IEEE 1394 with the longest name, and one of groups.
 PROFILES = ("paper-optimal-gap", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
-STEP = 15
-"""Each answer is written at every 15th width; all answers together have every width from 60 to 200."""
+STEP = 47
+"""Each answer is written at every 47th width; all answers together have every width from 60 to 200."""
 
 
 def swept(profile: Profile) -> Report:
