@@ -70,6 +70,8 @@ class Limit(NamedTuple):
     kept_from_us: Callable[[Network], float] | None = None
     """The period from which on plain numbers are shown to keep it, where a longer one is a cure [us]; without it none
     is."""
+    is_slow: bool = False
+    """Whether its value takes long to find: of a number of nodes it is asked last."""
     share: Callable[[Network], Number] | None = None
     """The share of the period that is its most, of a time that rests on no period: see `share_limit`."""
 

@@ -20,8 +20,8 @@ _REST_SHARE: Final = 1e-3
 
 
 def bus(profile: Profile) -> CapacityFigures:
-    """Capacity under the timing model that decides, without the numbers of nodes that no circle asks for."""
-    return figures(profile, model=bus_of(profile).deciding_model, with_counts=False)
+    """Capacity under the timing model that decides."""
+    return figures(profile, model=bus_of(profile).deciding_model)
 
 
 def setup(profile: Profile) -> Setup:
