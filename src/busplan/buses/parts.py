@@ -99,11 +99,7 @@ class Limit(NamedTuple):
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
-        return self.least_value(network) > self.bound(network)
-
-    def bound(self, network: Network) -> Number:
-        """The largest value that keeps it: `most`, but for the rounding of floats."""
-        return self.most(network) * (1 + FIT_ROUNDING)
+        return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:
         """The shortest period that keeps a limit that has a share [us]; 0 for any other."""

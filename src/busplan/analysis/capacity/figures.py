@@ -47,6 +47,7 @@ class GroupCapacity:
     nodes: int
     axes: int
     """Of all its nodes."""
+    node_axes: int = field(repr=False)
     timing_model: str = field(repr=False)
     profile: Profile = field(repr=False)
 
@@ -67,7 +68,7 @@ class GroupCapacity:
     @property
     def max_axes(self) -> int:
         """Their axes."""
-        return self._axes_of(self.max_nodes)
+        return self.node_axes * self.max_nodes
 
     @property
     def limited_by(self) -> str:
@@ -82,16 +83,12 @@ class GroupCapacity:
     @property
     def safe_axes(self) -> int | None:
         """Their axes."""
-        return None if self.safe_nodes is None else self._axes_of(self.safe_nodes)
+        return None if self.safe_nodes is None else self.node_axes * self.safe_nodes
 
     @property
     def safe_limited_by(self) -> str | None:
         """Key of the limit that keeps `safe_nodes` from being more."""
         return self._safe[1]
-
-    def _axes_of(self, nodes: int) -> int:
-        (own,) = (one for one in self.profile.alike_nodes if one.name == self.name)
-        return int(own.node.axes) * nodes
 
     def record(self) -> dict[str, Any]:
         """All its figures by key."""
@@ -284,7 +281,7 @@ def figures(profile: Profile, *, model: str) -> CapacityFigures:
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
     counts = (
-        GroupCapacity(one.name, int(one.nodes), int(one.nodes) * one.node.axes, model, profile)
+        GroupCapacity(one.name, int(one.nodes), int(one.nodes) * one.node.axes, one.node.axes, model, profile)
         for one in profile.alike_nodes
     )
     return CapacityFigures(
