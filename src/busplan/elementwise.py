@@ -390,15 +390,26 @@ def interpolated(places: Sequence[float], values: Sequence[float], place: Number
     >>> interpolated((4, 16), (36.0, 39.0), 8, words="table")
     37.0
     """
-    if isinstance(place, (*_PLAIN, Traced)):
-        return _between(places, values, place, words=words)
-    import numpy as np
+    if not isinstance(place, (*_PLAIN, Traced)):
+        import numpy as np
 
-    index = np.searchsorted(places, place)
-    left = np.maximum(index - 1, 0)
-    xs, ys = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
-    x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
-    return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
+        index = np.searchsorted(places, place)
+        left = np.maximum(index - 1, 0)
+        xs, ys = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
+        x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
+        return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
+    at = bisect_left(places, value_of(place))
+    is_point, found = places[at] == value_of(place), values[at]
+    between: Number = found
+    if not is_point:
+        between = values[at - 1] + (found - values[at - 1]) * (place - places[at - 1]) / (places[at] - places[at - 1])
+    if not isinstance(place, Traced):
+        return between
+    sources = (Traced(values, given=values.given),) if isinstance(values, GivenTable) else ()
+    if is_point:
+        words, numbers = f"{words} at {place.symbol}", f"{words} at {short(place.value)}"
+        return Traced(found, formula=words, numbers=numbers, parts=(place, *sources))
+    return Traced(value_of(between), operation=CHOSEN, parts=(between, *sources))
 
 
 def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> Number:
@@ -441,22 +452,6 @@ def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[
     return (one.item() for one in np.broadcast_to(number, shape).flat)
 
 
-def _between(places: Sequence[float], values: Sequence[float], place: "float | Traced", *, words: str) -> Number:
-    index = bisect_left(places, value_of(place))
-    is_at_point = places[index] == value_of(place)
-    found: Number = values[index]
-    if not is_at_point:
-        x0, y0, x1, y1 = places[index - 1], values[index - 1], places[index], values[index]
-        found = y0 + (y1 - y0) * (place - x0) / (x1 - x0)
-    if not isinstance(place, Traced):
-        return found
-    sources = (Traced(values, given=values.given),) if isinstance(values, GivenTable) else ()
-    if is_at_point:
-        at = f"{words} at {place.symbol}", f"{words} at {short(place.value)}"
-        return Traced(found, formula=at[0], numbers=at[1], parts=(place, *sources))
-    return Traced(value_of(found), operation=CHOSEN, parts=(found, *sources))
-
-
 def named(number: Number, key: str, symbol: str) -> Number:
     """Give a step of a computation its name, for a derivation; any other number stays as it is."""
     return number.named(key, symbol) if isinstance(number, Traced) else number
@@ -467,20 +462,6 @@ def worded(number: Number, words: str) -> Number:
     if not isinstance(number, Traced):
         return number
     return Traced(number.value, formula=words, numbers=short(number.value), parts=(number,))
-
-
-def are_same(one: object, other: object) -> bool:
-    """Whether two values of a profile are equal; arrays only where they are one.
-
-    Examples
-    --------
-    >>> are_same(2, 2.0), are_same("split", "unified")
-    (True, False)
-    """
-    return one is other or (isinstance(one, _COMPARED) and isinstance(other, _COMPARED) and bool(one == other))
-
-
-_COMPARED: Final = (*_PLAIN, str, tuple, Traced)
 
 
 def alike(constant: Number, number: Number) -> Number:
