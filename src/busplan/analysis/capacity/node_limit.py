@@ -93,7 +93,7 @@ def most_nodes(network: Network, limits: Sequence[Limit], *, ceiling: int = MAX_
         # One more, so that a limit that keeps the ceiling does not give its name to the answer of another.
         found[index] = _most_within(limits[index], network, int(_greatest(nodes)) + 1)
         nodes = smaller(nodes, found[index])
-    place: Number = 0
+    place: Number = len(limits) - 1  # time, where none keeps any out
     for index in reversed(range(len(limits))):
         place = choose(found[index] <= nodes, index, place)
     return MostNodes(nodes, place)
