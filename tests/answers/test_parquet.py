@@ -47,10 +47,9 @@ def table_and_blocks(
 def written(table: SweepTable, parts: "list[SweepBlock]", *, complete: bool = True) -> bytes:
     found: list[bytes] = []
     writer = rows_writer("parquet", table, found.append)
-    writer.begin()
     for part in parts:
-        writer.join(writer.encode(part))
-    writer.end(complete=complete)
+        writer.add(part)
+    writer.finish(complete=complete)
     return b"".join(found)
 
 
@@ -166,13 +165,14 @@ def test_counts_of_groups_and_figures_of_circles_are_typed() -> None:
     assert row["passed"] is None
 
 
-def test_an_error_of_the_work_writes_nothing_more() -> None:
+def test_an_error_of_the_work_writes_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
     table, parts = table_and_blocks()
     found: list[bytes] = []
     writer = rows_writer("parquet", table, found.append)
-    writer.begin()
-    writer.join(writer.encode(parts[0]))
+    monkeypatch.setattr("busplan.answers.sweep.parquet.GROUP_ROWS", 10)
+    writer.add(parts[0])
     before = len(found)
+    assert before
     # As when a later point cannot be computed: pyarrow ends its file when nobody holds it.
     del writer
     gc.collect()
@@ -187,6 +187,6 @@ def test_an_error_of_the_destination_is_the_callers() -> None:
 
     writer = rows_writer("parquet", table, full)
     with pytest.raises(busplan.BusplanError, match="No space left"):
-        writer.begin()
+        writer.finish(complete=True)
     del writer, parts
     gc.collect()

@@ -46,10 +46,9 @@ def written(form: RowsForm, parts: list[SweepBlock], columns: Sequence[str], *, 
     found: list[bytes] = []
     table = SweepTable(profile, checked_grid(profile, AXES, with_circle=False), BOTH, tuple(columns))
     writer = rows_writer(form, table, found.append)
-    writer.begin()
     for part in parts:
-        writer.join(writer.encode(part))
-    writer.end(complete=complete)
+        writer.add(part)
+    writer.finish(complete=complete)
     return b"".join(found).decode()
 
 

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import pickle
 from itertools import product
 
 import numpy as np
@@ -75,10 +74,9 @@ def jsonl_by_cell(table: SweepTable, rows: list[dict[str, Cell]]) -> str:
 def written(form: str, table: SweepTable, parts: list[SweepBlock]) -> str:
     found: list[bytes] = []
     writer = rows_writer("csv" if form == "csv" else "jsonl", table, found.append)
-    writer.begin()
     for part in parts:
-        writer.join(writer.encode(part))
-    writer.end(complete=True)
+        writer.add(part)
+    writer.finish(complete=True)
     return b"".join(found).decode()
 
 
@@ -100,25 +98,6 @@ def test_any_columns_in_any_order(data: st.DataObject) -> None:
     rows = [part.row(index, columns) for part in parts for index in range(part.chunk.points * len(part.models))]
     assert written("csv", table, parts) == csv_by_cell(table, rows)
     assert written("jsonl", table, parts) == jsonl_by_cell(table, rows)
-
-
-@pytest.mark.parametrize("form", ["csv", "json", "jsonl", "parquet"])
-def test_blocks_may_be_encoded_elsewhere_and_in_any_order(form: str) -> None:
-    if form == "parquet":
-        pytest.importorskip("pyarrow")
-    table, parts = blocks("one key", 15)
-    table = table._replace(columns=tuple(name for name in table.columns if name not in {"holes", "passed"}))
-    found: list[list[bytes]] = [[], []]
-    for place, elsewhere in enumerate((False, True)):
-        writer = rows_writer(form, table, found[place].append)  # type: ignore[arg-type]
-        writer.begin()
-        # What another process gets and gives back is pickled.
-        encode = pickle.loads(pickle.dumps(writer.encode)) if elsewhere else writer.encode
-        encoded = {index: encode(parts[index]) for index in (reversed if elsewhere else iter)(range(len(parts)))}
-        for index in range(len(parts)):
-            writer.join(encoded[index])
-        writer.end(complete=True)
-    assert b"".join(found[0]) == b"".join(found[1])
 
 
 def test_floats_read_back_to_the_same_float() -> None:

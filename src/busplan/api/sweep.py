@@ -70,7 +70,9 @@ class SweepAnswer(Answer):
     def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
             raise KeyError(f"no column {name!r}; there are {', '.join(self.columns)}")
-        return np.concatenate([_rows(block, name) for block in self.blocks])
+        return np.concatenate(
+            [block.interleaved([_spelled(column) for column in block.columns(name)]) for block in self.blocks]
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -105,10 +107,9 @@ class SweepAnswer(Answer):
         written: list[bytes] = []
         table = SweepTable(self.profile, self.grid, self.timing_models, self.columns, seeds=self.seeds)
         writer = rows_writer(form, table, written.append)
-        writer.begin()
         for block in self.blocks:
-            writer.join(writer.encode(block))
-        writer.end(complete=True)
+            writer.add(block)
+        writer.finish(complete=True)
         return b"".join(written)
 
     def _report(self) -> Report:
@@ -119,12 +120,6 @@ class SweepAnswer(Answer):
             top.add(block)
             tally.add(block)
         return sweep_report(top, tally, document=lambda: json.loads(self.to_json()))
-
-
-def _rows(block: SweepBlock, name: str) -> Array:
-    """One column of a block as a flat array."""
-    parts = [np.broadcast_to(_spelled(column), block.chunk.shape).ravel() for column in block.columns(name)]
-    return np.stack(parts, axis=1).ravel()
 
 
 def _spelled(column: Column) -> Array:

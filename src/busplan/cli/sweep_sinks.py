@@ -1,39 +1,28 @@
 """Destinations for the blocks of a sweep: the top rows, or every row."""
 
-from typing import TYPE_CHECKING, BinaryIO, NoReturn, Protocol
+from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from busplan.cli.answering import give, report_with
 from busplan.cli.output import emit_document
 from busplan.errors import BusplanError
 from busplan.files import document_bytes
-from busplan.forms import Form, RowsForm, render
+from busplan.forms import Form, render
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from busplan.analysis.sweep.blocks import SweepBlock
     from busplan.answers.sweep.top import Tally
+    from busplan.answers.sweep.writers import RowsWriter
     from busplan.cli.sweep_job import SweepJob
 
 
-class Sink(Protocol):
-    """Destination for blocks."""
-
-    points: int
-    """Good size of a block."""
-
-    def add(self, block: "SweepBlock") -> None:
-        """Add a block."""
-
-    def finish(self, *, complete: bool) -> None:
-        """End the document; it is marked as partial unless complete."""
-
-
-def sink_for(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> Sink:
+def sink_for(job: "SweepJob", file: BinaryIO | None, tally: "Tally") -> "RowsWriter":
     """Make the destination of a sweep."""
     match job.form:
         case "csv" | "json" | "jsonl" | "parquet":
-            return _RowsSink(job, job.form, emit_document if file is None else file.write)
+            from busplan.answers.sweep.rows import SweepTable
+            from busplan.answers.sweep.writers import rows_writer
+
+            table = SweepTable(job.profile, job.grid, job.timing_models, job.columns, job.changes, job.tests)
+            return rows_writer(job.form, table, emit_document if file is None else file.write)
         case _:
             return _TopSink(job, job.form, file, tally)
 
@@ -63,31 +52,3 @@ class _TopSink:
 
 def _not_kept() -> NoReturn:
     raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")
-
-
-class _RowsSink:
-    """Writes every row as it comes; nothing before the first, for a point may be refused."""
-
-    def __init__(self, job: "SweepJob", form: RowsForm, write: "Callable[[bytes], object]") -> None:
-        from busplan.answers.sweep.rows import SweepTable
-        from busplan.answers.sweep.writers import rows_writer
-
-        table = SweepTable(job.profile, job.grid, job.timing_models, job.columns, job.changes, job.tests)
-        self._writer = rows_writer(form, table, write)
-        self.points = self._writer.points
-        self._is_begun = False
-
-    def add(self, block: "SweepBlock") -> None:
-        """Write a block."""
-        self._begin()
-        self._writer.join(self._writer.encode(block))
-
-    def finish(self, *, complete: bool) -> None:
-        """Write what stands behind the rows."""
-        self._begin()
-        self._writer.end(complete=complete)
-
-    def _begin(self) -> None:
-        if not self._is_begun:
-            self._is_begun = True
-            self._writer.begin()

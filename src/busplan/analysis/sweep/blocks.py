@@ -99,8 +99,11 @@ class SweepBlock(NamedTuple):
 
     def rows(self, name: str) -> Array:
         """One column as a flat array: point by point, and for each point timing model by timing model."""
-        parts = [np.broadcast_to(one.values, self.chunk.shape).ravel() for one in self.columns(name)]
-        return np.stack(parts, axis=1).ravel()
+        return self.interleaved([column.values for column in self.columns(name)])
+
+    def interleaved(self, by_model: Sequence[Array]) -> Array:
+        """Arrays that broadcast to the chunk's shape, one for each timing model, in the order of the rows."""
+        return np.stack([np.broadcast_to(own, self.chunk.shape).ravel() for own in by_model], axis=1).ravel()
 
 
 def sweep(

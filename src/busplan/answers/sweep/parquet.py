@@ -7,13 +7,11 @@ meaning as metadata, the schema has the profile.
 import io
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-from pyarrow.ipc import new_stream, open_stream
 from pyarrow.parquet import ParquetWriter as FileWriter
 
 from busplan import __version__
@@ -73,43 +71,26 @@ def _axis_type(axis: Values) -> pa.DataType:
     return pa.from_numpy_dtype(values.dtype)
 
 
-def encoded(block: SweepBlock, *, schema: pa.Schema) -> bytes:
-    """Encode a block as a stream of Arrow.
-
-    Parameters
-    ----------
-    block
-        Part of a sweep.
-    schema
-        From `table_schema`.
-    """
-    arrays = [_array(block.columns(field.name), block.chunk.shape, field.type) for field in schema]
-    buffer = io.BytesIO()
-    with new_stream(buffer, schema) as stream:
-        stream.write_batch(pa.record_batch(arrays, schema=schema))
-    return buffer.getvalue()
-
-
-def _array(columns: list[Column], shape: tuple[int, ...], kind: pa.DataType) -> pa.Array:
-    """One column: point by point, and for each point timing model by timing model."""
+def _array(block: SweepBlock, name: str, kind: pa.DataType) -> pa.Array:
+    """One column of a block."""
     if kind == _WORDS:
-        return _words(columns, shape)
-    parts = [_numbers(one) for one in columns]
-    missing = _rows([np.isnan(one) for one in parts], shape)
-    values = _rows(parts, shape)
+        return _words(block, name)
+    values = block.interleaved([_numbers(column) for column in block.columns(name)])
+    missing = np.isnan(values)
     return pa.array(np.where(missing, 0, values).astype(_NUMPY[kind]), mask=missing)
 
 
-def _words(columns: list[Column], shape: tuple[int, ...]) -> pa.Array:
+def _words(block: SweepBlock, name: str) -> pa.Array:
     """Text as in CSV, each once in the dictionary; what is empty there is null."""
-    texts = [[str(spelled(word)) for word in one.words or ()] for one in columns]
+    columns = block.columns(name)
+    texts = [[str(spelled(word)) for word in column.words or ()] for column in columns]
     known = dict.fromkeys(text for own in texts for text in own if text)
     codes = {text: code for code, text in enumerate(known)}
     found = [
         np.array([codes.get(text, -1) for text in own], dtype=np.int32)[one.values]
         for own, one in zip(texts, columns, strict=True)
     ]
-    values = _rows(found, shape)
+    values = block.interleaved(found)
     indices = pa.array(values, mask=values < 0)
     return pa.DictionaryArray.from_arrays(indices, pa.array(list(known), type=pa.string()))
 
@@ -119,10 +100,6 @@ def _numbers(column: Column) -> Array:
     if column.words is None:
         return column.values
     return np.array([np.nan if word is None else word for word in column.words], dtype=float)[column.values]
-
-
-def _rows(parts: list[Array], shape: tuple[int, ...]) -> Array:
-    return np.stack([np.broadcast_to(one, shape).ravel() for one in parts], axis=1).ravel()
 
 
 class ParquetWriter:
@@ -140,34 +117,33 @@ class ParquetWriter:
 
     def __init__(self, table: SweepTable, write: Callable[[bytes], object]) -> None:
         self._schema = table_schema(table)
-        self.encode: Callable[[SweepBlock], bytes] = partial(encoded, schema=self._schema)
         self._stream = _Stream(write)
         self._pending: list[pa.Table] = []
+        self._file: FileWriter | None = None
 
-    def begin(self) -> None:
-        """Begin the file."""
-        with self._stream.open():
-            self._file = FileWriter(self._stream, self._schema)
-
-    def join(self, encoded: bytes) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Add a block."""
-        self._pending.append(open_stream(encoded).read_all())
-        if sum(one.num_rows for one in self._pending) >= GROUP_ROWS:
+        arrays = [_array(block, field.name, field.type) for field in self._schema]
+        self._pending.append(pa.table(arrays, schema=self._schema))
+        if sum(part.num_rows for part in self._pending) >= GROUP_ROWS:
             self._write_group()
 
-    def end(self, *, complete: bool) -> None:
+    def finish(self, *, complete: bool) -> None:
         """Write the footer."""
-        if self._pending:
+        if self._pending or self._file is None:
             self._write_group()
         self._file.add_key_value_metadata({"busplan.complete": json_text(complete)})
         with self._stream.open():
             self._file.close()
 
     def _write_group(self) -> None:
-        group = pa.concat_tables(self._pending).unify_dictionaries()
-        self._pending = []
         with self._stream.open():
-            self._file.write_table(group, row_group_size=group.num_rows)
+            if self._file is None:
+                self._file = FileWriter(self._stream, self._schema)
+            if self._pending:
+                group = pa.concat_tables(self._pending).unify_dictionaries()
+                self._pending = []
+                self._file.write_table(group, row_group_size=group.num_rows)
 
 
 class _Stream(io.RawIOBase):
