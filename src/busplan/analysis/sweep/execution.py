@@ -1,7 +1,7 @@
 """The seam of execution: tasks on any executor, a bounded number at once, done in any order, given in theirs."""
 
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from functools import partial
 from queue import Empty, SimpleQueue
 from typing import Final, TypeVar
@@ -120,6 +120,9 @@ def run_in_order(
                 future = results.pop(given)
                 given += 1
                 yield future.result()
+    except BrokenExecutor:
+        outstanding.clear()  # it ends its calls itself, and stumbles over one that is cancelled meanwhile
+        raise
     finally:
         for _, future in outstanding.values():
             future.cancel()
