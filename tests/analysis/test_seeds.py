@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from busplan.analysis.sweep.asked import column_figures
 from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, Figures
-from busplan.analysis.sweep.columns import circle_columns, column_figures
 from busplan.analysis.sweep.grid import Grid, Listed, Steps, Values
 from busplan.analysis.sweep.seeds import SUMMARY_COLUMNS, summary, without_seed
 from busplan.errors import BusplanError
@@ -97,4 +97,3 @@ def test_every_column_has_its_figure_with_its_unit() -> None:
     units = {name: figures[name].unit for name in SUMMARY_COLUMNS}
     assert {unit for name, unit in units.items() if "contour_error" in name or "deviation_" in name} == {"mm"}
     assert units["phase_margin_p95_deg"] == "deg"
-    assert circle_columns(circle=False, summary=False) == ()

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from busplan.analysis.capacity.figures import figures
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import CHUNK_POINTS, figure_names, sweep
 from busplan.analysis.sweep.grid import Chunk, Grid, Steps, checked_grid
-from busplan.answers.sweep.rows import TEXT_POINTS, SweepTable, TextForm
+from busplan.answers.sweep.rows import TEXT_POINTS, TextForm
 from busplan.answers.sweep.writers import rows_writer
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.ieee1394.table_1 import residual
@@ -216,7 +217,7 @@ def test_rows_as_text(benchmark: Any, form: TextForm, size: Callable[[int, int],
     arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
 
     grid = checked_grid(PROFILE, {"cycle.period_us": Steps(1000, 3, 10, size(130_000, 20_000))}, with_circle=False)
-    table = SweepTable(PROFILE, grid, MODELS, ("cycle.period_us", *figure_names(PROFILE)))
+    table = Sweep(PROFILE, grid, MODELS, ("cycle.period_us", *figure_names(PROFILE)))
     parts = list(sweep(PROFILE, grid, timing_models=MODELS, chunk_points=TEXT_POINTS))
 
     def write(form: RowsForm) -> bytes:

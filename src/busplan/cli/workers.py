@@ -11,10 +11,26 @@ from multiprocessing.connection import wait
 from threading import Thread
 from typing import TypeVar
 
+from busplan.analysis.sweep.execution import Here
 from busplan.cli.interrupt import ENDING
 from busplan.errors import WorkerLostError
 
 Result = TypeVar("Result")
+
+
+def available_processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def executor(number: int) -> Iterator[Executor]:
+    """Give an executor that works here, or in several processes, as `workers`."""
+    if number == 1:
+        yield Here()
+        return
+    with workers(number) as crew:
+        yield crew
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.refusal import require_circle
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, setup
-from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
+from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -34,11 +34,6 @@ _TRUTHS: Final = (None, False, True)
 """Values of a column of truth values that may be missing, in the order of sorting."""
 
 Figures = tuple[float | bool | None, ...]
-
-
-def all_columns(profile: Profile, grid: Grid, *, circle: Sequence[str]) -> tuple[str, ...]:
-    """All columns of a sweep: the varied keys, the figures of `capacity`, and `circle`, those of circle tests."""
-    return (*grid.axes, *figure_names(profile), *circle)
 
 
 class CircleChunk(NamedTuple):
@@ -83,7 +78,7 @@ def figures_of(results: Array) -> Iterator[Figures]:
         )
 
 
-def require_few(grid: Grid, *, seeds: int = 1, option: str, consent: str) -> None:
+def require_few(grid: Grid, *, seeds: int, option: str, consent: str) -> None:
     """Refuse more circle tests than anyone runs by mistake.
 
     Parameters

@@ -7,6 +7,7 @@ meaning as metadata, the schema has the profile.
 import io
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Final
 
@@ -15,10 +16,10 @@ import pyarrow as pa
 from pyarrow.parquet import ParquetWriter as FileWriter
 
 from busplan import __version__
+from busplan.analysis.sweep.asked import Sweep, column_figures
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.columns import column_figures
 from busplan.analysis.sweep.grid import Array, Values
-from busplan.answers.sweep.rows import SweepTable
+from busplan.answers.sweep.rows import sweep_facts
 from busplan.buses.figure import Figure, Sort, unit_of
 from busplan.forms.csv_rows import spelled
 from busplan.printable import json_text
@@ -37,21 +38,21 @@ _NUMPY: Final = MappingProxyType({pa.float64(): np.float64, pa.int64(): np.int64
 """NumPy's types; older versions of pyarrow name them only where pandas is installed."""
 
 
-def table_schema(table: SweepTable) -> pa.Schema:
+def table_schema(sweep: Sweep) -> pa.Schema:
     """Types of the columns, with their units; metadata say what the rows are of.
 
     The keys of the metadata are `busplan.version`, `busplan.profile` (TOML) and `busplan.sweep` (the first line of JSON
     lines). At the end of a file comes `busplan.complete`.
     """
-    figures = column_figures(table.profile)
+    figures = column_figures(sweep.profile)
     fields = [
-        _axis_field(name, table.grid.axes[name]) if name in table.grid.axes else _field(name, figures[name])
-        for name in table.columns
+        _axis_field(name, sweep.grid.axes[name]) if name in sweep.grid.axes else _field(name, figures[name])
+        for name in sweep.columns
     ]
     metadata = {
         "busplan.version": __version__,
-        "busplan.profile": profile_text(table.profile),
-        "busplan.sweep": json_text(table.facts),
+        "busplan.profile": profile_text(sweep.profile),
+        "busplan.sweep": json_text(sweep_facts(sweep)),
     }
     return pa.schema(fields, metadata=metadata)
 
@@ -107,7 +108,7 @@ class ParquetWriter:
 
     Parameters
     ----------
-    table
+    sweep
         What the rows are of.
     write
         Writes bytes to the destination, which need not be seekable.
@@ -115,11 +116,10 @@ class ParquetWriter:
 
     points = BLOCK_POINTS
 
-    def __init__(self, table: SweepTable, write: Callable[[bytes], object]) -> None:
-        self._schema = table_schema(table)
+    def __init__(self, sweep: Sweep, write: Callable[[bytes], object]) -> None:
+        self._schema = table_schema(sweep)
         self._stream = _Stream(write)
         self._pending: list[pa.Table] = []
-        self._file: FileWriter | None = None
 
     def add(self, block: SweepBlock) -> None:
         """Add a block."""
@@ -130,20 +130,22 @@ class ParquetWriter:
 
     def finish(self, *, complete: bool) -> None:
         """Write the footer."""
-        if self._pending or self._file is None:
+        if self._pending:
             self._write_group()
         self._file.add_key_value_metadata({"busplan.complete": json_text(complete)})
         with self._stream.open():
             self._file.close()
 
-    def _write_group(self) -> None:
+    @cached_property
+    def _file(self) -> FileWriter:
         with self._stream.open():
-            if self._file is None:
-                self._file = FileWriter(self._stream, self._schema)
-            if self._pending:
-                group = pa.concat_tables(self._pending).unify_dictionaries()
-                self._pending = []
-                self._file.write_table(group, row_group_size=group.num_rows)
+            return FileWriter(self._stream, self._schema)
+
+    def _write_group(self) -> None:
+        group, file = pa.concat_tables(self._pending).unify_dictionaries(), self._file
+        self._pending = []
+        with self._stream.open():
+            file.write_table(group, row_group_size=group.num_rows)
 
 
 class _Stream(io.RawIOBase):

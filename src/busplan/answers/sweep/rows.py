@@ -6,54 +6,40 @@ from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.grid import Array, Grid
+from busplan.analysis.sweep.grid import Array
 from busplan.answers.documents import changed_document, document
 from busplan.forms.blocks import JsonDocument
 from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
-from busplan.profile.changes import NO_CHANGES, KeyChanges
-from busplan.sections.profile import Profile
 
 TextForm = Literal["csv", "json", "jsonl"]
 TEXT_POINTS: Final = 4096
 """Points of a block written as text: all its cells are in memory at once."""
 
 
-class SweepTable(NamedTuple):
-    """What the rows of a sweep are of."""
-
-    profile: Profile
-    """The network, with its changes."""
-    grid: Grid
-    timing_models: tuple[str, ...]
-    columns: tuple[str, ...]
-    changes: KeyChanges = NO_CHANGES
-    seeds: int | None = None
-    """Circle tests that a point's row summarises; None where there is no summary."""
-
-    @property
-    def facts(self) -> JsonDocument:
-        """What a reader must know besides the rows, and how many there are."""
-        facts = document(
-            "sweep",
-            profile=self.profile.name,
-            varied={key: axis.size for key, axis in self.grid.axes.items()},
-            timing_models=list(self.timing_models),
-            points=self.grid.points,
-            **({} if self.seeds is None else {"seeds": self.seeds}),
-            rows=self.grid.points * len(self.timing_models),
-        )
-        return changed_document(facts, self.changes)
+def sweep_facts(sweep: Sweep) -> JsonDocument:
+    """What a reader must know besides the rows, and how many there are."""
+    facts = document(
+        "sweep",
+        profile=sweep.profile.name,
+        varied={key: axis.size for key, axis in sweep.grid.axes.items()},
+        timing_models=list(sweep.timing_models),
+        points=sweep.grid.points,
+        **({} if sweep.seeds is None else {"seeds": sweep.seeds.size}),
+        rows=sweep.grid.points * len(sweep.timing_models),
+    )
+    return changed_document(facts, sweep.changes)
 
 
-def _header(form: TextForm, table: SweepTable) -> str:
+def _header(form: TextForm, sweep: Sweep) -> str:
     """Text before the first row."""
     if form == "csv":
-        return ",".join(table.columns) + "\n"
+        return ",".join(sweep.columns) + "\n"
     if form == "jsonl":
-        return json_text(table.facts) + "\n"
-    facts = {key: value for key, value in table.facts.items() if key != "rows"}
+        return json_text(sweep_facts(sweep)) + "\n"
+    facts = {key: value for key, value in sweep_facts(sweep).items() if key != "rows"}
     return json_text(facts).removesuffix("}") + ', "rows": [\n'
 
 
@@ -77,7 +63,7 @@ class TextWriter:
     ----------
     form
         "csv"; "jsonl", whose first line describes the sweep; or "json", one document.
-    table
+    sweep
         What the rows are of.
     write
         Writes bytes to the destination.
@@ -85,9 +71,9 @@ class TextWriter:
 
     points = TEXT_POINTS
 
-    def __init__(self, form: TextForm, table: SweepTable, write: Callable[[bytes], object]) -> None:
-        self._form, self._columns, self._write = form, table.columns, write
-        self._layout, self._header = _LAYOUTS[form], _header(form, table)
+    def __init__(self, form: TextForm, sweep: Sweep, write: Callable[[bytes], object]) -> None:
+        self._form, self._columns, self._write = form, sweep.columns, write
+        self._layout, self._header = _LAYOUTS[form], _header(form, sweep)
 
     def add(self, block: SweepBlock) -> None:
         """Write a block."""

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import SweepBlock
-from busplan.answers.sweep.rows import SweepTable, TextWriter
+from busplan.answers.sweep.rows import TextWriter
 from busplan.forms import RowsForm
 
 
@@ -21,20 +22,20 @@ class RowsWriter(Protocol):
         """Write what stands behind the rows: the file is valid, and says if it is not complete."""
 
 
-def rows_writer(form: RowsForm, table: SweepTable, write: Callable[[bytes], object]) -> RowsWriter:
+def rows_writer(form: RowsForm, sweep: Sweep, write: Callable[[bytes], object]) -> RowsWriter:
     """Make the writer of a form.
 
     Parameters
     ----------
     form
         The form.
-    table
+    sweep
         What the rows are of.
     write
         Writes bytes to the destination.
     """
     if form != "parquet":
-        return TextWriter(form, table, write)
+        return TextWriter(form, sweep, write)
     from busplan.answers.sweep.parquet import ParquetWriter
 
-    return ParquetWriter(table, write)
+    return ParquetWriter(sweep, write)
