@@ -164,7 +164,7 @@ def _blocks(
         blocks = sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=points)
         yield _reported(blocks, asked.grid.points, report)
         return
-    from busplan.analysis.sweep.circle_run import NOTHING_KEPT, circle_blocks, require_circles
+    from busplan.analysis.sweep.circle_run import circle_blocks, require_circles
 
     with ExitStack() as stack:
         if parts is not None:
@@ -176,7 +176,7 @@ def _blocks(
             asked,
             where,
             cost=cost,
-            kept=parts or NOTHING_KEPT,
+            kept=parts,
             progress=lambda done: report(done, asked.tests),
             watch=watch,
         )

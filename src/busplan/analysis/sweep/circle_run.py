@@ -12,7 +12,6 @@ from busplan.analysis.sweep.circles import (
     MOST_CIRCLES_UNASKED,
     CircleChunk,
     check_chunk,
-    figures_of,
     run_chunk,
     with_circles,
 )
@@ -45,20 +44,6 @@ class Kept(Protocol):
 
     def add(self, start: int, results: Array) -> None:
         """Keep the results of a chunk."""
-
-
-class _Nothing:
-    def __contains__(self, test: int) -> bool:
-        return False
-
-    def results(self, start: int, count: int) -> Array:
-        raise KeyError(start, count)
-
-    def add(self, start: int, results: Array) -> None:
-        pass
-
-
-NOTHING_KEPT: Final[Kept] = _Nothing()
 
 
 def require_circles(
@@ -102,7 +87,7 @@ def circle_blocks(
     executor: Executor,
     *,
     cost: Estimate,
-    kept: Kept = NOTHING_KEPT,
+    kept: Kept | None = None,
     progress: Callable[[int], None] = ignored,
     watch: Callable[[], None] = ignored,
 ) -> Iterator[SweepBlock]:
@@ -117,7 +102,7 @@ def circle_blocks(
     cost
         What all of them cost, from `require_circles`.
     kept
-        What need not be computed.
+        What need not be computed, and takes what was.
     progress
         Called with the number of tests that are done, in whatever order.
     watch
@@ -136,13 +121,14 @@ def circle_blocks(
     done = 0
 
     def known(chunk: CircleChunk) -> Array | None:
-        if chunk.start not in kept:
+        if kept is None or chunk.start not in kept:
             return None
         count(chunk)
         return kept.results(chunk.start, len(chunk.points))
 
     def finished(chunk: CircleChunk, results: Array) -> None:
-        kept.add(chunk.start, results)
+        if kept is not None:
+            kept.add(chunk.start, results)
         count(chunk)
 
     def count(chunk: CircleChunk) -> None:
@@ -151,13 +137,13 @@ def circle_blocks(
         progress(done)
 
     size = chunk_tests(asked.tests, time_s=cost.time_s)
-    runs = groupby(enumerate(asked.test_points()), key=lambda one: one[0] in kept)
+    runs = groupby(enumerate(asked.test_points()), key=lambda test: kept is not None and test[0] in kept)
     chunks = (chunk for _, run in runs for chunk in _chunks(asked.profile, run, size))
     found = run_in_order(executor, run_chunk, chunks, known=known, finished=finished, watch=watch)
-    figures = (one for results in found for one in figures_of(results))
+    results = (row for chunk in found for row in chunk)
     most = max(1, _within(asked.tests // _BLOCKS, _BLOCK_TESTS) // asked.tests_each)
     for block in sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=most):
-        yield with_circles(block, figures) if asked.seeds is None else with_seeds(block, figures, asked.tests_each)
+        yield with_circles(block, results) if asked.seeds is None else with_seeds(block, results, asked.tests_each)
 
 
 def chunk_tests(number: int, *, time_s: float) -> int:

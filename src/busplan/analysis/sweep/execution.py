@@ -1,9 +1,9 @@
 """The seam of execution: tasks on any executor, a bounded number at once, done in any order, given in theirs."""
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
-from functools import partial
-from queue import Empty, SimpleQueue
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from itertools import islice
 from typing import Final, TypeVar
 
 Task = TypeVar("Task")
@@ -38,6 +38,10 @@ class Here(Executor):
 
 def unknown(_task: object) -> None:
     """Know no result: every task is run."""
+
+
+def _same(result: Result) -> Result:
+    return result
 
 
 def ignored(*_: object) -> None:
@@ -86,15 +90,13 @@ def run_in_order(
         The executor cancelled a task.
     """
     left = iter(tasks)
-    done: SimpleQueue[int] = SimpleQueue()
-    outstanding: dict[int, tuple[Task, Future[Result]]] = {}
-    results: dict[int, Future[Result]] = {}
-    taken = given = 0
+    order: deque[Future[Result]] = deque()
+    running: dict[Future[Result], Task] = {}
     is_open = True
     try:
-        while is_open or given < taken:
+        while is_open or order:
             # A task that is done is looked at before another is handed over.
-            while is_open and taken - given < most and done.empty() and given not in results:
+            while is_open and len(order) < most and not any(map(Future.done, (*islice(order, 1), *running))):
                 try:
                     task = next(left)
                 except StopIteration:
@@ -102,41 +104,24 @@ def run_in_order(
                     break
                 result = known(task)
                 if result is None:
-                    future = executor.submit(function, task)
-                    outstanding[taken] = task, future
-                    future.add_done_callback(partial(_note, done, taken))
+                    order.append(executor.submit(function, task))
+                    running[order[-1]] = task
                 else:
-                    results[taken] = Here().submit(lambda found: found, result)
-                taken += 1
-            for place in _those_done(done, is_waiting=given < taken and given not in results):
-                task, future = outstanding.pop(place)
-                results[place] = future
+                    order.append(Here().submit(_same, result))
+            if order and not order[0].done():
+                wait(running, _GLANCE_S, FIRST_COMPLETED)
+            for future in filter(Future.done, tuple(running)):
+                task = running.pop(future)
                 if future.cancelled() or future.exception() is not None:
                     is_open = False
                 else:
                     finished(task, future.result())
             watch()
-            while given in results:
-                future = results.pop(given)
-                given += 1
-                yield future.result()
+            while order and order[0] not in running:
+                yield order.popleft().result()
     except BrokenExecutor:
-        outstanding.clear()  # it ends its calls itself, and stumbles over one that is cancelled meanwhile
+        running.clear()  # it ends its calls itself, and stumbles over one that is cancelled meanwhile
         raise
     finally:
-        for _, future in outstanding.values():
+        for future in running:
             future.cancel()
-
-
-def _note(done: SimpleQueue[int], place: int, _: "Future[Result]") -> None:
-    done.put(place)
-
-
-def _those_done(done: SimpleQueue[int], *, is_waiting: bool) -> Iterator[int]:
-    """Give the places of all that is done; wait a little for the first."""
-    try:
-        yield done.get(timeout=_GLANCE_S) if is_waiting else done.get_nowait()
-        while True:
-            yield done.get_nowait()
-    except Empty:
-        return
