@@ -89,25 +89,17 @@ def run_in_order(
     CancelledError
         The executor cancelled a task.
     """
-    left = iter(tasks)
     order: deque[Future[Result]] = deque()
     running: dict[Future[Result], Task] = {}
+    left = _handed_over(executor, function, tasks, known, running)
     is_open = True
     try:
         while is_open or order:
             # A task that is done is looked at before another is handed over.
             while is_open and len(order) < most and not any(map(Future.done, (*islice(order, 1), *running))):
-                try:
-                    task = next(left)
-                except StopIteration:
-                    is_open = False
-                    break
-                result = known(task)
-                if result is None:
-                    order.append(executor.submit(function, task))
-                    running[order[-1]] = task
-                else:
-                    order.append(Here().submit(_same, result))
+                following = [*islice(left, 1)]
+                is_open = bool(following)
+                order.extend(following)
             if order and not order[0].done():
                 wait(running, _GLANCE_S, FIRST_COMPLETED)
             for future in filter(Future.done, tuple(running)):
@@ -125,3 +117,21 @@ def run_in_order(
     finally:
         for future in running:
             future.cancel()
+
+
+def _handed_over(
+    executor: Executor,
+    function: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    known: Callable[[Task], Result | None],
+    running: dict[Future[Result], Task],
+) -> Iterator[Future[Result]]:
+    """Hand over one task after the other; those that are run stand in `running`."""
+    for task in tasks:
+        result = known(task)
+        if result is not None:
+            yield Here().submit(_same, result)
+            continue
+        future = executor.submit(function, task)
+        running[future] = task
+        yield future
