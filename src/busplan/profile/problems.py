@@ -219,8 +219,8 @@ def refusal(error: ValidationError | None, data: dict[str, Any], document: Docum
         The document of the data.
     """
     found = _unknown_kind(data) if error is None else findings(error, data)
-    placed = sorted(((document.nearest(one.path), one) for one in found), key=lambda pair: pair[0])
-    return PlacedError(document.name, tuple(_problem(document, one) for _, one in placed))
+    placed = sorted((_problem(document, one) for one in found), key=lambda problem: (problem.line, problem.column))
+    return PlacedError(document.name, tuple(placed))
 
 
 def _problem(document: Document, found: KeyFinding) -> PlacedProblem:
