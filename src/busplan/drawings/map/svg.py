@@ -17,8 +17,8 @@ from busplan.drawings.map.labels import (
     title_of,
     value_text,
 )
-from busplan.drawings.svg_style import style_sheet
-from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
+from busplan.drawings.own_picture import begin, style_sheet
+from busplan.forms.svg import LINE, PHONE, inside, markup, paragraph, text_at
 
 _CELL: Final = 20
 """Height of a cell."""
@@ -40,11 +40,8 @@ _DARK_STYLE: Final = """\
 {0} .own{{stroke:#ffffff}}
 {0} .here{{fill:#ffffff}}
 """
-
-
-def stylesheet() -> str:
-    """CSS for light and dark backgrounds, scoped to the class of the drawing."""
-    return style_sheet(".busplan-map", light=_STYLE, dark=_DARK_STYLE)
+STYLESHEET: Final = style_sheet(".busplan-map", light=_STYLE, dark=_DARK_STYLE)
+"""CSS for light and dark backgrounds, scoped to the class of the drawing."""
 
 
 def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
@@ -61,11 +58,8 @@ def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
     inline
         If True, leave out style sheet, title and legend: the page has them.
     """
-    root = drawing(title, css="busplan-map")
-    SubElement(root, "desc").text = map_title(found)
-    if not inline:
-        SubElement(root, "style").text = stylesheet()
-        SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
+    sheet = None if inline else STYLESHEET
+    root = begin(title, scope="busplan-map", description=map_title(found), stylesheet=sheet)
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     looks = looks_of(found)
     y = 0 if inline else paragraph(body, title, y=8, css="head") + _GAP

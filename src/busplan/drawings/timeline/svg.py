@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.timeline.schedule import SHARE, Event, Schedule, totals
+from busplan.drawings.own_picture import begin, style_sheet
 from busplan.drawings.timeline.kinds import event_title, kind_of
 from busplan.drawings.timeline.lanes import (
     Stretch,
@@ -32,11 +33,10 @@ from busplan.drawings.timeline.period import (
     period_title,
     rest,
 )
-from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import figure_text
-from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
+from busplan.forms.svg import LINE, PHONE, Scale, inside, markup, paragraph, text_at
 
 _BAR: Final = 18
 _GAP: Final = 14
@@ -46,6 +46,24 @@ _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _MOST_BARS: Final = 400
 """Most bars in the lanes of a page; with more events, a bar is a transaction."""
+_STYLE: Final = """\
+{0} .over{{fill:#b3261e;fill-opacity:.16}}
+{0} .track{{fill:#f4f6f8}}
+{0} .edge{{stroke:#b3261e;stroke-width:2}}
+{0} .late{{fill:#b3261e}}
+{0} .end{{stroke:#1c2430;stroke-width:1.5;stroke-dasharray:3 2}}
+{0} .window{{fill:none;stroke:#1c2430;stroke-width:2}}
+"""
+_DARK_STYLE: Final = """\
+{0} .over{{fill:#ff8a80;fill-opacity:.22}}
+{0} .track{{fill:#1a2029}}
+{0} .edge{{stroke:#ff8a80}}
+{0} .late{{fill:#ff8a80}}
+{0} .end{{stroke:#e6ebf1}}
+{0} .window{{stroke:#e6ebf1}}
+"""
+STYLESHEET: Final = style_sheet(".busplan-timeline", light=_STYLE, dark=_DARK_STYLE)
+"""CSS for light and dark backgrounds, scoped to the class of the drawing."""
 
 
 def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
@@ -62,11 +80,8 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     inline
         If True, leave out style sheet, verdict, subject and legend: the page has them.
     """
-    root = drawing(title, css="busplan-timeline")
-    SubElement(root, "desc").text = sentence_text(subject(plan))
-    if not inline:
-        SubElement(root, "style").text = stylesheet()
-        SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
+    words, sheet = sentence_text(subject(plan)), None if inline else STYLESHEET
+    root = begin(title, scope="busplan-timeline", description=words, stylesheet=sheet)
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     window = drawn_window(plan)
     height = 0 if inline else _above(body, plan, window, title=title) + _GAP
