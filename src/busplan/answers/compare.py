@@ -13,7 +13,7 @@ from busplan.answers.verdict import execution_sentence, refused_circle
 from busplan.buses import kind_named
 from busplan.buses.figure import SAFE_AXES, VERDICT
 from busplan.drawings.compare.characters import compare_lines
-from busplan.drawings.compare.svg import STYLESHEET, compare_svg
+from busplan.drawings.compare.svg import STYLE, compare_svg
 from busplan.drawings.own_picture import OwnPicture
 from busplan.errors import BusplanError
 from busplan.forms.blocks import (
@@ -208,7 +208,7 @@ def compare_chart(found: KindComparison) -> Chart:
     """The most axes over the period, a line for each kind of bus."""
     caption = "Most axes that are shown to fit over the period, both logarithmic"
     svg = partial(compare_svg, found, title=sentence_text(headline(found)), inline=True)
-    return Chart(OwnPicture(svg, partial(compare_lines, found), stylesheet=STYLESHEET), Sentence((caption,)))
+    return Chart(OwnPicture(svg, partial(compare_lines, found), stylesheet=STYLE), Sentence((caption,)))
 
 
 def require_drawn(found: KindComparison) -> None:

@@ -11,7 +11,7 @@ from busplan.answers.sweep.top import payload_sentences
 from busplan.answers.verdict import refused_circle
 from busplan.drawings.map.characters import map_lines
 from busplan.drawings.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
-from busplan.drawings.map.svg import STYLESHEET, map_svg
+from busplan.drawings.map.svg import STYLE, map_svg
 from busplan.drawings.own_picture import OwnPicture
 from busplan.forms.blocks import (
     Block,
@@ -89,7 +89,7 @@ def map_chart(found: TradeOff) -> Chart:
     fitting = sum(cell.state == "fits" for cell in found.cells)
     marked = "" if found.own is None else ", this design marked"
     caption = sentence(f"{{}} of {{}} settings fit, {map_title(found)}{marked}", *_counts(fitting, len(found.cells)))
-    return Chart(OwnPicture(svg, partial(map_lines, found), stylesheet=STYLESHEET), caption)
+    return Chart(OwnPicture(svg, partial(map_lines, found), stylesheet=STYLE), caption)
 
 
 def _counts(*numbers: int) -> tuple[ShownValue, ...]:

@@ -17,7 +17,7 @@ from busplan.drawings.timeline.characters import timeline_lines
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import charged, drawn_window, overruns
 from busplan.drawings.timeline.period import model_bars
-from busplan.drawings.timeline.svg import STYLESHEET, is_coarse, timeline_svg
+from busplan.drawings.timeline.svg import STYLE, is_coarse, timeline_svg
 from busplan.forms.blocks import (
     Block,
     Chart,
@@ -92,7 +92,7 @@ def timeline_chart(plan: Schedule) -> Chart:
     caption = joined(_most(window), charged(window), by="; ")
     legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
     svg = partial(timeline_svg, plan, title=sentence_text(headline(plan)), inline=True)
-    picture = OwnPicture(svg, partial(timeline_lines, plan), stylesheet=STYLESHEET)
+    picture = OwnPicture(svg, partial(timeline_lines, plan), stylesheet=STYLE)
     return Chart(picture, _placed(caption, plan), legend)
 
 

@@ -15,31 +15,26 @@ from busplan.drawings.compare.plane import (
     period_labels,
     plane_of,
 )
-from busplan.drawings.own_picture import begin, style_sheet
-from busplan.forms.inks import INKS
+from busplan.forms.inks import DARK, INKS
 from busplan.forms.numbers import period, plural
-from busplan.forms.svg import LINE, PHONE, anchor, inside, markup, paragraph, text_at
+from busplan.forms.picture import styled
+from busplan.forms.svg import LINE, PHONE, anchor, drawing, inside, markup, paragraph, text_at
 
 _HEIGHT: Final = 240
 _LETTER: Final = 7
 """Width of a letter, about."""
 _GAP: Final = 12
 _RADIUS: Final = 7
-_STROKES: Final = "".join(f"{{0}} .line-{ink}{{{{stroke:{INKS[ink].light}}}}}\n" for ink in INKS_OF_LINES)
-_DARK_STROKES: Final = "".join(f"{{0}} .line-{ink}{{{{stroke:{INKS[ink].dark}}}}}\n" for ink in INKS_OF_LINES)
-_STYLE: Final = f"""\
-{{0}} .line{{{{fill:none;stroke-width:2}}}}
-{{0}} .dot{{{{stroke:#ffffff;stroke-width:1.5}}}}
-{{0}} .mark{{{{font-size:10px;font-weight:700;fill:#ffffff}}}}
-{{0}} .own{{{{stroke:#10151c;stroke-width:1;stroke-dasharray:2 3}}}}
-{_STROKES}"""
-_DARK_STYLE: Final = f"""\
-{{0}} .dot{{{{stroke:#12161c}}}}
-{{0}} .mark{{{{fill:#10151c}}}}
-{{0}} .own{{{{stroke:#ffffff}}}}
-{_DARK_STROKES}"""
-STYLESHEET: Final = style_sheet(".busplan-kinds", light=_STYLE, dark=_DARK_STYLE)
-"""CSS for light and dark backgrounds, scoped to the class of the drawing."""
+_STROKES, _DARK_STROKES = (
+    "".join(f".chart.kinds .line-{ink}{{stroke:{INKS[ink][side]}}}\n" for ink in INKS_OF_LINES) for side in (0, 1)
+)
+STYLE: Final = f"""\
+.chart.kinds .line{{fill:none;stroke-width:2}}
+.chart.kinds .dot{{stroke:var(--paper);stroke-width:1.5}}
+.chart.kinds .mark{{font-size:10px;font-weight:700;fill:var(--paper);stroke:none}}
+{_STROKES}{DARK}{{{_DARK_STROKES}}}
+"""
+"""Rules of the drawing."""
 
 
 def compare_svg(found: KindComparison, *, title: str, inline: bool = False) -> str:
@@ -56,14 +51,14 @@ def compare_svg(found: KindComparison, *, title: str, inline: bool = False) -> s
     inline
         If True, leave out style sheet and title: the page has them.
     """
-    words = "Most axes that are shown to fit over the period, both logarithmic"
-    root = begin(title, scope="busplan-kinds", description=words, stylesheet=None if inline else STYLESHEET)
+    root = drawing(title, css="chart kinds")
+    SubElement(root, "desc").text = "Most axes that are shown to fit over the period, both logarithmic"
     body = inside(root, x_percent=2.5, width_percent=95.0, y=0)
     y = _GAP if inline else paragraph(body, title, y=8, css="head") + _GAP
     plane, lines = plane_of(found), kind_lines(found)
     y = _area(body, found, plane, lines, y=y)
     root.set("height", str(_legend(body, lines, y=y) + _GAP))
-    return markup(root)
+    return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
 def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindLine, ...], *, y: int) -> int:

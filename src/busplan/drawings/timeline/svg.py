@@ -5,7 +5,6 @@ from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from busplan.analysis.timeline.schedule import SHARE, Event, Schedule, totals
-from busplan.drawings.own_picture import begin, style_sheet
 from busplan.drawings.timeline.kinds import event_title, kind_of
 from busplan.drawings.timeline.lanes import (
     Stretch,
@@ -36,7 +35,8 @@ from busplan.drawings.timeline.period import (
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import figure_text
-from busplan.forms.svg import LINE, PHONE, Scale, inside, markup, paragraph, text_at
+from busplan.forms.picture import styled
+from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
 
 _BAR: Final = 18
 _GAP: Final = 14
@@ -46,24 +46,15 @@ _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _MOST_BARS: Final = 400
 """Most bars in the lanes of a page; with more events, a bar is a transaction."""
-_STYLE: Final = """\
-{0} .over{{fill:#b3261e;fill-opacity:.16}}
-{0} .track{{fill:#f4f6f8}}
-{0} .edge{{stroke:#b3261e;stroke-width:2}}
-{0} .late{{fill:#b3261e}}
-{0} .end{{stroke:#1c2430;stroke-width:1.5;stroke-dasharray:3 2}}
-{0} .window{{fill:none;stroke:#1c2430;stroke-width:2}}
+STYLE: Final = """\
+.chart.timeline .over{fill:var(--bad);fill-opacity:.16}
+.chart.timeline .track{fill:var(--raised)}
+.chart.timeline .late, .chart.timeline .bad{fill:var(--bad)}
+.chart.timeline .end{stroke:var(--ink);stroke-width:1.5;stroke-dasharray:3 2}
+.chart.timeline .window{fill:none;stroke:var(--ink);stroke-width:2}
+.chart.timeline .idle{stroke:none}
 """
-_DARK_STYLE: Final = """\
-{0} .over{{fill:#ff8a80;fill-opacity:.22}}
-{0} .track{{fill:#1a2029}}
-{0} .edge{{stroke:#ff8a80}}
-{0} .late{{fill:#ff8a80}}
-{0} .end{{stroke:#e6ebf1}}
-{0} .window{{stroke:#e6ebf1}}
-"""
-STYLESHEET: Final = style_sheet(".busplan-timeline", light=_STYLE, dark=_DARK_STYLE)
-"""CSS for light and dark backgrounds, scoped to the class of the drawing."""
+"""Rules of the drawing."""
 
 
 def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
@@ -80,8 +71,8 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     inline
         If True, leave out style sheet, verdict, subject and legend: the page has them.
     """
-    words, sheet = sentence_text(subject(plan)), None if inline else STYLESHEET
-    root = begin(title, scope="busplan-timeline", description=words, stylesheet=sheet)
+    root = drawing(title, css="chart timeline")
+    SubElement(root, "desc").text = sentence_text(subject(plan))
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     window = drawn_window(plan)
     height = 0 if inline else _above(body, plan, window, title=title) + _GAP
@@ -93,7 +84,7 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     if not inline:
         height = _legend(body, plan, y=height + _GAP) + _GAP
     root.set("height", str(height))
-    return markup(root)
+    return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
 def is_coarse(window: Schedule) -> bool:
