@@ -52,6 +52,30 @@ def ring_step(largest: float) -> float:
     return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
 
 
+def round_numbers(low: float, high: float, *, most: int) -> list[float]:
+    """Labels of a logarithmic scale: 1, 2 and 5 times powers of ten, fewer where these are too many.
+
+    Parameters
+    ----------
+    low, high
+        Ends of the scale, above 0.
+    most
+        Largest number of labels, 1 or more.
+
+    Examples
+    --------
+    >>> round_numbers(0.9, 40.0, most=6), round_numbers(0.9, 400.0, most=6)
+    ([1.0, 2.0, 5.0, 10.0, 20.0], [1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+    """
+    powers = range(floor(log10(low)), ceil(log10(high)) + 1)
+    for factors in ((1, 2, 5), (1, 3), (1,)):
+        found = [float(f"{factor}e{power}") for power in powers for factor in factors]
+        inside = [one for one in found if low <= one <= high]
+        if len(inside) <= most:
+            return inside
+    return inside[:: ceil(len(inside) / most)]
+
+
 def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     """Tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
 

@@ -14,6 +14,7 @@ from busplan.errors import BusplanError
 from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
+from busplan.profile.write import whole
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
@@ -306,7 +307,7 @@ def _samples(axis: Values) -> list[Value]:
     # In equal steps from a whole number, the second value is a fraction if any is.
     chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, 1, axis.size - 1)
     values = (axis.part(index, index + 1).item() for index in chosen)
-    return [int(value) if isinstance(value, float) and value.is_integer() else value for value in values]
+    return list(map(whole, values))
 
 
 def _least(values: list[Value]) -> Value:
