@@ -170,9 +170,9 @@ def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Pr
 
 @pytest.mark.parametrize("period_us", [1000.0, 600.0, 100.0])
 def test_every_figure_of_the_blocks_stands_in_the_document(
-    profile: Profile, period_us: float, values_in_their_places: Callable[[Report], int]
+    profile: Profile, period_us: float, values_of_the_document: Callable[[Report], int]
 ) -> None:
     result = capacity(profile, periods_us=[4000.0, period_us])
     # Two tables of 44 figures under two models, and the figures of the sentences.
-    assert values_in_their_places(capacity_report(result, verdicts(result))) > 100
-    assert values_in_their_places(latency_report(latency(profile, payloads_bytes=[4, 16]), profile)) == 2 * 4 * 21
+    assert values_of_the_document(capacity_report(result, verdicts(result))) > 100
+    assert values_of_the_document(latency_report(latency(profile, payloads_bytes=[4, 16]), profile)) == 2 * 4 * 21

@@ -129,7 +129,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     yield sentence(
         f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
         Code(result.profile.name),
-        count_value(measurements, "measurements", at="/measurements"),
+        count_value(measurements, "measurements"),
         count_value(sizes),
         Code(source),
     )
@@ -145,18 +145,15 @@ def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
     shown = {**_COLUMNS, **(_MEASURED_COLUMNS if measured else {})}
     if not any(fit.left_out for fit in payloads):
         del shown["left_out"]
-    rows = (
-        TableRow(tuple(_cell(getattr(fit, key), key, f"/payloads/{number}/{key}") for key in shown))
-        for number, fit in enumerate(payloads)
-    )
+    rows = (TableRow(tuple(_cell(getattr(fit, key), key) for key in shown)) for fit in payloads)
     return Table(tuple(shown.values()), tuple(rows))
 
 
-def _cell(value: float | None, key: str, at: str) -> Cell:
+def _cell(value: float | None, key: str) -> Cell:
     """A time has three decimals; further ones are rounding."""
     if value is None:
         return ""
-    return time_value(value, key, at=at)._replace(fixed=True) if key.endswith("_us") else count_value(value, key, at=at)
+    return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else count_value(value, key)
 
 
 def calibration_warnings(result: Calibration) -> list[str]:

@@ -63,7 +63,7 @@ def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
     rows = [(figure, 0) for figure in figures]
     caption = Sentence((f"Phases in us, {subject}",))
     for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
-        owners = [Owner(_column(one), one.phases, f"/transactions/{place}") for _, place, one in group]
+        owners = [Owner(_column(one), one.phases) for _, one in group]
         yield figure_table(rows, owners, caption=caption, unit=False)
 
 
@@ -71,23 +71,23 @@ def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: s
     """One row for each transaction; one table for each payload and timing model."""
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
     tables: dict[tuple[int, str], list[TableRow]] = {}
-    for number, place, one in _numbered(result.transactions):
-        values = (attribute_value(figure, one.phases, at=f"/transactions/{place}") for figure in figures)
+    for number, one in _numbered(result.transactions):
+        values = (attribute_value(figure, one.phases) for figure in figures)
         tables.setdefault((number, one.timing_model), []).append(TableRow((_name(one), *values)))
     for (_, model), rows in tables.items():
         yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
 
 
-def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:
-    """Each transaction with the number of its table and its index; a repeated one begins a new table."""
+def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, Transaction]]:
+    """Each transaction with the number of its table; a repeated one begins a new table."""
     seen: set[tuple[str, str, str]] = set()
     number = 0
-    for place, one in enumerate(transactions):
+    for one in transactions:
         key = (one.timing_model, one.transaction, one.group)
         if key in seen:
             number, seen = number + 1, set()
         seen.add(key)
-        yield number, place, one
+        yield number, one
 
 
 def _column(one: Transaction) -> TableColumn:

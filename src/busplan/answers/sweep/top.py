@@ -136,7 +136,7 @@ class Tally:
 
     def sentences(self) -> Iterator[Sentence]:
         """Summary of the counts."""
-        whole = count_value(self.expected, "points", at="/points", grouped=True)
+        whole = count_value(self.expected, "points", grouped=True)
         found = whole if self.points == self.expected else count_value(self.points, grouped=True)
         cut = Sentence(()) if self.points == self.expected else sentence(" of {} (interrupted)", whole)
         head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(self.profile.name), found)
@@ -315,13 +315,12 @@ def _column(name: str, figure: Figure | None, *, rank: int) -> TableColumn:
 
 def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:
     for name, own in row.record.items():
-        at = f"/rows/{row.number}/{name}"
         value = None if isinstance(own, float) and isnan(own) else own
         figure = figures.get(name)
         if figure is None:
-            yield ShownValue(value, name, at=at)
+            yield ShownValue(value, name)
         else:
-            shown = figure_value(figure, value, at=at)
+            shown = figure_value(figure, value)
             # In the unit of the column's name; a length in mm has three more decimals than one in um.
             finer = 3 if figure.unit == "mm" and figure.column == "um" else 0
             yield shown._replace(unit=figure.unit or shown.unit, decimals=shown.decimals and shown.decimals + finer)
