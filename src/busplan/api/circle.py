@@ -7,7 +7,6 @@ from busplan.analysis.circle.roundness import CircleFigures, CircleTest
 from busplan.answers.circle import circle_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Periods, ProfileLike, load_profile, one_or_several
-from busplan.api.renamed import renamed
 from busplan.drawings.circle_plot import circle_svg
 from busplan.forms.blocks import Report
 from busplan.progress import Progress
@@ -52,7 +51,6 @@ class CircleTestAnswer(Answer):
         return CircleTest(self.profile, self.results, self.runs)
 
 
-@renamed(periods_us="period_us", with_contributions="contributions")
 def circle_test(
     profile: ProfileLike,
     *,

@@ -9,7 +9,6 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.answers.latency import latency_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, load_profile, one_or_several, whole
-from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 
@@ -43,7 +42,6 @@ class LatencyAnswer(Answer):
         return analysis.LatencyResult(self.profile.name, self.transactions, self.payloads_bytes)
 
 
-@renamed(payloads_bytes="payload_bytes", timing_models="timing_model")
 def latency(
     profile: ProfileLike,
     *,

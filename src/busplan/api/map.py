@@ -10,7 +10,6 @@ from busplan.analysis.map.trade_off import TradeOff
 from busplan.answers.map import headline, map_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, load_profile
-from busplan.api.renamed import renamed
 from busplan.api.sweep import axis_values
 from busplan.drawings.map.svg import map_svg
 from busplan.errors import BusplanError
@@ -69,7 +68,6 @@ class MapAnswer(Answer):
         return TradeOff(self.profile, self.x, self.y, self.rows, self.with_circle)
 
 
-@renamed(with_circle="circle")
 def map_(
     profile: ProfileLike,
     *,
@@ -131,8 +129,3 @@ def _direction(profile: Profile, along: Along | None, *, name: str, with_circle:
         option=name,
         circle_option=None if with_circle else "circle=True",
     )
-
-
-TradeOffAnswer = MapAnswer
-trade_off = map_
-"""The old names, for one release."""

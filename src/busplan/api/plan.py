@@ -15,7 +15,6 @@ from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.answers.plan import plan_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, items, load_profile, plain, whole
-from busplan.api.renamed import renamed
 from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
@@ -86,7 +85,6 @@ class PlanAnswer(Answer):
         )
 
 
-@renamed(with_circle="circle")
 def plan(
     profile: ProfileLike,
     *,
