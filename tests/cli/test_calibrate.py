@@ -151,7 +151,11 @@ def test_apply_from_a_table_to_a_line_and_back(busplan: Run, bench: Path) -> Non
 
 @pytest.mark.parametrize(
     ("timing", "options", "residual", "gap_count"),
-    [("paper", (), "paper", 63), ("standard", (), "standard", 63), ("standard", ("--gap-count", "10"), "standard", 10)],
+    [
+        ("paper", (), "paper", 63),
+        ("standard", (), "standard", 63),
+        ("standard", ("--set", "bus.gap_count=10"), "standard", 10),
+    ],
 )
 def test_what_a_time_was_fitted_against_is_written_and_weighed(
     busplan: Run, bench: Path, timing: str, options: tuple[str, ...], residual: str, gap_count: int
@@ -170,7 +174,7 @@ def test_what_a_time_was_fitted_against_is_written_and_weighed(
 
 
 def test_a_new_fit_leaves_nothing_of_the_one_before(busplan: Run, bench: Path) -> None:
-    busplan("calibrate", "bench.toml", "m.csv", "--gap-count", "10", "--apply", cwd=bench.parent)
+    busplan("calibrate", "bench.toml", "m.csv", "--set", "bus.gap_count=10", "--apply", cwd=bench.parent)
     busplan("calibrate", "bench.toml", "table-1.csv", "--apply", cwd=bench.parent)
     execution = load(str(bench)).document.data()["node"]["execution"]
     # One measurement of a payload says nothing of how far they scatter; and what was once seen can happen again.
@@ -279,7 +283,9 @@ def test_refused_with_exit_2_and_nothing_written(
 
 
 def test_bench_options_move_the_packets_and_outliers_are_warned_of(busplan: Run, bench: Path) -> None:
-    run = busplan("calibrate", "bench.toml", "m.csv", "--nodes", 5, "--gap-count", 10, cwd=bench.parent)
+    run = busplan(
+        "calibrate", "bench.toml", "m.csv", "--set", "bus.nodes=5", "--set", "bus.gap_count=10", cwd=bench.parent
+    )
     assert (
         "(T1+T2) - (T4+T5), eq (3): both halves by the standard timing model for S400, 5 hops, gap count 10."
         in run.stdout

@@ -36,7 +36,7 @@ def test_csv_has_the_columns_of_the_contract_and_the_rows_of_capacity(busplan: R
     run = busplan("sweep", "paper-4ms", "--vary", "bus.nodes=2:3", "--format", "csv", cwd=tmp_path)
     assert (run.returncode, run.stderr.count("\n")) == (0, 1)
     rows = list(csv.reader(run.stdout.splitlines()))
-    three = busplan("capacity", "paper-4ms", "--nodes", "3", "--format", "csv", cwd=tmp_path)
+    three = busplan("capacity", "paper-4ms", "--set", "bus.nodes=3", "--format", "csv", cwd=tmp_path)
     own = list(csv.reader(three.stdout.splitlines()))
     assert rows[0] == ["bus.nodes", *own[0][1:]]
     assert rows[0][1] == "timing_model"
@@ -164,7 +164,17 @@ def test_circle_tests_add_their_columns_and_processes_change_nothing(busplan: Ru
     ]
     # What does not fit is not simulated, and does not pass.
     assert (rows[1]["max_contour_error_mm"], rows[1]["passed"]) == (None, False)
-    single = busplan("circle-test", "paper-4ms", "--radius", "20", "--feed", "15000", "--format", "json", cwd=tmp_path)
+    single = busplan(
+        "circle-test",
+        "paper-4ms",
+        "--set",
+        "circle.radius_mm=20",
+        "--set",
+        "circle.feed_mm_per_min=15000",
+        "--format",
+        "json",
+        cwd=tmp_path,
+    )
     (result,) = json.loads(single.stdout)["results"]
     for name in (
         "mean_contour_error_mm",

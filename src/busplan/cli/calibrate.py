@@ -10,7 +10,7 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.changes import GAP_COUNT, NODES, takes_changes
+from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
@@ -24,7 +24,7 @@ from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 
-@takes_changes(NODES, GAP_COUNT, words="--apply writes it, too.")
+@takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -96,10 +96,10 @@ def calibrate_command(
     acknowledge, in us), a line for each measurement; repetitions are welcome, lines that begin with # are comments. A
     column transaction says read or write (write without it).
 
-    T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
-    where the bench was not as the profile; --apply does not write these two. With a column request_and_acknowledge_us,
-    the measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements
-    far from the others are named by their line and are not in the fit: slow ones are in worst_extra_us, and the others
+    T_exec is the latency less what its packets take by the timing model, equation (3). Give --set bus.nodes=2 and
+    --set bus.gap_count=63 where the bench was not as the profile. With a column request_and_acknowledge_us, the
+    measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements far
+    from the others are named by their line and are not in the fit: slow ones are in worst_extra_us, and the others
     contradict fast ones. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
@@ -139,13 +139,12 @@ def calibrate_command(
             for one in changes.by_set:
                 for key in found:
                     require_separate(one, key, typed="--apply")
-            asked = {one.key: one.value for one in changes.by_set}
-            apply_changes(loaded.document, {**asked, **found}, notes={said.section(result): note})
+            apply_changes(loaded.document, found, notes={said.section(result): note})
             gone = origin_comments(loaded.document, said.section(result))
             kept = "every comment of yours is kept"
             if gone:
                 kept = f"the new comment on their origin replaces {plural(len(gone), 'line')}: {' '.join(gone)}"
-            say(f"wrote {', '.join((f'[{said.section(result)}]', *asked))} of {profile}; {kept}")
+            say(f"wrote [{said.section(result)}] of {profile}; {kept}")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
 
