@@ -42,7 +42,7 @@ def small(*, ranked: bool = True, **changes: object) -> CircleTest:
 
 
 def texts(test: CircleTest, *, with_contributions: bool = True) -> list[str]:
-    blocks = circle_report(test, with_contributions=with_contributions).blocks()
+    blocks = circle_report(test._replace(with_contributions=with_contributions)).blocks()
     return [sentence_text(block) for block in blocks if isinstance(block, Sentence)]
 
 
@@ -52,7 +52,7 @@ def test_every_figure_stands_in_its_place(
     changes: dict[str, object], with_contributions: bool, values_of_the_document: Callable[[Report], int]
 ) -> None:
     test = circle_of(*changes.items(), periods_us=(4000.0, 2000.0, 100.0), ranked=with_contributions)
-    assert values_of_the_document(circle_report(test, with_contributions=with_contributions)) > 3 * 18
+    assert values_of_the_document(circle_report(test._replace(with_contributions=with_contributions))) > 3 * 18
 
 
 @pytest.mark.parametrize("form", ["table", "markdown", "html"])
@@ -68,12 +68,12 @@ def test_each_period_has_a_column(form: str, values_in: ValuesIn) -> None:
     # What was not simulated is a dash; only what fails is set apart.
     assert [figure_text(cell) for cell in rows["circular deviation G"] if isinstance(cell, ShownValue)][2] == "-"
     assert [value for value in values_in(table) if value.state == "fails"] == [rows["passed"][-1]]
-    assert "nan" not in render(circle_report(test, with_contributions=True), form).lower()  # type: ignore[arg-type]
+    assert "nan" not in render(circle_report(test._replace(with_contributions=True)), form).lower()  # type: ignore[arg-type]
 
 
 def test_the_table_has_every_figure_of_the_answer_that_a_reader_asks_for(values_in: ValuesIn) -> None:
     shown = {value.key for value in values_in(circle_table(small().results))}
-    record = circle_document(small(), with_contributions=False)["results"][0]
+    record = circle_document(small()._replace(with_contributions=False))["results"][0]
     assert {key for key in record if key not in shown} == {
         *("steps", "timing_model", "bus_fits", "verdict", "required_us", "available_us", "servo_grade"),
         *("centre_offset_mm", "constant_speed_deg", "failures", "settled", "ideal_drive"),
@@ -200,7 +200,9 @@ def test_sources_are_ranked_with_bars_of_one_scale_beside_their_figures() -> Non
 def test_sources_that_take_nothing_have_no_bar() -> None:
     result = small().results[0]
     nothing = tuple(one._replace(removed_mm=0.0) for one in result.contributions or ())
-    report = circle_report(small()._replace(results=(result._replace(contributions=nothing),)), with_contributions=True)
+    report = circle_report(
+        small()._replace(results=(result._replace(contributions=nothing),))._replace(with_contributions=True)
+    )
     assert "takes" in render(report, "html")
     table = contributions_table(result._replace(contributions=nothing))
     assert not [cell for row in table.rows for cell in row.cells if isinstance(cell, Bar)]
@@ -209,9 +211,9 @@ def test_sources_that_take_nothing_have_no_bar() -> None:
 def test_sources_stand_only_where_they_were_asked_for() -> None:
     test = circle_of(*TIGHT.items(), ranked=False)
     assert test.results[0].contributions
-    blocks = circle_report(test, with_contributions=False).blocks()
+    blocks = circle_report(test._replace(with_contributions=False)).blocks()
     assert len([block for block in blocks if isinstance(block, Table)]) == 1
-    assert "contributions" not in circle_document(test, with_contributions=False)["results"][0]
+    assert "contributions" not in circle_document(test._replace(with_contributions=False))["results"][0]
     without = small()._replace(results=(small().results[0]._replace(contributions=()),))
     assert "The profile has no error source that could be removed." in texts(without)
 
@@ -220,7 +222,9 @@ def test_sources_stand_only_where_they_were_asked_for() -> None:
 
 
 def chart_of(test: CircleTest) -> Chart:
-    (chart,) = (block for block in circle_report(test, with_contributions=False).blocks() if isinstance(block, Chart))
+    (chart,) = (
+        block for block in circle_report(test._replace(with_contributions=False)).blocks() if isinstance(block, Chart)
+    )
     return chart
 
 
@@ -238,7 +242,7 @@ def test_a_page_has_the_magnified_circle_and_how_to_read_it(tolerance_mm: float,
     assert re.match(r"Magnified \d+ times; [\d.]+ um from ring to ring, the nominal", sentence_text(legend))
     assert "; the dot is the start of the turn, the arrow its direction; " in sentence_text(legend)
     assert sentence_text(legend).endswith(words)
-    report = circle_report(test, with_contributions=False)
+    report = circle_report(test._replace(with_contributions=False))
     page = render(report, "html")
     assert page.count('class="chart circle"') == 1
     assert "from ring to ring" in page
@@ -258,7 +262,9 @@ def test_without_a_tolerance_the_legend_says_so() -> None:
 def test_what_was_not_simulated_or_did_not_go_round_has_no_drawing() -> None:
     for test in (circle_of(*SMALL.items(), periods_us=(100.0,)), circle_of(*UNSTABLE.items())):
         assert not [
-            block for block in circle_report(test, with_contributions=True).blocks() if isinstance(block, Chart)
+            block
+            for block in circle_report(test._replace(with_contributions=True)).blocks()
+            if isinstance(block, Chart)
         ]
 
 
@@ -267,12 +273,12 @@ def test_what_was_not_simulated_or_did_not_go_round_has_no_drawing() -> None:
 
 def test_documents_hold_the_results_own_numbers() -> None:
     test = circle_of(*TIGHT.items(), periods_us=(4000.0, 100.0))
-    document = json.loads(to_json(circle_document(test, with_contributions=True)))
+    document = json.loads(to_json(circle_document(test._replace(with_contributions=True))))
     for record, result in zip(document["results"], test.results, strict=True):
         assert record["max_contour_error_mm"] == result.max_contour_error_mm
         assert record["failures"] == [failure.document() for failure in result.failures]
         assert (record["contributions"] is None) == (result.contributions is None)
-    flat = circle_records(test, with_contributions=True)
+    flat = circle_records(test._replace(with_contributions=True))
     assert flat[0]["centre_offset_x_mm"] == (test.results[0].centre_offset_mm or (None,))[0]
     removed = {one.source: one.removed_mm for one in test.results[0].contributions or ()}
     assert {key: value for key, value in flat[0].items() if key.startswith("removed_")} == {

@@ -47,38 +47,28 @@ ACT_TOGETHER: Final = Sentence(
 NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
 
 
-def circle_report(test: CircleTest, *, with_contributions: bool) -> Report:
-    """Report of `circle-test`.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    with_contributions
-        If True, the document ranks the error sources.
-    """
+def circle_report(test: CircleTest) -> Report:
+    """Report of `circle-test`."""
     return Report(
         Sentence(("Circle test of ", Code(test.profile.name))),
-        lambda: tuple(_blocks(test, with_contributions=with_contributions)),
-        partial(circle_document, test, with_contributions=with_contributions),
-        lambda: with_profile(test.profile.name, circle_records(test, with_contributions=with_contributions)),
+        lambda: tuple(_blocks(test)),
+        partial(circle_document, test),
+        lambda: with_profile(test.profile.name, circle_records(test)),
     )
 
 
-def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
+def _blocks(test: CircleTest) -> Iterator[Block]:
     """Verdict of each period, the periods side by side, and the error sources of each circle."""
     for result in test.results:
         yield from circle_sentences(test.profile, result)
     simulated = (result for result in test.results if result.stable is not None)
     yield from servo_sentence(test.profile, next(simulated, test.results[0]))
     yield circle_table(test.results)
-    ranked = [
-        result.contributions for result in test.results if with_contributions and result.contributions is not None
-    ]
-    if with_contributions:
-        yield from (contributions_table(one) for one in test.results if one.contributions)
-    if ranked:
-        yield ACT_TOGETHER if any(ranked) else NO_SOURCES
+    if test.with_contributions:
+        ranked = [result for result in test.results if result.contributions is not None]
+        yield from (contributions_table(one) for one in ranked if one.contributions)
+        if ranked:
+            yield ACT_TOGETHER if any(one.contributions for one in ranked) else NO_SOURCES
     for result, run in zip(test.results, test.runs, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
         if result.stable is not None:
@@ -182,7 +172,7 @@ def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profil
     return Chart(drawing, caption, joined(magnified, limit, by=""))
 
 
-def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record]:
+def circle_records(test: CircleTest) -> list[Record]:
     """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
     sources = sorted({one.source for result in test.results for one in result.contributions or ()})
     records = []
@@ -192,13 +182,13 @@ def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record
         record |= {"centre_offset_x_mm": offset[0], "centre_offset_y_mm": offset[1]}
         record["failures"] = [failure.name for failure in result.failures]
         removed = {one.source: one.removed_mm for one in record.pop("contributions") or ()}
-        if with_contributions:
+        if test.with_contributions:
             record |= {f"removed_{source}_mm": removed.get(source) for source in sources}
         records.append(record)
     return records
 
 
-def circle_document(test: CircleTest, *, with_contributions: bool) -> JsonDocument:
+def circle_document(test: CircleTest) -> JsonDocument:
     """Document of `busplan circle-test --format json`."""
     results = []
     for result in test.results:
@@ -206,7 +196,7 @@ def circle_document(test: CircleTest, *, with_contributions: bool) -> JsonDocume
         record["failures"] = [failure.document() for failure in result.failures]
         record["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
         ranked = record.pop("contributions")
-        if with_contributions:
+        if test.with_contributions:
             record["contributions"] = None if ranked is None else [one._asdict() for one in ranked]
         results.append(record)
     return document("circle-test", profile=test.profile.name, results=results)

@@ -22,41 +22,35 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
-from busplan.sections.profile import Profile
 
 
-def latency_report(result: LatencyResult, profile: Profile) -> Report:
+def latency_report(result: LatencyResult) -> Report:
     """Report of `latency`."""
     return Report(
-        Sentence(("Latency of ", Code(result.profile))),
-        lambda: tuple(_blocks(result, profile)),
+        Sentence(("Latency of ", Code(result.profile.name))),
+        lambda: tuple(_blocks(result)),
         partial(latency_document, result),
-        lambda: with_profile(result.profile, latency_records(result)),
+        lambda: with_profile(result.profile.name, latency_records(result)),
     )
 
 
-def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
+def _blocks(result: LatencyResult) -> Iterator[Block]:
     """Phases of each transaction, the timing models side by side; one table for each payload."""
-    network = network_of(profile)
-    yield from latency_tables(result, profile)
-    yield Sentence(
-        (
-            Code(result.profile),
-            f": {bus_of(profile).latency_subject(network)}.",
-        )
-    )
+    profile, network = result.profile, network_of(result.profile)
+    yield from latency_tables(result)
+    yield Sentence((Code(profile.name), f": {bus_of(profile).latency_subject(network)}."))
     yield from not_applicable(profile)
     yield from execution_sentence(profile, of_latency=True)
-    yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
+    yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result))
     yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
 
 
-def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
+def latency_tables(result: LatencyResult) -> Iterator[Table]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
-    bus = bus_of(profile)
+    bus = bus_of(result.profile)
     figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
     figures = tuple(figure for figure in figures if all(figure.key in one.phases for one in result.transactions))
-    subject = bus.latency_subject(network_of(profile))
+    subject = bus.latency_subject(network_of(result.profile))
     if bus.has_many_transactions:
         yield from _by_transaction(result, figures, subject)
         return
@@ -100,10 +94,11 @@ def _name(one: Transaction) -> str:
     return " ".join(filter(None, (one.group, one.transaction, payload)))
 
 
-def _over(result: LatencyResult, profile: Profile) -> list[str]:
+def _over(result: LatencyResult) -> list[str]:
     """Limits of the bus that the profile breaks with any of the payloads asked for, or with its own."""
-    networks = [network_of(with_payload(profile, size)) for size in result.payloads_bytes] or [network_of(profile)]
-    broken = (limit.words(network) for network in networks for limit in bus_of(profile).broken(network))
+    networks = [network_of(with_payload(result.profile, size)) for size in result.payloads_bytes]
+    networks = networks or [network_of(result.profile)]
+    broken = (limit.words(network) for network in networks for limit in bus_of(result.profile).broken(network))
     return list(dict.fromkeys(broken))
 
 
@@ -123,4 +118,4 @@ def _record(transaction: Transaction, *, has_groups: bool) -> Record:
 
 def latency_document(result: LatencyResult) -> JsonDocument:
     """Document of `busplan latency --format json`."""
-    return document("latency", profile=result.profile, transactions=latency_records(result))
+    return document("latency", profile=result.profile.name, transactions=latency_records(result))

@@ -35,27 +35,19 @@ from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 
-def plan_report(plan: Plan, *, with_circle: bool) -> Report:
-    """Report of `plan`.
-
-    Parameters
-    ----------
-    plan
-        The plan.
-    with_circle
-        Whether the circle test was run.
-    """
+def plan_report(plan: Plan) -> Report:
+    """Report of `plan`."""
     return Report(
         Sentence(("Plan of ", Code(plan.profile.name))),
-        lambda: tuple(_blocks(plan, with_circle=with_circle)),
+        lambda: tuple(_blocks(plan)),
         partial(plan_document, plan),
         lambda: with_profile(plan.profile.name, plan_records(plan)),
     )
 
 
-def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
+def _blocks(plan: Plan) -> Iterator[Block]:
     """The recommendation, or what stands in its way; a row for each step of the search, and what could be reached."""
-    yield _headline(plan, with_circle=with_circle)
+    yield _headline(plan)
     yield from (_relaxed(plan, one) for one in plan.relaxations)
     yield from _warnings(plan)
     yield options_table(plan)
@@ -90,14 +82,14 @@ def _settings(profile: Profile, changes: NewValues) -> Sentence:
     return settings_sentence(changes, meanings=meanings)
 
 
-def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
+def _headline(plan: Plan) -> Sentence:
     option, subject = plan.recommended, _goal(plan)
     if option is None or plan.binding is not None:
         why = ShownValue("" if plan.binding is None else plan.binding.why, "why")
         none = Words("NO PLAN", "fails")
         return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
     judged = plan.goal.tolerance.judges_contour
-    circle = (" and passes the circle" if judged else ", and its circle is not judged") if with_circle else ""
+    circle = (" and passes the circle" if judged else ", and its circle is not judged") if plan.with_circle else ""
     margin = margin_parts(option.deciding)
     result = (Words("fits", "passes"), " with a margin of ", *margin, f"{circle}.")
     if not option.changes:

@@ -99,7 +99,7 @@ def circle_test_command(
             if plot_file is not None and form is not None:
                 _draw(test, plot_file, changes, form)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
-        give(circle_report(test, with_contributions=contributions))
+        give(circle_report(test))
     if test.passed is False:
         raise PlanFailsError
 

@@ -57,4 +57,4 @@ def latency_command(
             payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
             timing_models=timing_models(timing, plan),
         )
-        give(latency_report(result, plan))
+        give(latency_report(result))

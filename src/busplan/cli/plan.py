@@ -167,7 +167,7 @@ def plan_command(
             _apply(loaded, result)
         elif file is not None:
             say(f"wrote {new}")
-        report = plan_report(result, with_circle=with_circle)
+        report = plan_report(result)
         (partial(_say_report, changes) if piped else give)(report)
     if result.recommended is None:
         raise PlanFailsError

@@ -86,7 +86,7 @@ def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
         (
             capacity_table(answer.capacity),
             *([groups_table(answer.capacity)] if answer.profile.group else []),
-            *latency_tables(answer.latency, answer.profile),
+            *latency_tables(answer.latency),
             sources["capacity"].line,
             sources["latency"].line,
         ),

@@ -108,7 +108,7 @@ def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[s
     add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
     add("map", "period against axes, cell by cell", map_document(answer.trade_off))
     if answer.circle is not None:
-        document = circle_document(answer.circle, with_contributions=True)
+        document = circle_document(answer.circle)
         add("circle", "the circle and its error sources", document, "--contributions")
     document = assumptions_document(answer.profile, answer.assumptions)
     add("explain", "what the figures rest on", document, own=elsewhere)
