@@ -187,7 +187,7 @@ def cell(value: Any) -> str:
 
 
 def test_usage(refused: Refused) -> None:
-    assert refused("diff", "paper-1ms").startswith("B: missing; ")
+    assert refused("diff", "paper-1ms").startswith("busplan diff: missing argument 'B'; ")
     assert "--format: 'text' is not one of 'table'" in refused("diff", "paper-1ms", "paper-4ms", "--format", "text")
 
 

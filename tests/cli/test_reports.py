@@ -376,7 +376,7 @@ def test_every_command_has_its_own_help_with_an_example(run: Run, command: str) 
         ((), "Usage: busplan [OPTIONS] COMMAND"),
         (("nope",), "nope: no such command; `busplan --help` lists them"),
         (("capcity", "paper-4ms"), "capcity: no such command; did you mean capacity?"),
-        (("--nope",), "--nope: no such option; `busplan --help` says more"),
+        (("--nope",), "busplan: no such option: --nope; `busplan --help` says more"),
         (("capacity", "paper-4ms", "--perod", "1ms"), "no such option: --perod (Possible options: --period)"),
         (("capacity", "paper-4ms", "--period"), "option '--period' requires an argument"),
         (("capacity",), "busplan capacity: missing argument 'PROFILE'; `busplan capacity --help` says more"),
