@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from busplan.analysis.circle.move import path_steps
 from busplan.analysis.circle.roundness import CircleTest, circle_test
-from busplan.analysis.circle.setup import path_steps
 from busplan.errors import PlacedError
 from busplan.profile.toml import decode, override
 from busplan.rules.baseline import MODELS, read_baseline

@@ -3,9 +3,8 @@
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.drawings.map.labels import placed_labels
 from busplan.forms.raster import WIDTH
-from busplan.forms.scale import Tick, ticks
+from busplan.forms.scale import Tick, placed_labels, ticks
 from busplan.forms.svg import LINE, PHONE, inside, text_at
 
 MARGIN_PERCENT: Final = 2.5

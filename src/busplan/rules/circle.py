@@ -34,8 +34,8 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.analysis.circle.failures import STABILITY
+    from busplan.analysis.circle.move import path_steps
     from busplan.analysis.circle.roundness import circle_test, to_attack
-    from busplan.analysis.circle.setup import path_steps
 
     steps = path_steps(profile)
     if steps > most_steps:

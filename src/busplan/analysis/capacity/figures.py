@@ -5,6 +5,7 @@ from itertools import chain
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import (
+    FITS,
     VERDICTS,
     Certainty,
     VerdictWord,
@@ -25,7 +26,7 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, plain
-from busplan.profile.toml import at_periods
+from busplan.profile.toml import at_periods, override
 from busplan.sections.profile import Profile
 
 
@@ -322,3 +323,23 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
         if limit.share is not None:
             found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network)))
     return found
+
+
+def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
+    """Figures of a plan after a bus reset, where it fits as it is set and is not shown to fit then.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    deciding
+        Its figures under the model that decides.
+    """
+    changes = bus_of(profile).reset_changes
+    if deciding.verdict != FITS or not changes:
+        return None
+    reset = override(profile, dict(changes))
+    if reset == profile:
+        return None
+    found = figures(reset, model=deciding.timing_model)
+    return None if found.verdict == FITS else found

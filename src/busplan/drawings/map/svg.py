@@ -13,11 +13,11 @@ from busplan.drawings.map.labels import (
     look_of,
     looks_of,
     map_title,
-    placed_labels,
     title_of,
     value_text,
 )
 from busplan.drawings.svg_style import style_sheet
+from busplan.forms.scale import placed_labels
 from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
 
 _CELL: Final = 20
