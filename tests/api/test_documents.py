@@ -86,10 +86,8 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     ),
     "evidence": busplan.evidence,
     "evidence can": lambda: busplan.evidence("can"),
-    "calibrate paper-two-node table-1.csv --form linear --robust --keep-outliers --timing paper": lambda: (
-        busplan.calibrate(
-            "paper-two-node", "table-1.csv", form="linear", robust=True, keep_outliers=True, timing_model="paper"
-        )
+    "calibrate paper-two-node table-1.csv --form linear --timing paper": lambda: busplan.calibrate(
+        "paper-two-node", "table-1.csv", form="linear", timing_model="paper"
     ),
     "report sercos2-servo-8 sercos3-servo-8 --set bus.nodes=3 --no-circle --title Two": lambda: busplan.report(
         [busplan.load_profile(name, changes={"bus.nodes": 3}) for name in ("sercos2-servo-8", "sercos3-servo-8")],

@@ -96,8 +96,6 @@ def provenance(result: Calibration, *, source: str) -> str:
 def _doubts(result: Calibration) -> str:
     """Outliers, for a list in words."""
     slow, fast = slow_and_fast(result)
-    if result.outliers_kept:
-        return f"{plural(len(result.outliers), 'outlier')} kept, " if result.outliers else ""
     said = (f"{len(slow)} slow in {_WORST}, " if slow else "", f"{len(fast)} fast left out, " if fast else "")
     return "".join(said)
 
@@ -180,7 +178,6 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         way=result.way,
         form=result.execution.kind,
         method=result.method,
-        robust=result.robust,
         measurements=result.measurements,
         execution=execution_keys(result),
         uncertainty_us=result.uncertainty_us,
@@ -188,7 +185,6 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         rms_residual_us=result.rms_residual_us,
         largest_residual=result.largest._asdict(),
         outliers=[one._asdict() for one in result.outliers],
-        outliers_kept=result.outliers_kept,
         worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),
         payloads=calibration_records(result),

@@ -64,11 +64,9 @@ def _way(result: Calibration) -> Sentence:
 def _form(result: Calibration) -> Sentence:
     execution = result.execution
     if execution.kind == "linear":
-        meaning = "all measurements" if result.method == "least squares" else "the median at each payload"
-        if result.outliers and not result.outliers_kept:
-            meaning += ", without the outliers"
+        without = ", without the outliers" if result.outliers else ""
         return sentence(
-            f"Line: {{}} + {{}} * payload, by {result.method} through {meaning}.",
+            f"Line: {{}} + {{}} * payload, by {result.method} through the median at each payload{without}.",
             ShownValue(execution.base_us, "base_us", "us", digits=_LINE_DIGITS),
             ShownValue(execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS),
         )
@@ -167,10 +165,8 @@ def _outliers(result: Calibration) -> Iterator[Sentence]:
 
 
 def _effect(result: Calibration, word: str) -> Sentence:
-    if result.outliers_kept:
-        return sentence("; in the fit by --keep-outliers, so that the grade is assumed.")
     if word == "fast":
-        return sentence("; left out of the fit; measure again, or use --keep-outliers where they are real.")
+        return sentence("; left out of the fit; measure again.")
     worst = time_value(result.worst_extra_us or 0.0, "worst_extra_us")
     return sentence("; not in the fit: the slowest execution takes {} more, worst_extra_us.", worst)
 

@@ -61,22 +61,6 @@ def calibrate_command(
             show_default=False,
         ),
     ] = None,
-    robust: Annotated[
-        bool,
-        typer.Option(
-            "--robust",
-            help="Let no single measurement pull: the median at each payload instead of the mean; the line of Theil "
-            "and Sen through these medians instead of least squares.",
-        ),
-    ] = False,
-    keep_outliers: Annotated[
-        bool,
-        typer.Option(
-            "--keep-outliers",
-            help="Fit the outliers, too, with the grade assumed. Otherwise slow ones are in worst_extra_us, and fast "
-            "ones are left out, each named by its line.",
-        ),
-    ] = False,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
@@ -128,8 +112,6 @@ def calibrate_command(
             group=group,
             timing_model=None if timing is None else timing_model(timing, bench),
             form=form,
-            robust=robust,
-            keep_outliers=keep_outliers,
             # The shipped example has published figures, so the result is derived.
             grade="derived" if shipped else "measured",
         )
