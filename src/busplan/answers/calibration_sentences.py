@@ -82,9 +82,7 @@ def _residual(result: Calibration) -> Sentence:
     )
     if one.residual_us:
         place = sentence(
-            " at {} (line {})",
-            ShownValue(one.payload_bytes, "payload_bytes", "bytes"),
-            count_value(one.line, "line"),
+            " at {} (line {})", ShownValue(one.payload_bytes, "payload_bytes", "bytes"), count_value(one.line, "line")
         )
         said = joined(said, place, by="")
     repeated = [fit.deviation_us for fit in result.payloads if fit.deviation_us is not None]

@@ -134,11 +134,7 @@ def groups_table(result: Capacity) -> Table:
         )
     rows = []
     for place, group in enumerate(result.results[0].groups):
-        cells: list[Cell] = [
-            Code(group.name),
-            count_value(group.nodes, "nodes"),
-            count_value(group.axes, "axes"),
-        ]
+        cells: list[Cell] = [Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes")]
         for number, keys in shown:
             cells += (attribute_value(key, result.results[number].groups[place]) for key in keys)
         rows.append(TableRow(tuple(cells)))

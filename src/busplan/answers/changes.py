@@ -28,14 +28,7 @@ _CONTEXT: Final = 8
 
 def change_table(keys: Iterable[KeyDifference]) -> Table:
     """One row for each key: its values in A and B, with a note if a value is a default."""
-    rows = (
-        (
-            Code(one.key),
-            _cell(one.key, one.a, one.b),
-            _cell(one.key, one.b, one.a),
-        )
-        for one in keys
-    )
+    rows = ((Code(one.key), _cell(one.key, one.a, one.b), _cell(one.key, one.b, one.a)) for one in keys)
     return Table(_COLUMNS, tuple(map(TableRow, rows)))
 
 

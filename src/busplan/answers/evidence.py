@@ -167,13 +167,6 @@ def _compared(one: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
     return (
         ShownValue(one.computed, "computed", one.unit, decimals, fixed=True),
         *((doubt,) if is_weighed else ()),
-        ShownValue(
-            one.residual,
-            "residual",
-            one.unit,
-            max(decimals, _RESIDUAL_DECIMALS),
-            signed=True,
-            fixed=True,
-        ),
+        ShownValue(one.residual, "residual", one.unit, max(decimals, _RESIDUAL_DECIMALS), signed=True, fixed=True),
         ShownValue(one.relative_residual, "relative_residual", "%", 1, signed=True, fixed=True),
     )

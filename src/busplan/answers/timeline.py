@@ -107,10 +107,7 @@ def _most(window: Schedule) -> Sentence:
 def margins_sentence(plan: Schedule) -> Sentence:
     """Say what each timing model leaves of the slice."""
     margins = (
-        sentence(
-            f"{{}} by the {one.timing_model} model",
-            figure_value(MARGIN, one.figures.margin_us),
-        )
+        sentence(f"{{}} by the {one.timing_model} model", figure_value(MARGIN, one.figures.margin_us))
         for one in model_bars(plan)
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")

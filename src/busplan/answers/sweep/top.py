@@ -212,8 +212,6 @@ class TopRow(NamedTuple):
 
     rank: float
     """Sort key, the smallest first."""
-    number: int
-    """Index among all rows."""
     record: Record
 
 
@@ -254,8 +252,7 @@ class TopRows:
         self.kept = sorted(self.kept, key=lambda row: row.rank)[: self._top]
 
     def _row(self, block: SweepBlock, index: int, *, rank: float) -> TopRow:
-        number = block.chunk.start * len(block.models) + index
-        return TopRow(rank, number, block.row(index, self.columns))
+        return TopRow(rank, block.row(index, self.columns))
 
     @property
     def order(self) -> str:
