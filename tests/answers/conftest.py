@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from busplan.forms.blocks import Report, Sentence, ShownValue
+from busplan.forms.blocks import Report, Sentence, ShownValue, Table
 
 
 def values_in(item: object) -> Iterator[ShownValue]:
@@ -34,8 +34,10 @@ def values_by_key(document: Any, found: dict[str, list[Any]] | None = None) -> d
 
 
 def _outside_sentences(blocks: object) -> Iterator[ShownValue]:
-    """The figures in cells and beside their names; sentences also count things, and say what is short."""
-    if isinstance(blocks, ShownValue):
+    """The figures in cells and beside their names; other sentences also count things, and say what is short."""
+    if isinstance(blocks, Table):
+        yield from values_in(blocks.rows)
+    elif isinstance(blocks, ShownValue):
         yield blocks
     elif isinstance(blocks, tuple) and not isinstance(blocks, Sentence):
         for one in blocks:

@@ -55,9 +55,8 @@ def test_evidence_has_every_comparison_once(
     assert {one["data"] for one in figures} == {"paper", "dvrk", "ieee1394"}
 
 
-def test_each_profile_is_a_section(values_of_the_document: Callable[[Report], int]) -> None:
+def test_each_profile_is_a_section() -> None:
     report = profiles_report([load(name).profile for name in shipped_names()])
-    assert values_of_the_document(report) == 2 * len(shipped_names())
     text = render(report, "table")
     assert "paper-two-node: 1 node at 4 ms, paper model leads\n" in text
     assert "\n\n\n" not in text
