@@ -16,6 +16,7 @@ from busplan.analysis.derivation.explain import assumptions, explain
 from busplan.analysis.latency import latency
 from busplan.analysis.network import model_names
 from busplan.analysis.planning.plan import plan
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Listed, checked_grid
 from busplan.analysis.timeline.schedule import schedule
@@ -49,8 +50,9 @@ def swept(profile: Profile) -> Report:
         with_circle=False,
     )
     models = model_names(profile)
-    columns = (*grid.axes, "timing_model", *default_columns(profile, ()))
-    rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(profile, grid, models)
+    asked = Sweep(profile, grid, tuple(models), ())
+    columns = (*grid.axes, "timing_model", *default_columns(asked))
+    rows, tally = TopRows(columns, sort_by=None, ascending=False, top=20), Tally(asked)
     for block in sweep(profile, grid, timing_models=models):
         rows.add(block)
         tally.add(block)

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from contextlib import AbstractContextManager, chdir, nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,7 +16,7 @@ from typing import Any, NamedTuple
 import pytest
 from ruamel.yaml import YAML
 
-from busplan.cli.workers import Workers, workers
+from busplan.cli.workers import workers
 
 ROOT = Path(__file__).resolve().parents[2]
 CLEAN = (ROOT / "tests/rules/examples/BP001/valid.toml").read_text(encoding="utf-8")
@@ -284,7 +285,7 @@ class Crew(NamedTuple):
     """A folder, and two workers that were started in it: where workers start, they work."""
 
     folder: Path
-    executor: Workers
+    executor: Executor
 
 
 @pytest.fixture(scope="module")
@@ -301,7 +302,7 @@ def by_two(busplan: Busplan, crew: Crew, monkeypatch: pytest.MonkeyPatch) -> Cal
     def call(*arguments: object, stdin: str | None = None, jobs: int = 2, workers: int = 2) -> Run:
         asked: list[int] = []
 
-        def again(number: int) -> AbstractContextManager[Workers]:
+        def again(number: int) -> AbstractContextManager[Executor]:
             asked.append(number)
             return nullcontext(crew.executor)
 

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from busplan.cli.workers import workers
-
 PROFILE = Path(__file__).parents[2] / "profiles" / "paper-1ms.toml"
 CIRCLES = ("sweep", "p.toml", "--circle", "--jobs", "2", "--vary")
 SWEEP = (*CIRCLES, "circle.radius_mm=10,320", "--vary", "servo.position_gain_per_s=100:119")
@@ -200,11 +198,3 @@ def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
         process.kill()
         process.wait()
     assert until(lambda: not any(map(alive, started)), seconds=5)
-
-
-def test_workers_answer_in_order_and_pass_on_what_went_wrong() -> None:
-    with workers(2) as crew:
-        assert list(crew.map(abs, [-3, -1, -2])) == [3, 1, 2]
-        assert list(crew.map(abs, [])) == []
-        with pytest.raises(FileNotFoundError, match="nowhere"):
-            list(crew.map(os.stat, ["nowhere", "."]))

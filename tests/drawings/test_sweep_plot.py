@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element, fromstring
 import numpy as np
 import pytest
 
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.axis_values import listed, stepped
 from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Values, checked_grid
@@ -32,7 +33,7 @@ def values(given: Sequence[Any] | range) -> Values:
 
 def added(figure: str, profile: Any = PAPER, **vary: Any) -> FigureData:
     grid = checked_grid(profile, {key.replace("__", "."): values(one) for key, one in vary.items()}, with_circle=False)
-    data = FigureData(profile, grid, figure=figure, timing_models=MODELS)
+    data = FigureData(Sweep(profile, grid, MODELS, ()), figure=figure)
     for block in sweep(profile, grid, timing_models=MODELS, chunk_points=7):
         data.add(block)
     return data

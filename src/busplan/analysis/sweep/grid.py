@@ -21,6 +21,7 @@ Array = NDArray[Any]
 
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
+_POINTS_AT_ONCE: Final = 4096
 MAX_POINTS: Final = 10**12
 """A larger grid would take weeks, so it is probably a typing error."""
 
@@ -148,6 +149,11 @@ class Grid(NamedTuple):
                 chunk = self._chunk(start, parts)
                 yield chunk
                 start += chunk.points
+
+    def each_point(self) -> Iterator[dict[str, object]]:
+        """Values of the keys of each point."""
+        # Some at a time: an axis that is a list is looked through for each chunk.
+        return (chunk.point(index) for chunk in self.chunks(_POINTS_AT_ONCE) for index in range(chunk.points))
 
     def _chunk(self, start: int, parts: list[tuple[int, int]]) -> Chunk:
         shape = tuple(stop - first for first, stop in parts)
