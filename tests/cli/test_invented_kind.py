@@ -41,7 +41,7 @@ KINDS = " or ".join(f'"{one}"' for one in kind_names())
 RATES = (1.0, 2.0, 4.0)
 MOST_STATIONS = 40
 SHARED = 3
-"""Stations that one token serves: the token's share of the cycle is no polynomial of their number."""
+"""Stations that one token serves: the token's share of the cycle grows by steps."""
 
 
 class RingSection(BusSection):
@@ -405,7 +405,7 @@ def limit_of(value: Callable[[Network], Number], most: Callable[[Network], Numbe
     [
         pytest.param(limit_of(lambda one: one.nodes**2, lambda _one: 170), 13, id="a square"),
         pytest.param(limit_of(lambda one: one.nodes**3, lambda _one: 170), 5, id="a cube"),
-        pytest.param(limit_of(lambda one: rounded_up(one.nodes / 2), lambda _one: 7), 14, id="no polynomial"),
+        pytest.param(limit_of(lambda one: rounded_up(one.nodes / 2), lambda _one: 7), 14, id="steps"),
         pytest.param(limit_of(lambda one: 10 * one.nodes, lambda one: 40 + 5 * one.nodes), 8, id="a bound that grows"),
         pytest.param(limit_of(lambda one: one.period_us, lambda _one: 1e5), 0, id="without the stations"),
         pytest.param(limit_of(lambda one: one.period_us, lambda _one: 1e7), 37, id="kept by any number"),

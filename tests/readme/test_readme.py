@@ -14,7 +14,6 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
-from busplan.analysis.derivation.origin import short
 from busplan.analysis.register import figures_of
 from busplan.answers.assumptions import constant_rows, equation_rows
 from busplan.buses import kind_named, kind_names
@@ -27,6 +26,7 @@ from busplan.profile.kinds import models_of
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, validate
 from busplan.sections.machine import AxisOverride
+from busplan.sourced import short
 
 Run = Callable[..., CompletedProcess[str]]
 

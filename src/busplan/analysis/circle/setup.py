@@ -13,8 +13,8 @@ from busplan.servo.path import circle_path
 
 
 def bus(profile: Profile) -> CapacityFigures:
-    """Capacity under the timing model that decides, without the numbers of nodes that no circle asks for."""
-    return figures(profile, model=bus_of(profile).deciding_model, with_counts=False)
+    """Capacity under the timing model that decides."""
+    return figures(profile, model=bus_of(profile).deciding_model)
 
 
 def setup(profile: Profile) -> Setup:

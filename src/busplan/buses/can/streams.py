@@ -128,8 +128,3 @@ def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, in
     for place, other in sorted(pairs):
         first = max(each[place].first, each[other].first)
         yield each[place], each[other], first, min(each[place].last, each[other].last) - first + 1
-
-
-def load_before(own: Stream, each: Sequence[Stream]) -> float:
-    """Load of the bus by one stream and all that go before it, 0..1 [1]."""
-    return sum(one.sender().load for one in each if one is own or one.goes_before(own))
