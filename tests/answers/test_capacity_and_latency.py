@@ -86,7 +86,7 @@ def test_a_verdict_that_is_not_shown_says_so_with_its_reserve(profile: Profile) 
 
 def test_an_execution_that_no_answer_puts_on_the_bus_is_not_spoken_of(profile: Profile) -> None:
     off = override(profile, {"node.read_response": "concatenated", "node.write_response": "unified"})
-    for text in (words(off), render(latency_report(latency(off), off), "table")):
+    for text in (words(off), render(latency_report(latency(off)), "table")):
         assert "The execution time behind these figures" not in text
     assert "slowest execution" not in words(off)
     assert "The execution time behind these figures is derived." in words(
@@ -128,19 +128,19 @@ def test_the_verdict_says_which_limit_is_broken(profile: Profile, changes: dict[
 
 def test_latency_warns_of_payloads_over_the_limit(profile: Profile) -> None:
     slow = override(profile, {"bus.speed": "S100"})
-    text = render(latency_report(latency(slow, payloads_bytes=[4, 1024]), slow), "table")
+    text = render(latency_report(latency(slow, payloads_bytes=[4, 1024])), "table")
     assert text.endswith("\nWarning: a payload of 1024 bytes is over the 512 bytes of S100.\n")
 
 
 def test_latency_warns_of_hops_and_gap_count(profile: Profile) -> None:
     long = override(profile, {"bus.nodes": 17, "bus.gap_count": 5})
-    text = render(latency_report(latency(long), long), "table")
+    text = render(latency_report(latency(long)), "table")
     assert "17 hops are over the 16 of one bus" in text
     assert "gap count 5 is unsafe for 17 hops (17 nodes); the smallest safe one is 46" in text
 
 
 def test_one_table_a_payload_and_one_for_all_periods(profile: Profile) -> None:
-    heads = render(latency_report(latency(profile, payloads_bytes=[4, 16, 32]), profile), "table")
+    heads = render(latency_report(latency(profile, payloads_bytes=[4, 16, 32])), "table")
     assert heads.count("\nfigure ") == 3
     result = capacity(profile, periods_us=[1000.0, 500.0])
     text = render(capacity_report(result, verdicts(result)), "table")
@@ -170,9 +170,9 @@ def test_what_fails_is_marked_where_it_stands_and_the_rest_is_detail(profile: Pr
 
 @pytest.mark.parametrize("period_us", [1000.0, 600.0, 100.0])
 def test_every_figure_of_the_blocks_stands_in_the_document(
-    profile: Profile, period_us: float, values_in_their_places: Callable[[Report], int]
+    profile: Profile, period_us: float, values_of_the_document: Callable[[Report], int]
 ) -> None:
     result = capacity(profile, periods_us=[4000.0, period_us])
     # Two tables of 44 figures under two models, and the figures of the sentences.
-    assert values_in_their_places(capacity_report(result, verdicts(result))) > 100
-    assert values_in_their_places(latency_report(latency(profile, payloads_bytes=[4, 16]), profile)) == 2 * 4 * 21
+    assert values_of_the_document(capacity_report(result, verdicts(result))) > 100
+    assert values_of_the_document(latency_report(latency(profile, payloads_bytes=[4, 16]))) == 2 * 4 * 21

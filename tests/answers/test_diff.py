@@ -195,13 +195,13 @@ def test_what_is_worse_fails(paper: Profile) -> None:
 
 
 @pytest.mark.parametrize("name", ["paper-1ms", "paper-optimal-gap", "paper-dma", "paper-two-node"])
-def test_every_figure_stands_at_its_place(name: str, values_in_their_places: Callable[[Report], int]) -> None:
+def test_every_figure_stands_at_its_place(name: str, values_of_the_document: Callable[[Report], int]) -> None:
     found = difference(load("paper-4ms").profile, load(name).profile, circle=run_circle)
     # The table shows the first 20 keys.
     sides = (side.value for one in found.keys[:20] for side in (one.a, one.b) if side is not None)
     numbers = [one for one in sides if isinstance(one, int | float) and not isinstance(one, bool)]
     # Four of each row, the two periods, and the numbers of the keys.
-    assert values_in_their_places(diff_report(found, arguments=AB)) == 4 * len(figures(found)) + 2 + len(numbers)
+    assert values_of_the_document(diff_report(found, arguments=AB)) == 4 * len(figures(found)) + 2 + len(numbers)
 
 
 def test_keys_that_differ_in_their_last_digit_are_seen_to_differ() -> None:

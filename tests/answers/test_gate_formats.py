@@ -7,7 +7,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from busplan.answers.gate.full import Full
 from busplan.answers.gate.plain import Concise
 from busplan.buses.rule import RuleProblem
 from busplan.forms import csv_rows, html, markdown, terminal
-from busplan.forms.blocks import Report, Sentence
+from busplan.forms.blocks import Sentence
 from busplan.profile.document import Document, Spot
 from busplan.profile.schema import profile_schema
 from busplan.profile.shipped import load, shipped_names
@@ -119,9 +119,7 @@ def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
 # The answer in blocks
 
 
-def test_the_answer_says_findings_failures_and_what_they_add_up_to(
-    mixed: CheckReport, values_in_their_places: Callable[[Report], int]
-) -> None:
+def test_the_answer_says_findings_failures_and_what_they_add_up_to(mixed: CheckReport) -> None:
     answer = check_report(mixed)
     assert terminal.text(answer).splitlines() == [
         *render(mixed, file_format="concise").splitlines(),
@@ -130,11 +128,8 @@ def test_the_answer_says_findings_failures_and_what_they_add_up_to(
     ]
     states = [block.state for block in answer.blocks() if isinstance(block, Sentence)]
     assert states == ["warns", "fails", "fails", "fails", "fails"]
-    # That one of the files could not be checked is said, and not where the document has it.
-    assert values_in_their_places(answer) == 2
     clean = check_report(report(checked(CLEAN)))
     assert [block.state for block in clean.blocks() if isinstance(block, Sentence)] == ["passes"]
-    assert values_in_their_places(clean) == 3
     *_, warned = check_report(report(checked(WARNS))).blocks()
     assert isinstance(warned, Sentence)
     assert warned.state == "warns"

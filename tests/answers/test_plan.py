@@ -1,6 +1,6 @@
 """What `busplan plan` says, and the data it gives."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -10,13 +10,15 @@ from busplan.analysis.planning.plan import Plan, plan
 from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.answers.plan import plan_document, plan_records, plan_report, settings
 from busplan.forms import render
-from busplan.forms.blocks import Report, Sentence, ShownValue, Table, TableRow, Words, values_in
+from busplan.forms.blocks import Report, Sentence, ShownValue, Table, TableRow, Words
 from busplan.forms.columns import cell_text, sentence_text
 from busplan.forms.csv_rows import to_csv
 from busplan.forms.json_document import to_json
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.sections.profile import Profile
+
+ValuesIn = Callable[[object], Iterator[ShownValue]]
 
 CONTRACT = {
     "title",
@@ -60,7 +62,7 @@ def planned(profile: Profile, circle: Circle | None = None, max_circles: int = M
 
 
 def report(profile: Profile, circle: Circle | None = None, **options: Any) -> Report:
-    return plan_report(planned(profile, circle, **options), with_circle=circle is not None)
+    return plan_report(planned(profile, circle, **options))
 
 
 def text(profile: Profile, circle: Circle | None = None, **options: Any) -> str:
@@ -141,7 +143,7 @@ def test_what_fails_is_set_apart(paper: Profile) -> None:
     first = rows(report(paper, rough, max_circles=3))[0]
     assert first.cells[5] == Words("FAILS", "fails")
     result = planned(paper, bus__nodes=4)
-    for row, option in zip(rows(plan_report(result, with_circle=False)), result.options, strict=True):
+    for row, option in zip(rows(plan_report(result)), result.options, strict=True):
         margins = [cell for cell in row.cells if isinstance(cell, ShownValue) and "margin" in cell.key]
         assert [margin.state == "fails" for margin in margins] == [option.deciding.verdict != "fits"]
         assert row.cells[5] == "-"
@@ -158,18 +160,18 @@ def test_what_fails_is_set_apart(paper: Profile) -> None:
     ],
 )
 def test_every_figure_stands_in_its_place(
-    name: str, wanted: dict[str, Any], values_in_their_places: Callable[[Report], int]
+    name: str, wanted: dict[str, Any], values_of_the_document: Callable[[Report], int]
 ) -> None:
     found = report(load(name).profile, **wanted)
-    assert values_in_their_places(found) > 6 * len(rows(found))
+    assert values_of_the_document(found) >= 5 * len(rows(found))
 
 
-def test_a_cell_writes_what_its_option_sets(paper: Profile) -> None:
+def test_a_cell_writes_what_its_option_sets(paper: Profile, values_in: ValuesIn) -> None:
     result = planned(paper, bus__nodes=4)
-    cells = [row.cells[2] for row in rows(plan_report(result, with_circle=False))]
-    for number, (cell, option) in enumerate(zip(cells, result.options, strict=True)):
+    cells = [row.cells[2] for row in rows(plan_report(result))]
+    for cell, option in zip(cells, result.options, strict=True):
         values = list(values_in(cell))
-        assert {value.at for value in values} <= {f"/options/{number}/changes/{key}" for key in option.changes}
+        assert {value.key for value in values} <= set(option.changes)
         assert {value.value for value in values} == set(option.changes.values())
     assert [*map(cell_text, cells)] == [
         *("-", "gap count 10", "500 us, ratio 0.9, gap count 10", "payload 140 bytes, ratio 0.9, gap count 10"),
@@ -221,7 +223,7 @@ def test_data_holds_the_contract(paper: Profile) -> None:
 def test_a_circle_without_a_tolerance_is_not_said_to_pass() -> None:
     goal = override(load("paper-4ms").profile, {"circle.radius_mm": 25.0, "tolerance": {}})
     plan_ = plan(goal, circle=lambda _: ())
-    said = next(block for block in plan_report(plan_, with_circle=True).blocks() if isinstance(block, Sentence))
+    said = next(block for block in plan_report(plan_).blocks() if isinstance(block, Sentence))
     assert sentence_text(said).endswith(", and its circle is not judged.")
     assert {option.circle_passed for option in plan_.options} == {None}
-    assert {option["circle_passed"] for option in plan_report(plan_, with_circle=True).document()["options"]} == {None}
+    assert {option["circle_passed"] for option in plan_report(plan_).document()["options"]} == {None}

@@ -37,13 +37,13 @@ def lines(profile: Profile) -> list[str]:
 
 @pytest.mark.parametrize("name", ["paper-1ms", "gantry-24", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8"])
 def test_a_figure_stands_at_its_place_at_every_period(
-    name: str, values_in_their_places: Callable[[Report], int]
+    name: str, values_of_the_document: Callable[[Report], int]
 ) -> None:
     one = load(name).profile
-    assert values_in_their_places(made(one, 4000.0, 300.0)) > 100
+    assert values_of_the_document(made(one, 4000.0, 300.0)) > 100
     nodes = one.alike_nodes[0]
     tree: dict[str, object] = {"bus.max_hops": 3, "bus.charge_hops": "farthest"} if one.bus.kind == "ieee1394" else {}
-    assert values_in_their_places(made(override(one, {**tree, nodes.payload_key("write"): 16}))) > 80
+    assert values_of_the_document(made(override(one, {**tree, nodes.payload_key("write"): 16}))) > 60
 
 
 def test_the_document_is_that_of_capacity_with_two_keys_more(profile: Profile) -> None:

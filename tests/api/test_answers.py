@@ -102,7 +102,7 @@ HEADLINES = {
     "12 more.>",
     "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",
     "explain all": "<ExplainAnswer: paper-1ms: 44 assumptions behind its figures>",
-    "calibrate": "<CalibrateAnswer: paper-1ms: Table: the mean at each payload, 4 to 1024 bytes.>",
+    "calibrate": "<CalibrateAnswer: paper-1ms: Table: the median at each payload, 4 to 1024 bytes.>",
     "report": "<ReportAnswer: paper-1ms: fits>",
 }
 

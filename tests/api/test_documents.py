@@ -32,23 +32,23 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "latency paper-4ms --payload 4,16 --timing standard": lambda: busplan.latency(
         "paper-4ms", payload_bytes=[4, 16], timing_model=["standard"]
     ),
-    "latency paper-4ms --nodes 5 --gap-count optimal": lambda: busplan.latency(
+    "latency paper-4ms --set bus.nodes=5 --set bus.gap_count=optimal": lambda: busplan.latency(
         busplan.load_profile("paper-4ms", changes={"bus.nodes": 5, "bus.gap_count": "optimal"})
     ),
     "capacity paper-1ms --period 600us --period 0.25ms --timing paper": lambda: busplan.capacity(
         "paper-1ms", period_us=[600, 250], timing_model="paper"
     ),
-    "circle-test paper-1ms --feed 10000 --radius 20 --period 1ms --period 100us --contributions": lambda: (
+    "circle-test paper-1ms --set circle.radius_mm=20 --period 1ms --period 100us --contributions": lambda: (
         busplan.circle_test(
-            busplan.load_profile("paper-1ms", changes={"circle.feed_mm_per_min": 10000.0, "circle.radius_mm": 20.0}),
+            busplan.load_profile("paper-1ms", changes={"circle.radius_mm": 20.0}),
             period_us=[1000, 100],
             contributions=True,
         )
     ),
-    "plan paper-1ms --nodes 6 --period 500us --gap-count 63 --max-circles 2": lambda: busplan.plan(
+    "plan paper-1ms --nodes 6 --period 500us --set bus.gap_count=63 --max-circles 2": lambda: busplan.plan(
         "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
     ),
-    "plan paper-1ms --axes 15 --reserve 12.5% --free responses,gap_count --no-circle": lambda: busplan.plan(
+    "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count --no-circle": lambda: busplan.plan(
         "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"], circle=False
     ),
     "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
@@ -60,7 +60,7 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     "compare can-servo-8 --buses can,ieee1394 --circle": lambda: busplan.compare(
         "can-servo-8", buses=["can", "ieee1394"], circle=True
     ),
-    "compare paper-1ms --buses can --nodes 3": lambda: busplan.compare(
+    "compare paper-1ms --buses can --set bus.nodes=3": lambda: busplan.compare(
         busplan.load_profile("paper-1ms", changes={"bus.nodes": 3}), buses="can"
     ),
     "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
@@ -86,10 +86,8 @@ OPTIONS: dict[str, Callable[[], Answer]] = {
     ),
     "evidence": busplan.evidence,
     "evidence can": lambda: busplan.evidence("can"),
-    "calibrate paper-two-node table-1.csv --form linear --robust --keep-outliers --timing paper": lambda: (
-        busplan.calibrate(
-            "paper-two-node", "table-1.csv", form="linear", robust=True, keep_outliers=True, timing_model="paper"
-        )
+    "calibrate paper-two-node table-1.csv --form linear --timing paper": lambda: busplan.calibrate(
+        "paper-two-node", "table-1.csv", form="linear", timing_model="paper"
     ),
     "report sercos2-servo-8 sercos3-servo-8 --set bus.nodes=3 --no-circle --title Two": lambda: busplan.report(
         [busplan.load_profile(name, changes={"bus.nodes": 3}) for name in ("sercos2-servo-8", "sercos3-servo-8")],
@@ -118,7 +116,11 @@ def test_of_every_class_of_bus(command: str, name: str) -> None:
 @pytest.mark.parametrize("line", OPTIONS)
 def test_with_the_options_of_the_command(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert OPTIONS[line]().to_dict() == printed(line)
+    document = printed(line)
+    # In Python the changes are the profile's.
+    if "--set" in line and not line.startswith("report"):
+        document.pop("changes", None)
+    assert OPTIONS[line]().to_dict() == document
 
 
 @pytest.mark.parametrize("name", ["latency", "capacity", "plan", "timeline"])

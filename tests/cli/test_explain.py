@@ -92,7 +92,18 @@ def test_keys_inside_a_figure_mean_the_figure(run: Run, tmp_path: Path) -> None:
 
 
 def test_options_multiply_as_in_the_commands(run: Run) -> None:
-    arguments = ("--period", "1ms", "--period", "600us", "--nodes", "3", "--gap-count", "optimal", "--timing", "both")
+    arguments = (
+        "--period",
+        "1ms",
+        "--period",
+        "600us",
+        "--set",
+        "bus.nodes=3",
+        "--set",
+        "bus.gap_count=optimal",
+        "--timing",
+        "both",
+    )
     said = json.loads(run("explain", "paper-4ms", "required_us", *arguments, "--format", "json").stdout)
     given = json.loads(run("capacity", "paper-4ms", *arguments, "--format", "json").stdout)
     assert [one["value"] for one in said["derivations"]] == [row["required_us"] for row in given["results"]]

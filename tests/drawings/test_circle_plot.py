@@ -189,8 +189,8 @@ def test_error_sources_stand_below_the_circle_by_rank() -> None:
 
 def test_the_title_names_grade_changes_and_periods_that_are_not_drawn() -> None:
     test = run(*SMALL.items(), periods_us=(4000.0, 100.0))
-    assert " ".join(texts(picture(test, note="--nodes 3"))).startswith(
-        "paper-4ms --nodes 3 circle test, servo values: 6 assumed, 4 calibrated, 2 published "
+    assert " ".join(texts(picture(test, note="--set bus.nodes=3"))).startswith(
+        "paper-4ms --set bus.nodes=3 circle test, servo values: 6 assumed, 4 calibrated, 2 published "
         "not drawn, for the bus does not carry it: 100 us 4 ms, "
     )
     (result, missing) = test.results

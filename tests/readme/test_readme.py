@@ -228,7 +228,7 @@ def test_the_example_profile_is_the_shipped_one() -> None:
 DOCUMENTS = {
     "latency": "paper-4ms",
     "capacity": "paper-1ms --period 600us --sensitivity",
-    "circle-test": "paper-4ms --period 4ms --period 100us --radius 20 --contributions",
+    "circle-test": "paper-4ms --period 4ms --period 100us --contributions",
     "explain": "paper-4ms required_us",
     "report": "paper-4ms --no-circle",
     "check": "paper-optimal-gap nowhere.toml --no-circle",

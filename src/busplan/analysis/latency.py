@@ -37,7 +37,7 @@ class Transaction(NamedTuple):
 class LatencyResult(NamedTuple):
     """Answer of `latency`."""
 
-    profile: str
+    profile: Profile
     transactions: tuple[Transaction, ...]
     payloads_bytes: tuple[int, ...] = ()
     """Payloads asked for [bytes]; empty for the profile's own."""
@@ -79,7 +79,7 @@ def latency(
     _require_execution(profile, payloads_bytes or ())
     variants = [profile] if payloads_bytes is None else [with_payload(profile, size) for size in payloads_bytes]
     return LatencyResult(
-        profile.name,
+        profile,
         tuple(
             Transaction(model, one.name, one.group, one.payload_bytes, nodes, FigureValues(_whole_bytes(one.phases)))
             for variant in variants

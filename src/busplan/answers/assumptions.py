@@ -63,17 +63,15 @@ def assumptions_report(profile: Profile, assumptions: Sequence[Input]) -> Report
     )
 
 
-def assumptions_table(assumptions: Sequence[Input], *, at: str = "/assumptions") -> Table:
+def assumptions_table(assumptions: Sequence[Input]) -> Table:
     """Table of inputs, one row each.
 
     Parameters
     ----------
     assumptions
         The inputs.
-    at
-        JSON pointer to their list.
     """
-    rows = (TableRow((*input_cells(one, f"{at}/{number}"), one.meaning)) for number, one in enumerate(assumptions))
+    rows = (TableRow((*input_cells(one), one.meaning)) for one in assumptions)
     return Table((*INPUT_COLUMNS, _MEANING), tuple(rows), stacks=True)
 
 
@@ -120,9 +118,9 @@ def assumptions_document(profile: Profile, assumptions: Sequence[Input]) -> Json
     )
 
 
-def input_cells(one: Input, at: str) -> tuple[Cell, ...]:
+def input_cells(one: Input) -> tuple[Cell, ...]:
     """Cells of one input."""
-    value = ShownValue(one.value, "value", one.unit, digits=DIGITS, at=f"{at}/value")
+    value = ShownValue(one.value, "value", one.unit, digits=DIGITS)
     return Code(one.name), value, one.unit, one.grade, one.source
 
 

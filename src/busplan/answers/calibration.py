@@ -96,8 +96,6 @@ def provenance(result: Calibration, *, source: str) -> str:
 def _doubts(result: Calibration) -> str:
     """Outliers, for a list in words."""
     slow, fast = slow_and_fast(result)
-    if result.outliers_kept:
-        return f"{plural(len(result.outliers), 'outlier')} kept, " if result.outliers else ""
     said = (f"{len(slow)} slow in {_WORST}, " if slow else "", f"{len(fast)} fast left out, " if fast else "")
     return "".join(said)
 
@@ -129,7 +127,7 @@ def _blocks(result: Calibration, source: str) -> Iterator[Block]:
     yield sentence(
         f"{{}}: T_exec from {{}} {nouns(measurements, 'measurement')} at {{}} {nouns(sizes, 'payload')}, {{}}.",
         Code(result.profile.name),
-        count_value(measurements, "measurements", at="/measurements"),
+        count_value(measurements, "measurements"),
         count_value(sizes),
         Code(source),
     )
@@ -145,18 +143,15 @@ def _by_payload(payloads: Sequence[PayloadFit], *, measured: bool) -> Table:
     shown = {**_COLUMNS, **(_MEASURED_COLUMNS if measured else {})}
     if not any(fit.left_out for fit in payloads):
         del shown["left_out"]
-    rows = (
-        TableRow(tuple(_cell(getattr(fit, key), key, f"/payloads/{number}/{key}") for key in shown))
-        for number, fit in enumerate(payloads)
-    )
+    rows = (TableRow(tuple(_cell(getattr(fit, key), key) for key in shown)) for fit in payloads)
     return Table(tuple(shown.values()), tuple(rows))
 
 
-def _cell(value: float | None, key: str, at: str) -> Cell:
+def _cell(value: float | None, key: str) -> Cell:
     """A time has three decimals; further ones are rounding."""
     if value is None:
         return ""
-    return time_value(value, key, at=at)._replace(fixed=True) if key.endswith("_us") else count_value(value, key, at=at)
+    return time_value(value, key)._replace(fixed=True) if key.endswith("_us") else count_value(value, key)
 
 
 def calibration_warnings(result: Calibration) -> list[str]:
@@ -183,7 +178,6 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         way=result.way,
         form=result.execution.kind,
         method=result.method,
-        robust=result.robust,
         measurements=result.measurements,
         execution=execution_keys(result),
         uncertainty_us=result.uncertainty_us,
@@ -191,7 +185,6 @@ def calibration_document(result: Calibration, *, source: str, applied_to: str | 
         rms_residual_us=result.rms_residual_us,
         largest_residual=result.largest._asdict(),
         outliers=[one._asdict() for one in result.outliers],
-        outliers_kept=result.outliers_kept,
         worst_extra_us=result.worst_extra_us,
         unchecked_bytes=list(result.unchecked_bytes),
         payloads=calibration_records(result),

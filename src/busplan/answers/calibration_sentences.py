@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from busplan.analysis.calibration.calibrate import Calibration
+from busplan.analysis.calibration.calibrate import Calibration, Outlier
 from busplan.analysis.calibration.outliers import PAYLOADS_TO_COMPARE, REPETITIONS_TO_COMPARE
 from busplan.analysis.network import bus_of, network_of
 from busplan.forms.blocks import Sentence, ShownValue, count_value, joined, sentence
@@ -19,9 +19,9 @@ _LONG_EXECUTION_US: Final = 10_000.0
 """Longer than the execution time of any motion node: the latencies are probably in ns."""
 
 
-def time_value(value_us: float, key: str, *, at: str = "") -> ShownValue:
+def time_value(value_us: float, key: str) -> ShownValue:
     """A time of a calibration."""
-    return ShownValue(value_us, key, "us", _DECIMALS, at=at)
+    return ShownValue(value_us, key, "us", _DECIMALS)
 
 
 def fit_sentences(result: Calibration) -> Iterator[Sentence]:
@@ -64,55 +64,47 @@ def _way(result: Calibration) -> Sentence:
 def _form(result: Calibration) -> Sentence:
     execution = result.execution
     if execution.kind == "linear":
-        meaning = "all measurements" if result.method == "least squares" else "the median at each payload"
-        if result.outliers and not result.outliers_kept:
-            meaning += ", without the outliers"
+        without = ", without the outliers" if result.outliers else ""
         return sentence(
-            f"Line: {{}} + {{}} * payload, by {result.method} through {meaning}.",
-            ShownValue(execution.base_us, "base_us", "us", digits=_LINE_DIGITS, at="/execution/base_us"),
-            ShownValue(
-                execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS, at="/execution/per_byte_us"
-            ),
+            f"Line: {{}} + {{}} * payload, by {result.method} through the median at each payload{without}.",
+            ShownValue(execution.base_us, "base_us", "us", digits=_LINE_DIGITS),
+            ShownValue(execution.per_byte_us, "per_byte_us", "us/byte", digits=_LINE_DIGITS),
         )
     return sentence(f"Table: the {result.method} at each payload, {execution.range_bytes}.")
 
 
 def _residual(result: Calibration) -> Sentence:
-    one, at = result.largest, "/largest_residual"
+    one = result.largest
     said = sentence(
         "Measured less fitted: rms {}, largest {}",
-        time_value(result.rms_residual_us, "rms_residual_us", at="/rms_residual_us"),
-        time_value(one.residual_us, "residual_us", at=f"{at}/residual_us"),
+        time_value(result.rms_residual_us, "rms_residual_us"),
+        time_value(one.residual_us, "residual_us"),
     )
     if one.residual_us:
         place = sentence(
-            " at {} (line {})",
-            ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
-            count_value(one.line, "line", at=f"{at}/line"),
+            " at {} (line {})", ShownValue(one.payload_bytes, "payload_bytes", "bytes"), count_value(one.line, "line")
         )
         said = joined(said, place, by="")
-    repeated = [(fit.deviation_us, at) for at, fit in enumerate(result.payloads) if fit.deviation_us is not None]
+    repeated = [fit.deviation_us for fit in result.payloads if fit.deviation_us is not None]
     if not repeated:
         return joined(said, sentence("."), by="")
-    most_us, number = max(repeated)
-    scatter = time_value(most_us, "deviation_us", at=f"/payloads/{number}/deviation_us")
+    scatter = time_value(max(repeated), "deviation_us")
     return joined(said, sentence(". Repetitions scatter by {} at most (standard deviation).", scatter), by="")
 
 
 def _unexplained(result: Calibration) -> Iterator[Sentence]:
     model = f"the {result.timing_model} timing model"
-    halves = [(fit.unexplained_us, at) for at, fit in enumerate(result.payloads) if fit.unexplained_us is not None]
+    halves = [(fit.unexplained_us, fit) for fit in result.payloads if fit.unexplained_us is not None]
     if halves:
         mean_us = sum(value for value, _ in halves) / len(halves)
-        worst_us, number = max(halves, key=lambda pair: abs(pair[0]))
-        fit, at = result.payloads[number], f"/payloads/{number}"
+        worst_us, fit = max(halves, key=lambda pair: abs(pair[0]))
         share = worst_us / (fit.request_and_acknowledge_us or 1)
         yield sentence(
             f"Left unexplained by {model}: {{}} of T1+T2 on average, {{}} at most ({{}} of the measured, at {{}}).",
             time_value(mean_us, "unexplained_us"),
-            time_value(worst_us, "unexplained_us", at=f"{at}/unexplained_us"),
+            time_value(worst_us, "unexplained_us"),
             ShownValue(share, "", "%", 0, fixed=True),
-            ShownValue(fit.payload_bytes, "payload_bytes", "bytes", at=f"{at}/payload_bytes"),
+            ShownValue(fit.payload_bytes, "payload_bytes", "bytes"),
         )
     kinds = [abs(fit.read_less_write_us) for fit in result.payloads if fit.read_less_write_us is not None]
     if kinds:
@@ -139,7 +131,7 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
         yield sentence(
             "the bus waits {} before any response, so a shorter execution cannot be told from a latency: T_exec is "
             f"at most that at {', '.join(str(fit.payload_bytes) for fit in short)} bytes.",
-            time_value(result.at_most_us, "at_most_us", at="/at_most_us"),
+            time_value(result.at_most_us, "at_most_us"),
         )
     longest_us = max(fit.execution_us for fit in result.payloads)
     if longest_us > _LONG_EXECUTION_US:
@@ -149,42 +141,39 @@ def warning_sentences(result: Calibration) -> Iterator[Sentence]:
         )
 
 
-def slow_and_fast(result: Calibration) -> tuple[list[int], list[int]]:
-    """Places of the outliers that are slow executions, and of those that the others contradict."""
-    slow = [place for place, one in enumerate(result.outliers) if one.off_us > 0]
-    return slow, [place for place in range(len(result.outliers)) if place not in slow]
+def slow_and_fast(result: Calibration) -> tuple[list[Outlier], list[Outlier]]:
+    """The outliers that are slow executions, and those that the others contradict."""
+    slow = [one for one in result.outliers if one.off_us > 0]
+    return slow, [one for one in result.outliers if one.off_us <= 0]
 
 
 def _outliers(result: Calibration) -> Iterator[Sentence]:
     """Name the slow executions, and the measurements that the others contradict."""
-    for places, word in zip(slow_and_fast(result), ("slow", "fast"), strict=True):
-        if not places:
+    for outliers, word in zip(slow_and_fast(result), ("slow", "fast"), strict=True):
+        if not outliers:
             continue
         said = joined(
-            sentence(f"{{}} {word} {nouns(len(places), 'measurement')}: ", count_value(len(places))),
-            joined(*(_outlier(result, place) for place in places[:_MOST_LINES]), by=", "),
+            sentence(f"{{}} {word} {nouns(len(outliers), 'measurement')}: ", count_value(len(outliers))),
+            joined(*(_outlier(one) for one in outliers[:_MOST_LINES]), by=", "),
             by="",
         )
-        if len(places) > _MOST_LINES:
-            said = joined(said, sentence("and {} more", count_value(len(places) - _MOST_LINES)))
+        if len(outliers) > _MOST_LINES:
+            said = joined(said, sentence("and {} more", count_value(len(outliers) - _MOST_LINES)))
         yield joined(said, _effect(result, word), by="")
 
 
 def _effect(result: Calibration, word: str) -> Sentence:
-    if result.outliers_kept:
-        return sentence("; in the fit by --keep-outliers, so that the grade is assumed.")
     if word == "fast":
-        return sentence("; left out of the fit; measure again, or use --keep-outliers where they are real.")
-    worst = time_value(result.worst_extra_us or 0.0, "worst_extra_us", at="/worst_extra_us")
+        return sentence("; left out of the fit; measure again.")
+    worst = time_value(result.worst_extra_us or 0.0, "worst_extra_us")
     return sentence("; not in the fit: the slowest execution takes {} more, worst_extra_us.", worst)
 
 
-def _outlier(result: Calibration, at: int) -> Sentence:
-    one = result.outliers[at]
+def _outlier(one: Outlier) -> Sentence:
     return sentence(
         "line {} ({} at {}: T_exec {} off what the others say)",
-        count_value(one.line, "line", at=f"/outliers/{at}/line"),
-        ShownValue(one.latency_us, "latency_us", "us", at=f"/outliers/{at}/latency_us"),
-        ShownValue(one.payload_bytes, "payload_bytes", "bytes", at=f"/outliers/{at}/payload_bytes"),
-        time_value(one.off_us, "off_us", at=f"/outliers/{at}/off_us")._replace(signed=True, decimals=1),
+        count_value(one.line, "line"),
+        ShownValue(one.latency_us, "latency_us", "us"),
+        ShownValue(one.payload_bytes, "payload_bytes", "bytes"),
+        time_value(one.off_us, "off_us")._replace(signed=True, decimals=1),
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from itertools import accumulate
 from typing import Final
 
 from busplan.analysis.capacity.certainty import FITS
@@ -12,7 +11,7 @@ from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, leading_model, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
-from busplan.answers.verdict import places_of, uncertainty_parts, verdict_sentences, warnings
+from busplan.answers.verdict import uncertainty_parts, verdict_sentences, warnings
 from busplan.buses import figure
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
@@ -50,10 +49,7 @@ def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
 
 def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
     """Verdict of each period, and the figures of all, the timing models side by side."""
-    said = []
-    for number, (figures, verdict, start) in enumerate(zip(result.periods, verdicts, _starts(result), strict=False)):
-        places = places_of(figures, start=start, change=number)
-        said.append(list(verdict_sentences(verdict, result.profile, places=places)))
+    said = [list(verdict_sentences(verdict, result.profile)) for verdict in verdicts]
     yield from said[0] if len(said) == 1 else _of_all(said)
     yield capacity_table(result)
     if result.profile.group:
@@ -69,11 +65,6 @@ def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
     yield from (one for one in said[0] if sentence_text(one) in common)
 
 
-def _starts(result: Capacity) -> Iterator[int]:
-    """Index in `results` of each period's first set of figures."""
-    return accumulate(map(len, result.periods), initial=0)
-
-
 def capacity_table(result: Capacity) -> Table:
     """Figures of all periods, the timing models side by side; what does not decide is detail.
 
@@ -86,8 +77,8 @@ def capacity_table(result: Capacity) -> Table:
     setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network_of(profile))),) if words)
     caption = sentence(
         "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + setup,
-        count_value(first.nodes, "nodes", at="/results/0/nodes"),
-        count_value(first.axes, "axes", at="/results/0/axes"),
+        count_value(first.nodes, "nodes"),
+        count_value(first.axes, "axes"),
     )
     owners = list(_owners(result))
     shown = {*_DECIDES, *(term.key for one in result.results for term in one.terms if term.us)}
@@ -103,12 +94,12 @@ def capacity_table(result: Capacity) -> Table:
 def _owners(result: Capacity) -> Iterator[Owner]:
     """A column for each period and timing model, the profile's own model first."""
     leading, deciding = leading_model(result.profile), bus_of(result.profile).deciding_model
-    for figures, start in zip(result.periods, _starts(result), strict=False):
+    for figures in result.periods:
         several = len(result.periods) > 1
         group = period(figures[0].period_us) if several else ""
-        for number, one in sorted(enumerate(figures), key=lambda numbered: numbered[1].timing_model != leading):
+        for one in sorted(figures, key=lambda each: each.timing_model != leading):
             rank = 1 if several and len(figures) > 1 and one.timing_model != deciding else 0
-            yield Owner(TableColumn(one.timing_model, group=group, rank=rank), one, f"/results/{start + number}")
+            yield Owner(TableColumn(one.timing_model, group=group, rank=rank), one)
 
 
 def _state(key: Figure, one: CapacityFigures) -> State:
@@ -143,15 +134,9 @@ def groups_table(result: Capacity) -> Table:
         )
     rows = []
     for place, group in enumerate(result.results[0].groups):
-        at = f"/results/0/groups/{place}"
-        cells: list[Cell] = [
-            Code(group.name),
-            count_value(group.nodes, "nodes", at=f"{at}/nodes"),
-            count_value(group.axes, "axes", at=f"{at}/axes"),
-        ]
+        cells: list[Cell] = [Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes")]
         for number, keys in shown:
-            at = f"/results/{number}/groups/{place}"
-            cells += (attribute_value(key, result.results[number].groups[place], at=at) for key in keys)
+            cells += (attribute_value(key, result.results[number].groups[place]) for key in keys)
         rows.append(TableRow(tuple(cells)))
     return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
 

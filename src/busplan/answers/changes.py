@@ -28,25 +28,18 @@ _CONTEXT: Final = 8
 
 def change_table(keys: Iterable[KeyDifference]) -> Table:
     """One row for each key: its values in A and B, with a note if a value is a default."""
-    rows = (
-        (
-            Code(one.key),
-            _cell(one.key, one.a, one.b, at=f"/changes/{number}/a"),
-            _cell(one.key, one.b, one.a, at=f"/changes/{number}/b"),
-        )
-        for number, one in enumerate(keys)
-    )
+    rows = ((Code(one.key), _cell(one.key, one.a, one.b), _cell(one.key, one.b, one.a)) for one in keys)
     return Table(_COLUMNS, tuple(map(TableRow, rows)))
 
 
-def _cell(key: str, value: KeyValue | None, other: KeyValue | None, *, at: str) -> Cell:
+def _cell(key: str, value: KeyValue | None, other: KeyValue | None) -> Cell:
     """One side of a difference; the other side decides which part or how many digits of a long value are shown."""
     if value is None:
         return MISSING
     own, beside = value.value, None if other is None else other.value
     shown: ShownValue | Code
     if isinstance(own, int | float) and not isinstance(own, bool):
-        shown = ShownValue(own, key, at=at)
+        shown = ShownValue(own, key)
         if (
             own != beside
             and isinstance(beside, int | float)

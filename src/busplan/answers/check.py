@@ -38,9 +38,9 @@ def summary_sentence(report: CheckReport) -> Sentence:
     summary = sentence(
         f"checked {{}} {nouns(checked, 'profile')}: {{}} {nouns(counts.errors, 'error')}, "
         f"{{}} {nouns(counts.warnings, 'warning')}",
-        count_value(checked, "files", at="" if failed else "/summary/files"),
-        count_value(counts.errors, "errors", at="/summary/errors"),
-        count_value(counts.warnings, "warnings", at="/summary/warnings"),
+        count_value(checked, "files"),
+        count_value(counts.errors, "errors"),
+        count_value(counts.warnings, "warnings"),
         state=_state(report),
     )
     if failed:

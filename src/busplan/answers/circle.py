@@ -47,50 +47,35 @@ ACT_TOGETHER: Final = Sentence(
 NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
 
 
-def circle_report(test: CircleTest, *, with_contributions: bool) -> Report:
-    """Report of `circle-test`.
-
-    Parameters
-    ----------
-    test
-        The circle test.
-    with_contributions
-        If True, the document ranks the error sources.
-    """
+def circle_report(test: CircleTest) -> Report:
+    """Report of `circle-test`."""
     return Report(
         Sentence(("Circle test of ", Code(test.profile.name))),
-        lambda: tuple(_blocks(test, with_contributions=with_contributions)),
-        partial(circle_document, test, with_contributions=with_contributions),
-        lambda: with_profile(test.profile.name, circle_records(test, with_contributions=with_contributions)),
+        lambda: tuple(_blocks(test)),
+        partial(circle_document, test),
+        lambda: with_profile(test.profile.name, circle_records(test)),
     )
 
 
-def _blocks(test: CircleTest, *, with_contributions: bool) -> Iterator[Block]:
+def _blocks(test: CircleTest) -> Iterator[Block]:
     """Verdict of each period, the periods side by side, and the error sources of each circle."""
-    places = [f"/results/{number}" for number in range(len(test.results))]
-    for result, at in zip(test.results, places, strict=True):
-        yield from circle_sentences(test.profile, result, at=at, with_contributions=with_contributions)
+    for result in test.results:
+        yield from circle_sentences(test.profile, result)
     simulated = (result for result in test.results if result.stable is not None)
     yield from servo_sentence(test.profile, next(simulated, test.results[0]))
     yield circle_table(test.results)
-    ranked = [
-        result.contributions for result in test.results if with_contributions and result.contributions is not None
-    ]
-    if with_contributions:
-        yield from (
-            contributions_table(one, at=at) for one, at in zip(test.results, places, strict=True) if one.contributions
-        )
-    if ranked:
-        yield ACT_TOGETHER if any(ranked) else NO_SOURCES
-    for result, run, at in zip(test.results, test.runs, places, strict=True):
+    if test.with_contributions:
+        ranked = [result for result in test.results if result.contributions is not None]
+        yield from (contributions_table(one) for one in ranked if one.contributions)
+        if ranked:
+            yield ACT_TOGETHER if any(one.contributions for one in ranked) else NO_SOURCES
+    for result, run in zip(test.results, test.runs, strict=True):
         # A cycle that does not fit has no circle; the verdict says why.
         if result.stable is not None:
-            yield circle_drawing(drawn_profile(run), result, test.profile, at=at)
+            yield circle_drawing(drawn_profile(run), result, test.profile)
 
 
-def circle_drawing(
-    contour: ContourProfile | None, result: CircleFigures, profile: Profile, *, at: str
-) -> Chart | Sentence:
+def circle_drawing(contour: ContourProfile | None, result: CircleFigures, profile: Profile) -> Chart | Sentence:
     """The circle with its error magnified, or the reason why it is not drawn.
 
     Parameters
@@ -101,56 +86,37 @@ def circle_drawing(
         The circle test at one period.
     profile
         The network and its tolerances.
-    at
-        JSON pointer to its figures.
     """
     if contour is None:
-        return Sentence(("Not drawn: ", *failure_words(result, at=at).parts, "."))
-    chart = circle_chart(contour, result, profile, at=at)
-    return chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result, at=at))
+        return Sentence(("Not drawn: ", *failure_words(result).parts, "."))
+    chart = circle_chart(contour, result, profile)
+    return chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result))
 
 
-def circle_table(results: Sequence[CircleFigures], *, start: int = 0) -> Table:
-    """Figures of the circle test, the periods side by side.
-
-    Parameters
-    ----------
-    results
-        The circle test at each period.
-    start
-        Index of the first one in the document's results.
-    """
-    owners = [
-        Owner(TableColumn(period(result.period_us)), result, f"/results/{start + number}")
-        for number, result in enumerate(results)
-    ]
+def circle_table(results: Sequence[CircleFigures]) -> Table:
+    """Figures of the circle test, the periods side by side."""
+    owners = [Owner(TableColumn(period(result.period_us)), result) for result in results]
     of_host = () if any(result.loop == "host" for result in results) else _OF_HOST
     hidden = of_host if any(result.jitter_us for result in results) else (*of_host, JITTER.key)
     rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN if key not in hidden)
     return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
 
 
-def contributions_table(result: CircleFigures, *, at: str) -> Table:
+def contributions_table(result: CircleFigures) -> Table:
     """The error sources, ranked, each with a bar on a common scale.
 
     Parameters
     ----------
     result
         The circle test at one period, with contributions.
-    at
-        JSON pointer to its figures.
     """
     ranked = result.contributions or ()
     removed = [one.removed_mm for one in ranked]
     least, most = min((0.0, *removed)), max((0.0, *removed))
     rows = []
-    for number, one in enumerate(ranked):
-        place = f"{at}/contributions/{number}"
-        takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True, at=f"{place}/removed_mm")
-        left = (
-            attribute_value(CIRCLE_BY_KEY[key], one, at=place)
-            for key in ("max_contour_error_mm", "circular_deviation_mm")
-        )
+    for one in ranked:
+        takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True)
+        left = (attribute_value(CIRCLE_BY_KEY[key], one) for key in ("max_contour_error_mm", "circular_deviation_mm"))
         rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
     columns = (
         TableColumn("source", kind="words"),
@@ -161,14 +127,12 @@ def contributions_table(result: CircleFigures, *, at: str) -> Table:
     )
     caption = sentence(
         "Each error source removed in turn at {} and {}; what it takes from the largest contour error",
-        *setup_values(result, at=at),
+        *setup_values(result),
     )
     return Table(columns, tuple(rows), caption)
 
 
-def circle_chart(
-    contour: ContourProfile, result: CircleFigures, profile: Profile, *, at: str = "/results/0"
-) -> Chart | None:
+def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profile) -> Chart | None:
     """The circle with its error magnified; None if there is no error to show.
 
     Parameters
@@ -179,8 +143,6 @@ def circle_chart(
         The circle test at one period.
     profile
         The network and its tolerances.
-    at
-        JSON pointer to its figures.
     """
     tolerance_mm = profile.tolerance.max_contour_error_mm
     drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm, direction=profile.circle.direction)
@@ -188,10 +150,10 @@ def circle_chart(
     if scale is None:
         return None
     part = "at constant speed" if result.path == "trapezoid" else "on the turn"
-    setup = setup_values(result, at=at)
+    setup = setup_values(result)
     caption = sentence(f"Contour error {part}, at {{}} and {{}}", *setup)
     if result.max_contour_error_mm is not None:
-        largest = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], result, at=at)
+        largest = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], result)
         caption = sentence(f"The contour error {part} is {{}} or less, at {{}} and {{}}", largest, *setup)
     tolerance = ShownValue(tolerance_mm, "max_contour_error_mm", "um")
     limit = (
@@ -210,7 +172,7 @@ def circle_chart(
     return Chart(drawing, caption, joined(magnified, limit, by=""))
 
 
-def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record]:
+def circle_records(test: CircleTest) -> list[Record]:
     """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
     sources = sorted({one.source for result in test.results for one in result.contributions or ()})
     records = []
@@ -220,13 +182,13 @@ def circle_records(test: CircleTest, *, with_contributions: bool) -> list[Record
         record |= {"centre_offset_x_mm": offset[0], "centre_offset_y_mm": offset[1]}
         record["failures"] = [failure.name for failure in result.failures]
         removed = {one.source: one.removed_mm for one in record.pop("contributions") or ()}
-        if with_contributions:
+        if test.with_contributions:
             record |= {f"removed_{source}_mm": removed.get(source) for source in sources}
         records.append(record)
     return records
 
 
-def circle_document(test: CircleTest, *, with_contributions: bool) -> JsonDocument:
+def circle_document(test: CircleTest) -> JsonDocument:
     """Document of `busplan circle-test --format json`."""
     results = []
     for result in test.results:
@@ -234,7 +196,7 @@ def circle_document(test: CircleTest, *, with_contributions: bool) -> JsonDocume
         record["failures"] = [failure.document() for failure in result.failures]
         record["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
         ranked = record.pop("contributions")
-        if with_contributions:
+        if test.with_contributions:
             record["contributions"] = None if ranked is None else [one._asdict() for one in ranked]
         results.append(record)
     return document("circle-test", profile=test.profile.name, results=results)

@@ -98,7 +98,7 @@ def headline(found: KindComparison) -> Sentence:
     return sentence(
         f"{{}} at {{}}: shown to fit on {{}} of {{}} {nouns(of, 'kind')} of bus{where}.",
         Code(found.profile.name),
-        period_value(found.profile.cycle.period_us, at="/period_us"),
+        period_value(found.profile.cycle.period_us),
         count_value(len(carrying)),
         count_value(of),
         state=state_of(carrying),
@@ -107,23 +107,23 @@ def headline(found: KindComparison) -> Sentence:
 
 def _best(found: KindComparison) -> Iterator[Sentence]:
     """Say which kind has the smallest period, and which the most axes, of those whose host's time is known."""
-    placed = [(number, one) for number, one in enumerate(found.kinds) if isinstance(one, MachineOnKind)]
-    ranked = [(number, one) for number, one in placed if not one.assumed_host]
-    shortest = [(one.smallest.us, number, one) for number, one in ranked if one.smallest.us is not None]
+    ranked = [one for one in found.compared if not one.assumed_host]
+    shortest = [(one.smallest.us, one) for one in ranked if one.smallest.us is not None]
     if shortest:
-        us, number, one = min(shortest, key=lambda each: each[:2])
-        value = ShownValue(us, "smallest_period_us", "us", 3, at=f"/buses/{number}/smallest_period_us")
+        us, one = min(shortest, key=lambda each: each[0])
+        value = ShownValue(us, "smallest_period_us", "us", 3)
         yield sentence(f"The smallest period is {{}} on {bus_of(one.profile).title}.", value)
-    most = [(one.safe.axes, -number, one) for number, one in ranked if one.safe.axes]
+    most = [(one.safe.axes, one) for one in ranked if one.safe.axes]
     if most:
-        axes, number, one = max(most, key=lambda each: each[:2])
-        value = count_value(axes, SAFE_AXES.key, at=f"/buses/{-number}/{SAFE_AXES.key}")
+        axes, one = max(most, key=lambda each: each[0])
         yield sentence(
             f"The most axes at {{}} are {{}} on {bus_of(one.profile).title}.",
-            period_value(found.profile.cycle.period_us, at="/period_us"),
-            value,
+            period_value(found.profile.cycle.period_us),
+            count_value(axes, SAFE_AXES.key),
         )
-    unranked = [f"{bus_of(one.profile).title} ({_words(one.assumed_host)})" for _, one in placed if one.assumed_host]
+    unranked = [
+        f"{bus_of(one.profile).title} ({_words(one.assumed_host)})" for one in found.compared if one.assumed_host
+    ]
     if unranked:
         words = f"Not ranked, for the host's own time is assumed there: {listed(unranked, 'and')}."
         yield Sentence((words,), "warns")
@@ -158,14 +158,12 @@ def kinds_table(found: KindComparison) -> Table:
         The comparison.
     """
     columns = (*_COLUMNS, *(_CIRCLE if found.with_circle else ()))
-    rows = (_row(found, number, columns=len(columns)) for number in range(len(found.kinds)))
-    caption = "The machine on each kind of bus"
-    at = " and its circle at the smallest period" if found.with_circle else ""
-    return Table(columns, tuple(rows), Sentence((f"{caption}{at}",)))
+    rows = (_row(one, columns=len(columns), with_circle=found.with_circle) for one in found.kinds)
+    circle = " and its circle at the smallest period" if found.with_circle else ""
+    return Table(columns, tuple(rows), Sentence((f"The machine on each kind of bus{circle}",)))
 
 
-def _row(found: KindComparison, number: int, *, columns: int) -> TableRow:
-    one, at = found.kinds[number], f"/buses/{number}"
+def _row(one: MachineOnKind | NotOnKind, *, columns: int, with_circle: bool) -> TableRow:
     if isinstance(one, NotOnKind):
         empty = (ShownValue(None),) * (columns - 2)
         return TableRow((kind_named(one.kind).title, Words("not compared", "warns"), *empty))
@@ -173,17 +171,14 @@ def _row(found: KindComparison, number: int, *, columns: int) -> TableRow:
     cells: tuple[Cell, ...] = (
         f"{bus_of(one.profile).title}{', as it is' if one.is_own else ''}",
         _verdict(one),
-        *(
-            ShownValue(getattr(figures, key), key, "us", 3, at=f"{at}/{key}")
-            for key in ("margin_corrected_us", "uncertainty_us")
-        ),
+        *(ShownValue(getattr(figures, key), key, "us", 3) for key in ("margin_corrected_us", "uncertainty_us")),
         bus_of(one.profile).term_label(figures.binding_term),
-        ShownValue(one.smallest.us, "smallest_period_us", "us", 3, at=f"{at}/smallest_period_us"),
-        ShownValue(one.safe.axes, SAFE_AXES.key, at=f"{at}/{SAFE_AXES.key}"),
+        ShownValue(one.smallest.us, "smallest_period_us", "us", 3),
+        ShownValue(one.safe.axes, SAFE_AXES.key),
         one.safe.limited_by,
         _assumed(one),
     )
-    return TableRow((*cells, *(_circle(one, at=at) if found.with_circle else ())))
+    return TableRow((*cells, *(_circle(one) if with_circle else ())))
 
 
 def _verdict(one: MachineOnKind) -> Words:
@@ -195,10 +190,10 @@ def _verdict(one: MachineOnKind) -> Words:
     return Words(f"{figures.verdict}{unsafe}{refused}", state_of(is_well))
 
 
-def _circle(one: MachineOnKind, *, at: str) -> tuple[Cell, ...]:
+def _circle(one: MachineOnKind) -> tuple[Cell, ...]:
     if one.circle is None:
         return Words("NOT RUN", "warns"), ShownValue(None, "step_us", "us")
-    step = ShownValue(one.circle.step_us, "step_us", "us", 3, at=f"{at}/circle/step_us")
+    step = ShownValue(one.circle.step_us, "step_us", "us", 3)
     if one.circle.figures is None:
         return Words("NOT RUN", "warns"), step
     return _CIRCLE_WORDS[one.circle.figures.passed], step

@@ -119,26 +119,23 @@ def _blocks(found: Difference, arguments: Arguments) -> Iterator[Block]:
     if hidden > 0:
         yield sentence(f"And {{}} more {nouns(hidden, 'key')}.", count_value(hidden))
     # If one side has no circle, a note says why, and its figures need no rows.
-    shown = [
-        (at, one) for at, one in enumerate(found.figures) if one.judgement != "neutral" or None not in (one.a, one.b)
-    ]
-    if any(one.judgement != "same" for _, one in shown):
-        yield Table(_FIGURES, tuple(_row(one, f"/figures/{at}") for at, one in shown), heads=3)
-    same = len(named([one for _, one in shown if one.judgement == "same"], found))
+    shown = [one for one in found.figures if one.judgement != "neutral" or None not in (one.a, one.b)]
+    if any(one.judgement != "same" for one in shown):
+        yield Table(_FIGURES, tuple(map(_row, shown)), heads=3)
+    same = len(named([one for one in shown if one.judgement == "same"], found))
     if same:
         are = "is" if same == 1 else "are"
         yield sentence(f"{{}} {nouns(same, 'figure')} {are} the same.", count_value(same))
 
 
 def _sides(found: Difference, arguments: Arguments) -> Table:
-    period = next(at for at, one in enumerate(found.figures) if one.figure.key == PERIOD.key)
     rows = (
         TableRow(
             (
                 side,
                 Code(argument),
                 Code(profile.name),
-                figure_value(PERIOD, profile.cycle.period_us, at=f"/figures/{period}/{side.lower()}"),
+                figure_value(PERIOD, profile.cycle.period_us),
                 profile.bus.timing_model,
             )
         )
@@ -177,12 +174,10 @@ def _graded(words: str, a: str | None, b: str | None) -> Iterator[Sentence]:
         yield sentence(f"The {words} {text}.", state="warns" if "assumed" in text else "neutral")
 
 
-def _row(one: ComparedFigure, at: str) -> TableRow:
+def _row(one: ComparedFigure) -> TableRow:
     figure = one.figure
-    a, b, difference = (figure_value(figure, getattr(one, key), at=f"{at}/{key}") for key in ("a", "b", "difference"))
-    relative = ShownValue(
-        one.relative_difference, "relative_difference", "%", 1, signed=True, at=f"{at}/relative_difference"
-    )
+    a, b, difference = (figure_value(figure, getattr(one, key)) for key in ("a", "b", "difference"))
+    relative = ShownValue(one.relative_difference, "relative_difference", "%", 1, signed=True)
     judged = Words(one.judgement, STATES[one.judgement])
     cells = (figure.label, one.part, b.unit, a, b, difference._replace(signed=True), relative, judged)
     return TableRow(cells, is_detail=one.judgement == "same")

@@ -30,7 +30,6 @@ _DECIMALS: Final = {"mm": 6, "1": 4, "bytes": 0, "bits": 0}
 _MICROSECOND_DECIMALS: Final = 3
 _RESIDUAL_DECIMALS: Final = 4
 
-_Numbered = tuple[int, Comparison]
 """A comparison with its index in the document's figures."""
 
 
@@ -114,26 +113,22 @@ def evidence_document(kinds: Sequence[KindEvidence]) -> JsonDocument:
 
 
 def _kinds(kinds: Sequence[KindEvidence]) -> Iterator[Block]:
-    start = 0
     for one in kinds:
         yield from evidence_sentence(kind_named(one.kind))
-        yield from _sections(one.sections, start=start)
-        start += sum(len(section.comparisons) for section in one.sections)
+        yield from _sections(one.sections)
 
 
-def _sections(sections: Sequence[EvidenceSection], *, start: int = 0) -> Iterator[Chapter]:
+def _sections(sections: Sequence[EvidenceSection]) -> Iterator[Chapter]:
     for section in sections:
-        numbered = list(enumerate(section.comparisons, start=start))
-        yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(numbered)))
-        start += len(numbered)
+        yield Chapter(Sentence((section.title,)), (Sentence((section.note,)), _table(section.comparisons)))
 
 
-def _table(comparisons: Sequence[_Numbered]) -> Table:
-    methods = list(dict.fromkeys(one.method for _, one in comparisons))
-    is_weighed = any(one.uncertainty is not None for _, one in comparisons)
-    rows: dict[str, dict[str, _Numbered]] = {}
-    for at, one in comparisons:
-        rows.setdefault(one.quantity, {})[one.method] = at, one
+def _table(comparisons: Sequence[Comparison]) -> Table:
+    methods = list(dict.fromkeys(one.method for one in comparisons))
+    is_weighed = any(one.uncertainty is not None for one in comparisons)
+    rows: dict[str, dict[str, Comparison]] = {}
+    for one in comparisons:
+        rows.setdefault(one.quantity, {})[one.method] = one
     columns = (
         *(
             TableColumn("figure", kind="words", wraps=True),
@@ -156,34 +151,22 @@ def _table(comparisons: Sequence[_Numbered]) -> Table:
     return Table(columns, tuple(each), heads=3)
 
 
-def _row(by_method: dict[str, _Numbered], methods: Sequence[str], *, is_weighed: bool) -> TableRow:
-    at, first = next(iter(by_method.values()))
-    published = ShownValue(first.published, "published", first.unit, digits=_DIGITS, at=f"/figures/{at}/published")
+def _row(by_method: dict[str, Comparison], methods: Sequence[str], *, is_weighed: bool) -> TableRow:
+    first = next(iter(by_method.values()))
+    published = ShownValue(first.published, "published", first.unit, digits=_DIGITS)
     compared = (cell for method in methods for cell in _compared(by_method.get(method), is_weighed=is_weighed))
     return TableRow((first.quantity, first.unit, published, "" if first.published is None else first.grade, *compared))
 
 
-def _compared(numbered: _Numbered | None, *, is_weighed: bool) -> tuple[Cell, ...]:
-    if numbered is None:
+def _compared(one: Comparison | None, *, is_weighed: bool) -> tuple[Cell, ...]:
+    if one is None:
         return ("",) * (3 + is_weighed)
-    at, one = numbered
     decimals = _DECIMALS.get(one.unit, _MICROSECOND_DECIMALS)
-    place = f"/figures/{at}"
-    doubt = ShownValue(one.uncertainty, "uncertainty", one.unit, decimals, at=f"{place}/uncertainty", fixed=True)
+    doubt = ShownValue(one.uncertainty, "uncertainty", one.unit, decimals, fixed=True)
     # Smaller values are rounding of the printed figure.
     return (
-        ShownValue(one.computed, "computed", one.unit, decimals, at=f"{place}/computed", fixed=True),
+        ShownValue(one.computed, "computed", one.unit, decimals, fixed=True),
         *((doubt,) if is_weighed else ()),
-        ShownValue(
-            one.residual,
-            "residual",
-            one.unit,
-            max(decimals, _RESIDUAL_DECIMALS),
-            signed=True,
-            at=f"{place}/residual",
-            fixed=True,
-        ),
-        ShownValue(
-            one.relative_residual, "relative_residual", "%", 1, signed=True, at=f"{place}/relative_residual", fixed=True
-        ),
+        ShownValue(one.residual, "residual", one.unit, max(decimals, _RESIDUAL_DECIMALS), signed=True, fixed=True),
+        ShownValue(one.relative_residual, "relative_residual", "%", 1, signed=True, fixed=True),
     )

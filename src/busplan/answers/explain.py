@@ -53,7 +53,7 @@ def explain_report(explanation: Explanation) -> Report:
     name = found.profile.name
     return Report(
         Sentence(("Where ", Code(found.derivations[0].figure.key), " of ", Code(name), " comes from")),
-        lambda: [_section(one, name, f"/derivations/{at}") for at, one in enumerate(found.derivations)],
+        lambda: [_section(one, name) for one in found.derivations],
         partial(_explain_document, found),
         lambda: with_profile(name, [record for one in found.derivations for record in _step_records(one)]),
     )
@@ -125,35 +125,32 @@ def _step_records(one: Derivation) -> Iterator[Record]:
         }
 
 
-def _section(one: Derivation, profile: str, at: str) -> Chapter:
+def _section(one: Derivation, profile: str) -> Chapter:
     """The result, its meaning, every step to it, and the inputs."""
     figure = one.figure
     kind = f"{one.transaction}, " if one.transaction else ""
     title = Sentence(
         (
-            *(Code(figure.key), " of ", Code(profile), " at ", period_value(one.period_us, at=f"{at}/period_us")),
-            *(f", {kind}{one.timing_model} model: ", *_result_parts(one, at)),
+            *(Code(figure.key), " of ", Code(profile), " at ", period_value(one.period_us)),
+            *(f", {kind}{one.timing_model} model: ", *_result_parts(one)),
         )
     )
     about = Sentence((f"{figure.meaning[:1].upper()}{figure.meaning[1:]}; {figure.reference}.",))
-    steps = Calculation(tuple(_step(step, f"{at}/steps/{number}") for number, step in enumerate(one.steps)))
-    found: tuple[Block, ...] = (about, steps, _inputs(one, f"{at}/inputs"))
+    steps = Calculation(tuple(map(_step, one.steps)))
+    found: tuple[Block, ...] = (about, steps, _inputs(one))
     return Chapter(title, found)
 
 
-def _result_parts(one: Derivation, at: str) -> tuple[Part, ...]:
+def _result_parts(one: Derivation) -> tuple[Part, ...]:
     """The result in a sentence: one figure, or the keys that a change sets."""
     if isinstance(one.value, dict) and "changes" in one.value:
-        settings = (
-            Sentence((Code(key), " = ", ShownValue(new, key, at=f"{at}/value/changes/{key}")))
-            for key, new in one.value["changes"].items()
-        )
+        settings = (Sentence((Code(key), " = ", ShownValue(new, key))) for key, new in one.value["changes"].items())
         return joined(*settings, by=", ").parts
-    found = _result(one.value, one.figure.key, one.figure.unit, at=f"{at}/value")
+    found = _result(one.value, one.figure.key, one.figure.unit)
     return (found if isinstance(found, ShownValue) else found.text,)
 
 
-def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Words:
+def _result(value: object, key: str, unit: str) -> ShownValue | Words:
     if value is None or value in ([], {}):
         return _NONE
     if isinstance(value, dict) and "text" in value:
@@ -164,7 +161,7 @@ def _result(value: object, key: str, unit: str, *, at: str) -> ShownValue | Word
     if isinstance(value, list) and _has_names(value):
         names = (next(one[key] for key in _NAMING if key in one) for one in value)
         return Words(", ".join(names))
-    return ShownValue(value, key, unit, digits=DIGITS, at=at)
+    return ShownValue(value, key, unit, digits=DIGITS)
 
 
 def _has_names(value: object) -> bool:
@@ -172,18 +169,16 @@ def _has_names(value: object) -> bool:
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(one, dict) for one in value))
 
 
-def _step(step: Step, at: str) -> blocks.CalculationStep:
+def _step(step: Step) -> blocks.CalculationStep:
     """A line in symbols and one in numbers; a line that repeats its neighbour is left out."""
-    result = _result(step.value, step.key, step.unit, at=f"{at}/value")
+    result = _result(step.value, step.key, step.unit)
     said = figure_text(result) if isinstance(result, ShownValue) else result.text
     formula = "" if step.formula == step.symbol else step.formula
     numbers = "" if step.numbers in (formula, short(step.value), said) else step.numbers
     return blocks.CalculationStep(step.reference, step.symbol, formula, numbers, result)
 
 
-def _inputs(one: Derivation, at: str) -> Table:
-    rows = (
-        TableRow((Code(given.symbol), *input_cells(given, f"{at}/{number}"))) for number, given in enumerate(one.inputs)
-    )
+def _inputs(one: Derivation) -> Table:
+    rows = (TableRow((Code(given.symbol), *input_cells(given))) for given in one.inputs)
     caption = Sentence((f"It starts from these; the least well known is {one.weakest_grade}.",))
     return Table((_SYMBOL, *INPUT_COLUMNS), tuple(rows), caption, stacks=True)

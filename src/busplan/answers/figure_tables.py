@@ -16,8 +16,6 @@ class Owner(NamedTuple):
     column: TableColumn
     figures: object
     """Object that has the figures as attributes."""
-    at: str
-    """JSON pointer to it."""
 
 
 def figure_table(
@@ -58,5 +56,5 @@ def figure_table(
 
 
 def _value(figure: Figure, owner: Owner, state: Callable[[Figure, Any], State]) -> ShownValue:
-    found, own = attribute_value(figure, owner.figures, at=owner.at), state(figure, owner.figures)
+    found, own = attribute_value(figure, owner.figures), state(figure, owner.figures)
     return found if own == "neutral" else found._replace(state=own)

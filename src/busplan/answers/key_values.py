@@ -10,7 +10,7 @@ NewValues = Mapping[str, BusValue]
 """New values of a profile by dotted key."""
 
 
-def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: str, quotes: bool = True) -> Sentence:
+def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], quotes: bool = True) -> Sentence:
     """Write each key with its new value and its meaning.
 
     Parameters
@@ -19,27 +19,25 @@ def settings_sentence(changes: NewValues, *, meanings: Mapping[str, str], at: st
         The new values.
     meanings
         Note on a change, by key, for keys that need one.
-    at
-        JSON pointer to the changes; empty if they are not in the document.
     quotes
         If True, text values are quoted, as in a profile.
     """
     return joined(
         *(
-            Sentence((f"{key} = ", *_part(key, value, at, quotes), f" ({meanings[key]})" if key in meanings else ""))
+            Sentence((f"{key} = ", *_part(key, value, quotes), f" ({meanings[key]})" if key in meanings else ""))
             for key, value in changes.items()
         ),
         by=", ",
     )
 
 
-def key_value(key: str, value: object, *, at: str) -> ShownValue:
+def key_value(key: str, value: object) -> ShownValue:
     """The new value of one key, with its place in the JSON document."""
-    return ShownValue(value, key, at=f"{at}/{key}" if at else "")
+    return ShownValue(value, key)
 
 
-def _part(key: str, value: object, at: str, quotes: bool) -> tuple[Part, ...]:
+def _part(key: str, value: object, quotes: bool) -> tuple[Part, ...]:
     if isinstance(value, list):
         return (value_text(value),)
-    found = key_value(key, value, at=at)
+    found = key_value(key, value)
     return ('"', found, '"') if quotes and isinstance(value, str) else (found,)

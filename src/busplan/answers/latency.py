@@ -22,48 +22,42 @@ from busplan.forms.blocks import (
     TableRow,
     attribute_value,
 )
-from busplan.sections.profile import Profile
 
 
-def latency_report(result: LatencyResult, profile: Profile) -> Report:
+def latency_report(result: LatencyResult) -> Report:
     """Report of `latency`."""
     return Report(
-        Sentence(("Latency of ", Code(result.profile))),
-        lambda: tuple(_blocks(result, profile)),
+        Sentence(("Latency of ", Code(result.profile.name))),
+        lambda: tuple(_blocks(result)),
         partial(latency_document, result),
-        lambda: with_profile(result.profile, latency_records(result)),
+        lambda: with_profile(result.profile.name, latency_records(result)),
     )
 
 
-def _blocks(result: LatencyResult, profile: Profile) -> Iterator[Block]:
+def _blocks(result: LatencyResult) -> Iterator[Block]:
     """Phases of each transaction, the timing models side by side; one table for each payload."""
-    network = network_of(profile)
-    yield from latency_tables(result, profile)
-    yield Sentence(
-        (
-            Code(result.profile),
-            f": {bus_of(profile).latency_subject(network)}.",
-        )
-    )
+    profile, network = result.profile, network_of(result.profile)
+    yield from latency_tables(result)
+    yield Sentence((Code(profile.name), f": {bus_of(profile).latency_subject(network)}."))
     yield from not_applicable(profile)
     yield from execution_sentence(profile, of_latency=True)
-    yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result, profile))
+    yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result))
     yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
 
 
-def latency_tables(result: LatencyResult, profile: Profile) -> Iterator[Table]:
+def latency_tables(result: LatencyResult) -> Iterator[Table]:
     """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
-    bus = bus_of(profile)
+    bus = bus_of(result.profile)
     figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
     figures = tuple(figure for figure in figures if all(figure.key in one.phases for one in result.transactions))
-    subject = bus.latency_subject(network_of(profile))
+    subject = bus.latency_subject(network_of(result.profile))
     if bus.has_many_transactions:
         yield from _by_transaction(result, figures, subject)
         return
     rows = [(figure, 0) for figure in figures]
     caption = Sentence((f"Phases in us, {subject}",))
     for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
-        owners = [Owner(_column(one), one.phases, f"/transactions/{place}") for _, place, one in group]
+        owners = [Owner(_column(one), one.phases) for _, one in group]
         yield figure_table(rows, owners, caption=caption, unit=False)
 
 
@@ -71,23 +65,23 @@ def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: s
     """One row for each transaction; one table for each payload and timing model."""
     columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
     tables: dict[tuple[int, str], list[TableRow]] = {}
-    for number, place, one in _numbered(result.transactions):
-        values = (attribute_value(figure, one.phases, at=f"/transactions/{place}") for figure in figures)
+    for number, one in _numbered(result.transactions):
+        values = (attribute_value(figure, one.phases) for figure in figures)
         tables.setdefault((number, one.timing_model), []).append(TableRow((_name(one), *values)))
     for (_, model), rows in tables.items():
         yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
 
 
-def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, int, Transaction]]:
-    """Each transaction with the number of its table and its index; a repeated one begins a new table."""
+def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, Transaction]]:
+    """Each transaction with the number of its table; a repeated one begins a new table."""
     seen: set[tuple[str, str, str]] = set()
     number = 0
-    for place, one in enumerate(transactions):
+    for one in transactions:
         key = (one.timing_model, one.transaction, one.group)
         if key in seen:
             number, seen = number + 1, set()
         seen.add(key)
-        yield number, place, one
+        yield number, one
 
 
 def _column(one: Transaction) -> TableColumn:
@@ -100,10 +94,11 @@ def _name(one: Transaction) -> str:
     return " ".join(filter(None, (one.group, one.transaction, payload)))
 
 
-def _over(result: LatencyResult, profile: Profile) -> list[str]:
+def _over(result: LatencyResult) -> list[str]:
     """Limits of the bus that the profile breaks with any of the payloads asked for, or with its own."""
-    networks = [network_of(with_payload(profile, size)) for size in result.payloads_bytes] or [network_of(profile)]
-    broken = (limit.words(network) for network in networks for limit in bus_of(profile).broken(network))
+    networks = [network_of(with_payload(result.profile, size)) for size in result.payloads_bytes]
+    networks = networks or [network_of(result.profile)]
+    broken = (limit.words(network) for network in networks for limit in bus_of(result.profile).broken(network))
     return list(dict.fromkeys(broken))
 
 
@@ -123,4 +118,4 @@ def _record(transaction: Transaction, *, has_groups: bool) -> Record:
 
 def latency_document(result: LatencyResult) -> JsonDocument:
     """Document of `busplan latency --format json`."""
-    return document("latency", profile=result.profile, transactions=latency_records(result))
+    return document("latency", profile=result.profile.name, transactions=latency_records(result))

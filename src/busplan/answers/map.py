@@ -103,14 +103,14 @@ def regions_table(found: TradeOff) -> Table:
         TableColumn("limited by", kind="words", wraps=True),
         TableColumn("settings"),
     )
-    rows = (_region_row(found, number, one) for number, one in enumerate(found.regions))
+    rows = (_region_row(found, one) for one in found.regions)
     return Table(columns, tuple(rows), Sentence(("What limits each region",)))
 
 
-def _region_row(found: TradeOff, number: int, one: Region) -> TableRow:
+def _region_row(found: TradeOff, one: Region) -> TableRow:
     look = looks_of(found)[one.state, one.limited_by]
     name = Swatch(look.ink, look.mark, state_words(one.state, found))
-    cells = count_value(one.cells, "cells", at=f"/regions/{number}/cells")
+    cells = count_value(one.cells, "cells")
     return TableRow((name, limit_words(one, found.profile), cells))
 
 

@@ -12,7 +12,7 @@ from busplan.forms.numbers import nouns
 from busplan.sections.profile import Profile
 
 
-def next_bottleneck_sentence(found: NextBottleneck, profile: Profile, *, at: str = "") -> Sentence:
+def next_bottleneck_sentence(found: NextBottleneck, profile: Profile) -> Sentence:
     """Say what binds once the largest term, or the limit of the nodes, is gone.
 
     Parameters
@@ -21,12 +21,10 @@ def next_bottleneck_sentence(found: NextBottleneck, profile: Profile, *, at: str
         The bottlenecks.
     profile
         The network.
-    at
-        JSON pointer to them.
     """
     term, behind = (_term(one, profile) for one in (found.binding_term, found.next_binding_term))
     term_us, behind_us, margin_us = (
-        ShownValue(us, key, "us", 3, at=f"{at}/{key}")
+        ShownValue(us, key, "us", 3)
         for us, key in (
             (found.binding_term.us, "binding_term_us"),
             (found.next_binding_term.us, "next_binding_term_us"),
@@ -39,18 +37,18 @@ def next_bottleneck_sentence(found: NextBottleneck, profile: Profile, *, at: str
     else:
         text = f"Next bottleneck: behind {term}, {{}}, which no key takes away, comes {behind}, {{}}"
         of_term = sentence(text, term_us, behind_us)
-    limits = (_limit(one, at=f"{at}/groups/{place}" if one.group else at) for place, one in enumerate(found.limits))
+    limits = map(_limit, found.limits)
     return joined(joined(of_term, *limits, by="; "), Sentence((".",)), by="")
 
 
-def _limit(found: NextLimit, *, at: str) -> Sentence:
+def _limit(found: NextLimit) -> Sentence:
     """Say what limits the nodes, or those of a group, now and next."""
     of = f" of {found.group}" if found.group else ""
     return sentence(
         f"without the limit of {found.limited_by}, now at {{}} {nouns(found.safe_nodes, 'node')}{of}, the next limit "
         f"is {found.next_limited_by}, at {{}} {nouns(found.next_safe_nodes, 'node')}",
-        count_value(found.safe_nodes, SAFE_NODES.key, at=f"{at}/{SAFE_NODES.key}"),
-        count_value(found.next_safe_nodes, "next_safe_nodes", at=f"{at}/next_safe_nodes"),
+        count_value(found.safe_nodes, SAFE_NODES.key),
+        count_value(found.next_safe_nodes, "next_safe_nodes"),
     )
 
 

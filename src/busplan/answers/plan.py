@@ -35,37 +35,29 @@ from busplan.sections.profile import Profile
 from busplan.sections.transactions import TRANSACTION_KINDS
 
 
-def plan_report(plan: Plan, *, with_circle: bool) -> Report:
-    """Report of `plan`.
-
-    Parameters
-    ----------
-    plan
-        The plan.
-    with_circle
-        Whether the circle test was run.
-    """
+def plan_report(plan: Plan) -> Report:
+    """Report of `plan`."""
     return Report(
         Sentence(("Plan of ", Code(plan.profile.name))),
-        lambda: tuple(_blocks(plan, with_circle=with_circle)),
+        lambda: tuple(_blocks(plan)),
         partial(plan_document, plan),
         lambda: with_profile(plan.profile.name, plan_records(plan)),
     )
 
 
-def _blocks(plan: Plan, *, with_circle: bool) -> Iterator[Block]:
+def _blocks(plan: Plan) -> Iterator[Block]:
     """The recommendation, or what stands in its way; a row for each step of the search, and what could be reached."""
-    yield _headline(plan, with_circle=with_circle)
-    yield from (_relaxed(plan, number, one) for number, one in enumerate(plan.relaxations))
+    yield _headline(plan)
+    yield from (_relaxed(plan, one) for one in plan.relaxations)
     yield from _warnings(plan)
     yield options_table(plan)
     mark = "" if plan.recommended is None else "* recommended. "
     yield Sentence((f"{mark}'Held by' is what keeps a row from passing, or its value from being better.",))
     if not all(option.proven for option in plan.options):
         yield Sentence(("? not proven: the search for a period was cut short (--max-circles).",))
-    for number, one in enumerate(plan.impossible):
+    for one in plan.impossible:
         proven = "" if one.proven else " (not proven: the search was cut short, --max-circles)"
-        reason = ShownValue(one.reason, "reason", at=f"/impossible/{number}/reason")
+        reason = ShownValue(one.reason, "reason")
         yield sentence(f"{one.title.capitalize()}: none, {{}}{proven}.", reason)
 
 
@@ -84,29 +76,28 @@ def settings(profile: Profile, changes: NewValues) -> str:
     return sentence_text(_settings(profile, changes))
 
 
-def _settings(profile: Profile, changes: NewValues, *, at: str = "") -> Sentence:
+def _settings(profile: Profile, changes: NewValues) -> Sentence:
     # The number of nodes is the goal here, so the note on a second bus does not apply.
     meanings = {key: words for key, words in bus_of(profile).change_meanings.items() if key != "bus.nodes"}
-    return settings_sentence(changes, meanings=meanings, at=at)
+    return settings_sentence(changes, meanings=meanings)
 
 
-def _headline(plan: Plan, *, with_circle: bool) -> Sentence:
+def _headline(plan: Plan) -> Sentence:
     option, subject = plan.recommended, _goal(plan)
     if option is None or plan.binding is not None:
-        why = ShownValue("" if plan.binding is None else plan.binding.why, "why", at="/binding/why")
+        why = ShownValue("" if plan.binding is None else plan.binding.why, "why")
         none = Words("NO PLAN", "fails")
         return Sentence((*subject, ": ", none, f". No change of {_freed(plan)} is enough: ", why, "."), "fails")
     judged = plan.goal.tolerance.judges_contour
-    circle = (" and passes the circle" if judged else ", and its circle is not judged") if with_circle else ""
-    number = plan.options.index(option)
-    margin = margin_parts(option.deciding, at=f"/options/{number}")
+    circle = (" and passes the circle" if judged else ", and its circle is not judged") if plan.with_circle else ""
+    margin = margin_parts(option.deciding)
     result = (Words("fits", "passes"), " with a margin of ", *margin, f"{circle}.")
     if not option.changes:
         return Sentence((*subject, ": nothing to change; it ", *result), "passes")
     first = (
         "" if plan.period_is_kept else f"the period must change, for no change of {_freed(plan, PERIOD)} is enough: "
     )
-    changes = _settings(plan.goal, option.changes, at="/recommended_changes")
+    changes = _settings(plan.goal, option.changes)
     return Sentence((*subject, f": {first}set ", *changes.parts, "; then it ", *result), "passes")
 
 
@@ -118,12 +109,11 @@ def _freed(plan: Plan, before: str | None = None) -> str:
     return listed(labels, "and") if labels else "anything else"
 
 
-def _relaxed(plan: Plan, number: int, one: Relaxation) -> Sentence:
+def _relaxed(plan: Plan, one: Relaxation) -> Sentence:
     """Say what would be enough, and what to set then."""
-    at = f"/relaxations/{number}"
-    changes = _settings(plan.goal, one.changes, at=f"{at}/changes").parts if one.changes else ("nothing to change",)
+    changes = _settings(plan.goal, one.changes).parts if one.changes else ("nothing to change",)
     if one.value is not None:
-        value = ShownValue(one.value, one.relaxed, at=f"{at}/value")
+        value = ShownValue(one.value, one.relaxed)
         return Sentence((f"Enough would be {one.relaxed} = ", value, ": ", *changes, "."))
     what = "leave out the circle" if one.relaxed == CIRCLE else f"free the {_label(plan, one.relaxed)}"
     return Sentence((f"Enough would be to {what}: ", *changes, "."))
@@ -139,10 +129,9 @@ def _goal(plan: Plan) -> tuple[Part, ...]:
     nodes, axes = int(network.nodes), int(network.axes)
     return (
         *(Code(goal.name), " with "),
-        *(figure_value(NODES, nodes, at="/goal/nodes"), f" {nouns(nodes, 'node')} ("),
-        *(figure_value(AXES, axes, at="/goal/axes"), f" {nouns(axes, 'axis')}) at "),
-        # The first option is the goal as it is.
-        period_value(goal.cycle.period_us, at="/options/0/period_us"),
+        *(figure_value(NODES, nodes), f" {nouns(nodes, 'node')} ("),
+        *(figure_value(AXES, axes), f" {nouns(axes, 'axis')}) at "),
+        period_value(goal.cycle.period_us),
     )
 
 

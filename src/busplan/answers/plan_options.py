@@ -35,12 +35,10 @@ def options_table(plan: Plan) -> Table:
         *(TableColumn(heading, "us") for heading in ("margin", "+/-")),
         *(TableColumn(heading, group="safe", rank=1) for heading in ("nodes", "axes")),
     )
-    return Table(
-        columns, tuple(_row(option, at=f"/options/{number}") for number, option in enumerate(plan.options)), heads=2
-    )
+    return Table(columns, tuple(map(_row, plan.options)), heads=2)
 
 
-def _row(option: Option, *, at: str) -> TableRow:
+def _row(option: Option) -> TableRow:
     passed = option.circle_passed
     circle: Cell = MISSING if option.circle_failures is None else "not judged"
     if passed is not None:
@@ -50,27 +48,25 @@ def _row(option: Option, *, at: str) -> TableRow:
     cells: tuple[Cell, ...] = (
         option.title,
         "*" * option.recommended + "?" * (not option.proven),
-        _short(option.profile, option.changes, at=f"{at}/changes"),
+        _short(option.profile, option.changes),
         bus_of(option.profile).term_label(option.deciding.binding_term),
-        ShownValue(option.held_by, "held_by", at=f"{at}/held_by"),
+        ShownValue(option.held_by, "held_by"),
         circle,
-        *option_margin(option, at=at),
-        *(attribute_value(one, option.deciding, at=at) for one in (SAFE_NODES, SAFE_AXES)),
+        *option_margin(option),
+        *(attribute_value(one, option.deciding) for one in (SAFE_NODES, SAFE_AXES)),
     )
     return TableRow(cells, highlighted=option.recommended)
 
 
-def option_margin(option: Option, *, at: str) -> tuple[ShownValue, ShownValue]:
+def option_margin(option: Option) -> tuple[ShownValue, ShownValue]:
     """Margin less the bias, and its uncertainty.
 
     Parameters
     ----------
     option
         The option.
-    at
-        JSON pointer to the option.
     """
-    margin, doubt = (attribute_value(one, option.deciding, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    margin, doubt = (attribute_value(one, option.deciding) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     return margin._replace(state="neutral" if option.deciding.verdict == FITS else "fails"), doubt
 
 
@@ -89,7 +85,7 @@ _SHORT: Final = {
 _BOTH: Final = ("payload.read_bytes", "payload.write_bytes")
 
 
-def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
+def _short(profile: Profile, changes: NewValues) -> Cell:
     """The settings of an option, in a few words."""
     if not changes:
         return MISSING
@@ -99,9 +95,9 @@ def _short(profile: Profile, changes: NewValues, *, at: str) -> Cell:
     words = {**_SHORT, **bus_of(profile).change_words, **({_BOTH[0]: "payload {} bytes"} if alike else {})}
     return joined(
         *(
-            sentence(_counted(words[key], value), _short_value(key, value, at=at))
+            sentence(_counted(words[key], value), _short_value(key, value))
             if key in words
-            else settings_sentence({key: value}, meanings={}, at=at)
+            else settings_sentence({key: value}, meanings={})
             for key, value in shown.items()
         ),
         by=", ",
@@ -113,6 +109,6 @@ def _counted(words: str, value: BusValue) -> str:
     return words.replace(" bytes", " byte").replace(" nodes", " node") if value == 1 else words
 
 
-def _short_value(key: str, value: BusValue, *, at: str) -> ShownValue:
-    found = key_value(key, value, at=at)
+def _short_value(key: str, value: BusValue) -> ShownValue:
+    found = key_value(key, value)
     return found._replace(unit=period_value(float(value)).unit) if key.endswith("_us") else found

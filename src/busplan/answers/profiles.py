@@ -20,7 +20,7 @@ def profiles_report(profiles: Sequence[Profile]) -> Report:
     records = [_record(profile) for profile in profiles]
     return Report(
         Sentence(("Shipped profiles",)),
-        lambda: [_section(record, f"/profiles/{at}") for at, record in enumerate(records)],
+        lambda: list(map(_section, records)),
         lambda: document("profiles", profiles=records),
         lambda: records,
     )
@@ -37,11 +37,11 @@ def _record(profile: Profile) -> Record:
     }
 
 
-def _section(record: Record, at: str) -> Chapter:
+def _section(record: Record) -> Chapter:
     title = sentence(
         f"{{}}: {{}} {nouns(record['nodes'], 'node')} at {{}}, {record['timing_model']} model leads",
         Code(record["name"]),
-        count_value(record["nodes"], "nodes", at=f"{at}/nodes"),
-        period_value(record["period_us"], at=f"{at}/period_us"),
+        count_value(record["nodes"], "nodes"),
+        period_value(record["period_us"]),
     )
     return Chapter(title, (Sentence((record["description"],)),))

@@ -58,21 +58,19 @@ def sensitivity_report(result: Capacity, verdicts: Sequence[Verdict], found: Seq
 
 
 def _of_periods(found: Sequence[Sensitivity]) -> Iterator[Block]:
-    for number, one in enumerate(found):
-        yield from sensitivity_blocks(one, at=f"/verdicts/{number}")
+    for one in found:
+        yield from sensitivity_blocks(one)
 
 
-def sensitivity_blocks(found: Sensitivity, *, at: str) -> Iterator[Block]:
+def sensitivity_blocks(found: Sensitivity) -> Iterator[Block]:
     """What moves the margin at one period.
 
     Parameters
     ----------
     found
         The effects of all changes.
-    at
-        JSON pointer to the verdict of the period.
     """
-    yield sensitivity_table(found, at=at)
+    yield sensitivity_table(found)
     drawn = SensitivityDrawing(found)
     if not drawn.is_empty:
         change = _capital(found.effects[0].change)
@@ -80,25 +78,23 @@ def sensitivity_blocks(found: Sensitivity, *, at: str) -> Iterator[Block]:
         caption = Sentence((f"{change} moves the margin most; {sides}, in us",))
         legend = Sentence(("The red line is where nothing is left of the margin.",)) if drawn.shows_the_end else None
         yield Chart(drawn, caption, legend)
-    yield _headline(found, at=at)
+    yield _headline(found)
     yield from (Sentence((f"{_capital(one.change)}: {one.note}.",)) for one in found.effects if one.note)
-    yield next_bottleneck_sentence(found.next_bottleneck, found.profile, at=f"{at}/next_bottleneck")
+    yield next_bottleneck_sentence(found.next_bottleneck, found.profile)
 
 
-def sensitivity_table(found: Sensitivity, *, at: str) -> Table:
+def sensitivity_table(found: Sensitivity) -> Table:
     """Every change with what it does to the margin, the largest effect first.
 
     Parameters
     ----------
     found
         The effects of all changes.
-    at
-        JSON pointer to the verdict of the period.
     """
     caption = sentence(
         f"What moves the margin of {{}} at {{}}, by the {found.timing_model} model",
-        figure_value(MARGIN_CORRECTED, found.now.margin_corrected_us, at=f"{at}/margin_corrected_us"),
-        period_value(found.profile.cycle.period_us, at=f"{at}/period_us"),
+        figure_value(MARGIN_CORRECTED, found.now.margin_corrected_us),
+        period_value(found.profile.cycle.period_us),
     )
     columns = (
         TableColumn("what changes", kind="words"),
@@ -107,33 +103,31 @@ def sensitivity_table(found: Sensitivity, *, at: str) -> Table:
         TableColumn("then", "us", group="margin"),
         TableColumn("verdict then", kind="words", wraps=True),
     )
-    rows = (
-        TableRow(tuple(_cells(one, found, at=f"{at}/sensitivity/{number}"))) for number, one in enumerate(found.effects)
-    )
+    rows = (TableRow(tuple(_cells(one, found))) for one in found.effects)
     return Table(columns, tuple(rows), caption)
 
 
-def _cells(one: Effect, found: Sensitivity, *, at: str) -> Iterator[Cell]:
+def _cells(one: Effect, found: Sensitivity) -> Iterator[Cell]:
     yield one.change
-    yield _step(one, at=at)
-    yield ShownValue(one.margin_change_us, "margin_change_us", "us", 3, signed=True, at=f"{at}/margin_change_us")
+    yield _step(one)
+    yield ShownValue(one.margin_change_us, "margin_change_us", "us", 3, signed=True)
     then = None if one.then is None else one.then.margin_corrected_us
-    yield figure_value(MARGIN_CORRECTED, then, at=f"{at}/{MARGIN_CORRECTED.key}")
-    yield _verdict(one.then, found.profile, at=f"{at}/{VERDICT.key}")
+    yield figure_value(MARGIN_CORRECTED, then)
+    yield _verdict(one.then, found.profile)
 
 
-def _step(one: Effect, *, at: str) -> Cell:
+def _step(one: Effect) -> Cell:
     """From which value to which; nothing where the change has no single one."""
     if one.before is None or one.after is None:
         return ""
-    before = ShownValue(one.before, one.key, digits=_DIGITS, at=f"{at}/from")
-    after = ShownValue(one.after, one.key, unit_of(one.key), digits=_DIGITS, at=f"{at}/to")
+    before = ShownValue(one.before, one.key, digits=_DIGITS)
+    after = ShownValue(one.after, one.key, unit_of(one.key), digits=_DIGITS)
     return sentence("{} -> {}", before, after)
 
 
-def _verdict(then: Standing | None, profile: Profile, *, at: str) -> Cell:
+def _verdict(then: Standing | None, profile: Profile) -> Cell:
     """The verdict with the limits that are broken, or that the bus is unsafe."""
-    shown = figure_value(VERDICT, None if then is None else then.verdict, at=at)
+    shown = figure_value(VERDICT, None if then is None else then.verdict)
     if then is None:
         return shown
     why = list(limits_behind(then))
@@ -146,7 +140,7 @@ def _is_well(one: Standing) -> bool:
     return one.verdict == FITS and one.safe
 
 
-def _headline(found: Sensitivity, *, at: str) -> Sentence:
+def _headline(found: Sensitivity) -> Sentence:
     """Say which change moves the margin most, and after which ones all is no longer well."""
     first = found.effects[0]
     if not first.margin_change_us:
@@ -154,10 +148,8 @@ def _headline(found: Sensitivity, *, at: str) -> Sentence:
     then = None if first.then is None else first.then.margin_corrected_us
     most = sentence(
         f"{_capital(first.change)} moves the margin most, by {{}} to {{}}.",
-        ShownValue(
-            first.margin_change_us, "margin_change_us", "us", 3, signed=True, at=f"{at}/sensitivity/0/margin_change_us"
-        ),
-        figure_value(MARGIN_CORRECTED, then, at=f"{at}/sensitivity/0/{MARGIN_CORRECTED.key}"),
+        ShownValue(first.margin_change_us, "margin_change_us", "us", 3, signed=True),
+        figure_value(MARGIN_CORRECTED, then),
     )
     return joined(most, *_after_each(found))
 

@@ -37,7 +37,6 @@ from busplan.forms.blocks import (
     joined,
     sentence,
     state_of,
-    with_values,
 )
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import period_value
@@ -74,10 +73,10 @@ def headline(plan: Schedule) -> Sentence:
         f" by the {figures.timing_model} model",
     )
     if figures.verdict is None:
-        return _placed(Sentence((*parts, ", which decides nothing."), state_of(figures.fits and figures.safe)), plan)
+        return Sentence((*parts, ", which decides nothing."), state_of(figures.fits and figures.safe))
     state = state_of(figures.verdict == FITS and figures.safe)
     verdict = figure_value(VERDICT, figures.verdict)._replace(state=state)
-    return _placed(Sentence((*parts, "; verdict: ", verdict, "."), state), plan)
+    return Sentence((*parts, "; verdict: ", verdict, "."), state)
 
 
 def timeline_chart(plan: Schedule) -> Chart:
@@ -93,7 +92,7 @@ def timeline_chart(plan: Schedule) -> Chart:
     legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
     svg = partial(timeline_svg, plan, title=sentence_text(headline(plan)), inline=True)
     picture = OwnPicture(svg, partial(timeline_lines, plan), stylesheet=STYLE)
-    return Chart(picture, _placed(caption, plan), legend)
+    return Chart(picture, caption, legend)
 
 
 def _most(window: Schedule) -> Sentence:
@@ -110,13 +109,9 @@ def _most(window: Schedule) -> Sentence:
 
 def margins_sentence(plan: Schedule) -> Sentence:
     """Say what each timing model leaves of the slice."""
-    bars = model_bars(plan)
     margins = (
-        sentence(
-            f"{{}} by the {one.timing_model} model",
-            figure_value(MARGIN, one.figures.margin_us, at=f"/margins/{number}/{MARGIN.key}"),
-        )
-        for number, one in enumerate(bars)
+        sentence(f"{{}} by the {one.timing_model} model", figure_value(MARGIN, one.figures.margin_us))
+        for one in model_bars(plan)
     )
     return joined(Sentence(("Margin of the slice: ",)), joined(*margins, by=", "), Sentence((".",)), by="")
 
@@ -136,23 +131,15 @@ def totals_table(plan: Schedule) -> Table:
             *(TableColumn("kind", kind="words"), TableColumn("eq", kind="words", rank=1)),
             *(TableColumn(figure.label, figure.column or figure.unit) for figure in _TOTAL_FIGURES),
         ),
-        tuple(_total_row(plan, number, one) for number, one in enumerate(totals(plan))),
+        tuple(_total_row(plan, one) for one in totals(plan)),
         sentence(f"What takes {part}, {{}}", ShownValue(plan.to_us - plan.from_us, "duration_us", "us", 3)),
     )
 
 
-def _total_row(plan: Schedule, number: int, one: Total) -> TableRow:
+def _total_row(plan: Schedule, one: Total) -> TableRow:
     kind = kind_of(plan.profile, one.kind)
-    values = (attribute_value(figure, one, at=f"/totals/{number}") for figure in _TOTAL_FIGURES)
+    values = (attribute_value(figure, one) for figure in _TOTAL_FIGURES)
     return TableRow((Swatch(kind.ink, kind.mark, kind.label), kind.reference, *values))
-
-
-def _placed(one: Sentence, plan: Schedule) -> Sentence:
-    """Add the place of each figure that the document has."""
-    facts = _facts(plan)
-    return with_values(
-        one, lambda value: value._replace(at=f"/{value.key}") if facts.get(value.key) == value.value else value
-    )
 
 
 def _warnings(plan: Schedule) -> list[str]:

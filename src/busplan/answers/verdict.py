@@ -1,6 +1,6 @@
 """The verdict of `capacity` in sentences."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from busplan.analysis.capacity.assumed import heavy_assumptions
@@ -24,7 +24,6 @@ from busplan.buses.figure import (
     UNCERTAINTY,
     UTILISATION,
     VERDICT,
-    Figure,
     by_key,
 )
 from busplan.buses.published import parts_tested
@@ -37,8 +36,8 @@ from busplan.forms.blocks import (
     Sentence,
     ShownValue,
     Words,
+    attribute_value,
     count_value,
-    figure_value,
     joined,
     sentence,
     state_of,
@@ -50,12 +49,8 @@ from busplan.sections.profile import Profile
 if TYPE_CHECKING:
     from busplan.buses.bus import Bus
 
-Places = Mapping[str, str]
-"""JSON pointers: to the figures of each timing model, and to the `verdict` and its `change`."""
-NO_PLACES: Places = {}
 
-
-def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO_PLACES) -> Iterator[Sentence]:
+def verdict_sentences(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
     """Say the verdict, what the bus carries, the advised change, and warnings.
 
     Parameters
@@ -64,29 +59,26 @@ def verdict_sentences(verdict: Verdict, profile: Profile, *, places: Places = NO
         The verdict.
     profile
         The network.
-    places
-        JSON pointers to its figures.
     """
     figures = verdict.deciding
-    at = places.get("verdict", "")
     yield from refused_circle(override(profile, {PERIOD: verdict.period_us}))
     yield from _missed_limits(verdict, profile)
-    yield _headline(verdict, profile, at=at)
+    yield _headline(verdict, profile)
     yield from not_in_it(profile)
     yield from evidence_sentence(bus_of(profile))
-    yield from _other_models(verdict, profile, places)
+    yield from _other_models(verdict, profile)
     yield from reset_sentence(verdict.after_reset, profile)
     if not _broken_limits(figures, profile):
         largest = max(figures.terms, key=lambda term: plain(term.us))
         label = by_key(bus_of(profile).term_figures)[largest.key].label
         yield sentence(
             f"Largest term: {label}, {{}} of {{}}.",
-            ShownValue(largest.us, largest.key, "us", 3, at=_place(places.get(figures.timing_model, ""), largest.key)),
-            figure_value(REQUIRED, figures.required_us, at=_place(at, REQUIRED.key)),
+            ShownValue(largest.us, largest.key, "us", 3),
+            attribute_value(REQUIRED, figures),
         )
-    yield _carries(figures, at=at)
+    yield _carries(figures)
     if verdict.change is not None or not (verdict.all_well and profile.group):
-        yield _advice(verdict, profile, places)
+        yield _advice(verdict, profile)
     yield from _assumed(figures, profile)
     yield from warning_sentences(profile, nodes=figures.nodes, most=figures.safe_nodes or 0)
 
@@ -168,19 +160,15 @@ def execution_grades(profile: Profile) -> str | None:
     return ", ".join(f"{grade} of {' and '.join(each)}" for grade, each in names.items())
 
 
-def _place(at: str, key: str) -> str:
-    return f"{at}/{key}" if at else ""
-
-
-def _headline(verdict: Verdict, profile: Profile, *, at: str) -> Sentence:
+def _headline(verdict: Verdict, profile: Profile) -> Sentence:
     is_more = verdict.deciding.circle_refused_by or verdict.missed_limits
     alone = ", the bus alone: " if is_more else ": "
-    subject = (Code(profile.name), " at ", period_value(verdict.period_us, at=_place(at, "period_us")), alone)
-    parts = (*subject, *verdict_story(verdict.deciding, profile, at=at).parts)
+    subject = (Code(profile.name), " at ", period_value(verdict.period_us), alone)
+    parts = (*subject, *verdict_story(verdict.deciding, profile).parts)
     return Sentence(parts, state_of(verdict.all_well))
 
 
-def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> Sentence:
+def verdict_story(figures: CapacityFigures, profile: Profile) -> Sentence:
     """Say the verdict with its margin, bias, uncertainty and largest doubt.
 
     Parameters
@@ -189,24 +177,21 @@ def verdict_story(figures: CapacityFigures, profile: Profile, *, at: str = "") -
         Figures under the timing model that decides.
     profile
         The network.
-    at
-        JSON pointer to them.
     """
     limits = _broken_limits(figures, profile)
     safe = "" if figures.safe or figures.verdict == DOES_NOT_FIT else f", but with an unsafe {bus_of(profile).safety}"
     why = f", {'; '.join(limits)}" if limits else ""
     state = state_of(figures.verdict == FITS and figures.safe)
-    said = sentence(f"{{}}{{}}{why}.", _figure(VERDICT, figures, at=at)._replace(state=state), Words(safe, state))
+    said = sentence(f"{{}}{{}}{why}.", attribute_value(VERDICT, figures)._replace(state=state), Words(safe, state))
     if limits and figures.verdict == DOES_NOT_FIT:
         return said  # whatever the time is
-    found = [said, _margin(figures, bus_of(profile), at=at)]
+    found = [said, _margin(figures, bus_of(profile))]
     largest = next(iter(uncertainty_parts(figures)), None)
     if largest is not None and largest["share"]:
-        place = f"{at}/uncertainty_parts/0/share" if at else ""
-        share = ShownValue(largest["share"], "share", "%", 0, at=place)
+        share = ShownValue(largest["share"], "share", "%", 0)
         found.append(sentence(f"Largest doubt: {largest['label']}, {{}} of U squared.", share))
     if profile.limits.reserve:
-        reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0, at=_place(at, "reserve"))
+        reserve = ShownValue(profile.limits.reserve, "reserve", "%", 0)
         found.append(sentence("{} of the slice must stay free (limits.reserve).", reserve))
     return joined(*found)
 
@@ -225,22 +210,18 @@ def uncertainty_parts(figures: CapacityFigures) -> list[Record]:
     ]
 
 
-def _margin(figures: CapacityFigures, bus: "Bus", *, at: str) -> Sentence:
+def _margin(figures: CapacityFigures, bus: "Bus") -> Sentence:
     """The margin of {}, as far as it is known."""
-    of = _figure(AVAILABLE, figures, at=at)
-    margin = _figure(MARGIN_CORRECTED, figures, at=at)
-    uncertainty = _figure(UNCERTAINTY, figures, at=at)
+    of = attribute_value(AVAILABLE, figures)
+    margin = attribute_value(MARGIN_CORRECTED, figures)
+    uncertainty = attribute_value(UNCERTAINTY, figures)
     if figures.bias_us is not None:
-        bias = _figure(BIAS, figures, at=at)
+        bias = attribute_value(BIAS, figures)
         return sentence("Margin {} +/- {} of {}, less a bias of {}.", margin, uncertainty, of, bias)
     unknown = f"{bus.model_error}, so no bias"
     if figures.uncertainty_us is not None:
         return sentence(f"Margin {{}} +/- {{}} of {{}}; {unknown} is in it.", margin, uncertainty, of)
     return sentence(f"Margin {{}} of {{}}; {unknown} and no uncertainty are in it.", margin, of)
-
-
-def _figure(figure: Figure, figures: CapacityFigures, *, at: str) -> ShownValue:
-    return figure_value(figure, getattr(figures, figure.key), at=_place(at, figure.key))
 
 
 def _broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
@@ -274,14 +255,13 @@ def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
         yield Sentence((f"Of {kind} {'; '.join(each)}; not tested: {', '.join(found.untested)}.",))
 
 
-def _other_models(verdict: Verdict, profile: Profile, places: Places) -> Iterator[Sentence]:
+def _other_models(verdict: Verdict, profile: Profile) -> Iterator[Sentence]:
     """Say where another timing model contradicts the verdict, and which cannot express the profile."""
     figures = verdict.deciding
     for other in verdict.others:
         if contradicts(other.fits, figures):
-            at = places.get(other.timing_model, "")
-            needed = figure_value(REQUIRED, other.required_us, at=_place(at, REQUIRED.key))
-            available = figure_value(AVAILABLE, other.available_us, at=_place(at, AVAILABLE.key))
+            needed = attribute_value(REQUIRED, other)
+            available = attribute_value(AVAILABLE, other)
             text = f"The {other.timing_model} model says otherwise: {{}} needed of {{}}. It decides nothing."
             yield sentence(text, needed, available, state="warns")
     yield from not_applicable(profile)
@@ -304,7 +284,7 @@ def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[
         yield sentence(text, state="warns")
 
 
-def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[Part, ...]:
+def story(figures: CapacityFigures, profile: Profile) -> tuple[Part, ...]:
     """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
 
     Parameters
@@ -313,21 +293,19 @@ def story(figures: CapacityFigures, profile: Profile, *, at: str = "") -> tuple[
         The figures.
     profile
         The network.
-    at
-        JSON pointer to them.
     """
-    available = _figure(AVAILABLE, figures, at=at)
+    available = attribute_value(AVAILABLE, figures)
     if figures.fits:
-        used = _figure(UTILISATION, figures, at=at)._replace(decimals=1)
-        return sentence("{} to spare, {} of {} used", _figure(MARGIN, figures, at=at), used, available).parts
+        used = attribute_value(UTILISATION, figures)._replace(decimals=1)
+        return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
     short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
     reasons = [Sentence((words,)) for words in _broken_limits(figures, profile)]
     if TIME in figures.exceeded:
-        reasons.append(sentence("{} short, {} needed of {}", short, _figure(REQUIRED, figures, at=at), available))
+        reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
     return joined(*reasons, by=", and ").parts
 
 
-def _carries(figures: CapacityFigures, *, at: str) -> Sentence:
+def _carries(figures: CapacityFigures) -> Sentence:
     safely = "" if figures.safe else " on a bus that is set safely"
     if figures.groups:
         each = (
@@ -337,7 +315,7 @@ def _carries(figures: CapacityFigures, *, at: str) -> Sentence:
         return Sentence((f"Shown to fit{safely}, one group at a time: ", *joined(*each, by=", ").parts, "."))
     return Sentence(
         (
-            *(f"Shown to fit{safely}: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0, at=at).parts),
+            *(f"Shown to fit{safely}: ", *_nodes(figures.safe_nodes or 0, figures.safe_axes or 0).parts),
             f", limited by {figures.safe_limited_by}.",
         )
     )
@@ -347,22 +325,19 @@ def _safe(one: GroupCapacity) -> ShownValue:
     return count_value(one.safe_nodes or 0)
 
 
-def _nodes(nodes: int, axes: int, *, at: str = "") -> Sentence:
+def _nodes(nodes: int, axes: int) -> Sentence:
     return sentence(
         f"{{}} {nouns(nodes, 'node')} ({{}} {nouns(axes, 'axis')})",
-        count_value(nodes, SAFE_NODES.key, at=_place(at, SAFE_NODES.key)),
-        count_value(axes, SAFE_AXES.key, at=_place(at, SAFE_AXES.key)),
+        count_value(nodes, SAFE_NODES.key),
+        count_value(axes, SAFE_AXES.key),
     )
 
 
-def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
+def _advice(verdict: Verdict, profile: Profile) -> Sentence:
     change, figures = verdict.change, verdict.deciding
     if change is None:
         return _no_advice(verdict, profile)
-    at = places.get("change", "")
-    settings = settings_sentence(
-        change.changes, meanings=bus_of(profile).change_meanings, at=_place(at, "changes"), quotes=False
-    ).parts
+    settings = settings_sentence(change.changes, meanings=bus_of(profile).change_meanings, quotes=False).parts
     first = f"{period_must_change(profile)} " if PERIOD in change.changes else ""
     untested = f"; {UNTESTED_CIRCLE}" if change.circle_is_untested else ""
     if change.nodes > figures.nodes:
@@ -378,20 +353,18 @@ def _advice(verdict: Verdict, profile: Profile, places: Places) -> Sentence:
         return Sentence((*way, *carried, untested, "."))
     purpose = "make it fit" if figures.verdict != FITS else "pass `check`" if figures.safe else "make it safe"
     way = (f"{first}Cheapest way to {purpose}: ", *settings, ", which leaves a margin of ")
-    return Sentence((*way, *margin_parts(change.figures, at=at), untested, "."))
+    return Sentence((*way, *margin_parts(change.figures), untested, "."))
 
 
-def margin_parts(figures: CapacityFigures, *, at: str = "") -> tuple[Part, ...]:
+def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
     """A corrected margin with its uncertainty, as far as that is known.
 
     Parameters
     ----------
     figures
         Figures under the timing model that decides.
-    at
-        JSON pointer to them.
     """
-    margin, doubt = (_figure(one, figures, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    margin, doubt = (attribute_value(one, figures) for one in (MARGIN_CORRECTED, UNCERTAINTY))
     return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
 
 
@@ -408,19 +381,3 @@ def _no_advice(verdict: Verdict, profile: Profile) -> Sentence:
     purpose = "carries more nodes" if verdict.all_well else cured
     words = f"No change of {listed(changeable(profile), 'and')} {purpose}: {verdict.no_change}."
     return Sentence((words,), "neutral" if verdict.all_well else "fails")
-
-
-def places_of(results: Sequence[CapacityFigures], *, start: int, change: int) -> dict[str, str]:
-    """JSON pointers to the figures of one period in the document of `capacity`.
-
-    Parameters
-    ----------
-    results
-        Figures of the period, one set for each timing model.
-    start
-        Index of the first one in all results.
-    change
-        Index of the period in the verdicts.
-    """
-    own = {one.timing_model: f"/results/{start + number}" for number, one in enumerate(results)}
-    return {**own, "verdict": f"/verdicts/{change}", "change": f"/verdicts/{change}/cheapest_change"}

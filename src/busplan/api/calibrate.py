@@ -93,8 +93,6 @@ def calibrate(
     form: Literal["table", "linear"] | None = None,
     group: str | None = None,
     timing_model: str | None = None,
-    robust: bool = False,
-    keep_outliers: bool = False,
 ) -> CalibrateAnswer:
     """Find the execution time T_exec of a node from measured latencies.
 
@@ -113,10 +111,6 @@ def calibrate(
         Name of the group of nodes that was measured; by default the one that the profile has.
     timing_model
         Name of the timing model that says what the packets take; by default the one that decides.
-    robust
-        Let no single measurement pull: medians, and the line of Theil and Sen through them.
-    keep_outliers
-        Fit the outliers, too, with the grade assumed.
 
     Returns
     -------
@@ -138,7 +132,7 @@ def calibrate(
     >>> rows = [(4, 48.7), (16, 55.2), (64, 80.9), (256, 184.4)]
     >>> answer = busplan.calibrate("paper-two-node", rows, form="linear")
     >>> round(answer.execution.base_us, 2), round(answer.execution.per_byte_us, 3)
-    (35.9, 0.518)
+    (35.97, 0.516)
     >>> busplan.load_profile("paper-two-node", changes=answer.changes).node.execution.kind
     'linear'
     """
@@ -153,8 +147,6 @@ def calibrate(
         group=group,
         timing_model=None if timing_model is None else checked_models(timing_model, network)[0],
         form=form,
-        robust=robust,
-        keep_outliers=keep_outliers,
         # The shipped example has published figures, so the result is derived.
         grade="derived" if shipped else "measured",
     )

@@ -9,7 +9,6 @@ from busplan.analysis.capacity.verdict import Verdict, verdicts
 from busplan.answers.capacity import capacity_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
-from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.sections.profile import Profile
 
@@ -52,7 +51,6 @@ class CapacityAnswer(Answer):
         return Capacity(self.profile, self.periods)
 
 
-@renamed(periods_us="period_us", timing_models="timing_model")
 def capacity(
     profile: ProfileLike,
     *,

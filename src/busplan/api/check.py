@@ -9,7 +9,6 @@ from busplan.analysis.circle.check import MOST_STEPS
 from busplan.answers.check import check_report, summary_sentence
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, argument, items
-from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.profile.collect import collect
@@ -58,7 +57,6 @@ class CheckAnswer(Answer):
         return CheckReport(self.files)
 
 
-@renamed(with_circle="circle")
 def check(
     paths: ProfileLike | Iterable[ProfileLike], *, circle: bool = True, circle_steps: int = MOST_STEPS
 ) -> CheckAnswer:

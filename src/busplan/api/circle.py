@@ -1,58 +1,33 @@
 """`busplan.circle_test`."""
 
-from dataclasses import dataclass
-
 from busplan.analysis.circle import roundness as analysis
-from busplan.analysis.circle.roundness import CircleFigures, CircleTest
+from busplan.analysis.circle.roundness import CircleTest
 from busplan.answers.circle import circle_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Periods, ProfileLike, load_profile, one_or_several
-from busplan.api.renamed import renamed
 from busplan.drawings.circle_plot import circle_svg
 from busplan.forms.blocks import Report
 from busplan.progress import Progress
-from busplan.sections.profile import Profile
-from busplan.servo.circle import CircleRun
 
 
-@dataclass(frozen=True, slots=True, repr=False, eq=False)
-class CircleTestAnswer(Answer):
-    """Answer of `circle_test`.
+class CircleTestAnswer(Answer, CircleTest):
+    """Answer of `circle_test`: `results` and `runs`, one for each period.
 
-    Parameters
-    ----------
-    profile
-        The network, its servo and its circle.
-    results
-        Figures of each period; those of a simulation that did not run are None.
-    runs
-        Simulation of each period, with its `trace`; None if the cycle does not fit the bus.
-    with_contributions
-        If True, document and report rank the error sources.
+    Figures of a simulation that did not run are None, as is the run of a cycle that does not fit the bus.
     """
 
-    profile: Profile
-    results: tuple[CircleFigures, ...]
-    runs: tuple[CircleRun | None, ...]
-    with_contributions: bool
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether every period holds every tolerance; None if none fails, and the profile has no contour tolerance."""
-        return self._found.passed
+    __slots__ = ()
+    # Traces are arrays, which have no single truth.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     def _report(self) -> Report:
-        return circle_report(self._found, with_contributions=self.with_contributions)
+        return circle_report(self)
 
     def _repr_svg_(self) -> str | None:
-        return circle_svg(self._found) if any(self.runs) else None
-
-    @property
-    def _found(self) -> CircleTest:
-        return CircleTest(self.profile, self.results, self.runs)
+        return circle_svg(self) if any(self.runs) else None
 
 
-@renamed(periods_us="period_us", with_contributions="contributions")
 def circle_test(
     profile: ProfileLike,
     *,
@@ -103,4 +78,4 @@ def circle_test(
         with_contributions=contributions,
         progress=progress,
     )
-    return CircleTestAnswer(*found, with_contributions=contributions)
+    return CircleTestAnswer(*found)

@@ -1,7 +1,6 @@
 """`busplan.compare`."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from busplan.analysis.comparison import kinds as analysis
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind
@@ -12,27 +11,16 @@ from busplan.drawings.compare.svg import compare_svg
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.progress import Progress
-from busplan.sections.profile import Profile
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class CompareAnswer(Answer):
+class CompareAnswer(Answer, KindComparison):
     """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
 
-    Parameters
-    ----------
-    profile
-        The profile.
-    kinds
-        A `MachineOnKind` for each kind of bus, with its `figures` at the profile's period, its `smallest` period and
-        its most `safe` axes; or a `NotOnKind` with the reason.
-    with_circle
-        Whether the circle of each was tested.
+    Each of its `kinds` has `figures` at the profile's period, its `smallest` period and its most `safe` axes, or the
+    reason why it has none.
     """
 
-    profile: Profile
-    kinds: tuple[MachineOnKind | NotOnKind, ...]
-    with_circle: bool
+    __slots__ = ()
 
     def on(self, kind: str) -> MachineOnKind | NotOnKind:
         """The machine on one kind of bus.
@@ -45,18 +33,14 @@ class CompareAnswer(Answer):
         return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
 
     def _svg(self) -> str:
-        require_drawn(self._found)
-        return compare_svg(self._found, title=sentence_text(headline(self._found)))
+        require_drawn(self)
+        return compare_svg(self, title=sentence_text(headline(self)))
 
     def _repr_svg_(self) -> str | None:
-        return self._svg() if self._found.compared else None
+        return self._svg() if self.compared else None
 
     def _report(self) -> Report:
-        return compare_report(self._found)
-
-    @property
-    def _found(self) -> KindComparison:
-        return KindComparison(self.profile, self.kinds, self.with_circle)
+        return compare_report(self)
 
 
 def compare(

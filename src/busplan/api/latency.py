@@ -1,49 +1,28 @@
 """`busplan.latency`."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from busplan.analysis import latency as analysis
-from busplan.analysis.latency import Transaction
+from busplan.analysis.latency import LatencyResult
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.latency import latency_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, load_profile, one_or_several, whole
-from busplan.api.renamed import renamed
 from busplan.forms.blocks import Report
-from busplan.sections.profile import Profile
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class LatencyAnswer(Answer):
-    """Answer of `latency`.
+class LatencyAnswer(Answer, LatencyResult):
+    """Answer of `latency`: `transactions`, one for each payload, kind and timing model, with its `phases`."""
 
-    Parameters
-    ----------
-    profile
-        The network.
-    transactions
-        One for each payload, kind and timing model, nested in this order, with its `phases`.
-    payloads_bytes
-        Payloads asked for [bytes]; empty for the profile's own.
-    """
-
-    profile: Profile
-    transactions: tuple[Transaction, ...]
-    payloads_bytes: tuple[int, ...] = ()
+    __slots__ = ()
 
     def _report(self) -> Report:
-        return latency_report(self._found, self.profile)
+        return latency_report(self)
 
     def _headline(self) -> str:
         return f"{self.profile.name}: {bus_of(self.profile).latency_subject(network_of(self.profile))}"
 
-    @property
-    def _found(self) -> analysis.LatencyResult:
-        return analysis.LatencyResult(self.profile.name, self.transactions, self.payloads_bytes)
 
-
-@renamed(payloads_bytes="payload_bytes", timing_models="timing_model")
 def latency(
     profile: ProfileLike,
     *,
@@ -91,4 +70,4 @@ def latency(
         payloads_bytes=sizes and [whole(size, name="payload_bytes") for size in sizes],
         timing_models=checked_models(timing_model, network),
     )
-    return LatencyAnswer(network, found.transactions, found.payloads_bytes)
+    return LatencyAnswer(*found)

@@ -1,16 +1,13 @@
 """`busplan.map_`."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from busplan.analysis.map import trade_off as analysis
-from busplan.analysis.map.cells import Cell, NotDrawn, Region
 from busplan.analysis.map.direction import Direction, checked_direction
 from busplan.analysis.map.trade_off import TradeOff
 from busplan.answers.map import headline, map_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, load_profile
-from busplan.api.renamed import renamed
 from busplan.api.sweep import axis_values
 from busplan.drawings.map.svg import map_svg
 from busplan.errors import BusplanError
@@ -21,55 +18,18 @@ from busplan.sections.profile import Profile
 Along = Mapping[str, str | Iterable[object]]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class MapAnswer(Answer):
-    """Answer of `map_`: where a design fits, which a notebook draws.
+class MapAnswer(Answer, TradeOff):
+    """Answer of `map_`: where a design fits, which a notebook draws. Its `rows` have cells, or reasons for none."""
 
-    Parameters
-    ----------
-    profile
-        The network.
-    x, y
-        What lies across and what lies up: a key and its values.
-    rows
-        A row for each value of `y`, in it one for each value of `x`: a `Cell`, or a `NotDrawn` with the reason.
-    with_circle
-        Whether the circle of every setting that fits was tested.
-    """
-
-    profile: Profile
-    x: Direction
-    y: Direction
-    rows: tuple[tuple[Cell | NotDrawn, ...], ...]
-    with_circle: bool
-
-    @property
-    def cells(self) -> tuple[Cell, ...]:
-        """Cells of all settings that can exist, row by row."""
-        return self._found.cells
-
-    @property
-    def regions(self) -> tuple[Region, ...]:
-        """How many cells each state and limit has."""
-        return self._found.regions
-
-    @property
-    def own(self) -> Cell | None:
-        """Cell of the profile's own setting; None if it is not on the map."""
-        return self._found.own
+    __slots__ = ()
 
     def _repr_svg_(self) -> str:
-        return map_svg(self._found, title=sentence_text(headline(self._found)))
+        return map_svg(self, title=sentence_text(headline(self)))
 
     def _report(self) -> Report:
-        return map_report(self._found)
-
-    @property
-    def _found(self) -> TradeOff:
-        return TradeOff(self.profile, self.x, self.y, self.rows, self.with_circle)
+        return map_report(self)
 
 
-@renamed(with_circle="circle")
 def map_(
     profile: ProfileLike,
     *,
@@ -131,8 +91,3 @@ def _direction(profile: Profile, along: Along | None, *, name: str, with_circle:
         option=name,
         circle_option=None if with_circle else "circle=True",
     )
-
-
-TradeOffAnswer = MapAnswer
-trade_off = map_
-"""The old names, for one release."""

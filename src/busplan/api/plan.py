@@ -1,92 +1,29 @@
 """`busplan.plan`."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
 
 from busplan.analysis.circle.check import CircleCheck
 from busplan.analysis.planning import plan as analysis
-from busplan.analysis.planning.constraints import Need
 from busplan.analysis.planning.machine import nodes_for_axes
-from busplan.analysis.planning.option import Impossible, Option
 from busplan.analysis.planning.plan import Plan
-from busplan.analysis.planning.relaxations import Relaxation
 from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.answers.plan import plan_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, finite, items, load_profile, plain, whole
-from busplan.api.renamed import renamed
-from busplan.buses.parts import Value
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.sections.profile import Profile
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class PlanAnswer(Answer):
-    """Answer of `plan`.
+class PlanAnswer(Answer, Plan):
+    """Answer of `plan`: the steps of the search with their figures, and the recommended one with its `profile`."""
 
-    Parameters
-    ----------
-    profile
-        The original profile.
-    goal
-        The profile with the wanted values.
-    wanted
-        Wanted values that differ from the profile, by dotted key.
-    free
-        Names of what may be changed, the cheapest first.
-    options
-        The steps of the search, each with its figures, and what the network could reach.
-    impossible
-        Steps that have no suitable value, with the reason.
-    binding
-        The constraint that stands in the way of a plan; None if there is one.
-    relaxations
-        What alone would make a plan possible, with what to set then; empty if there is a plan.
-    with_circle
-        Whether the circle test was run.
-    """
-
-    profile: Profile
-    goal: Profile
-    wanted: dict[str, Value]
-    free: tuple[str, ...]
-    options: tuple[Option, ...]
-    impossible: tuple[Impossible, ...]
-    binding: Need | None
-    relaxations: tuple[Relaxation, ...]
-    with_circle: bool
-
-    @property
-    def recommended(self) -> Option | None:
-        """The recommended option, with its `profile`; None if there is no plan for the goal."""
-        return self._found.recommended
-
-    @property
-    def recommended_changes(self) -> dict[str, Value] | None:
-        """Changes from the original profile to the recommended one; None if there is no plan."""
-        option = self.recommended
-        return None if option is None else self._found.all_changes(option)
+    __slots__ = ()
 
     def _report(self) -> Report:
-        return plan_report(self._found, with_circle=self.with_circle)
-
-    @property
-    def _found(self) -> Plan:
-        return Plan(
-            self.profile,
-            self.goal,
-            self.wanted,
-            self.free,
-            self.options,
-            self.impossible,
-            self.binding,
-            self.relaxations,
-        )
+        return plan_report(self)
 
 
-@renamed(with_circle="circle")
 def plan(
     profile: ProfileLike,
     *,
@@ -170,4 +107,4 @@ def plan(
         circle=CircleCheck() if with_circle else None,
         max_circles=tries,
     )
-    return PlanAnswer(*found, with_circle=with_circle)
+    return PlanAnswer(*found)

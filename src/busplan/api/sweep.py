@@ -20,7 +20,6 @@ from busplan.answers.sweep.top import Tally, TopRows, default_columns, sweep_rep
 from busplan.answers.sweep.writers import rows_writer
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
-from busplan.api.renamed import renamed
 from busplan.drawings.sweep_plot import FigureData, require_drawable
 from busplan.errors import BusplanError
 from busplan.forms import ROWS_ENDINGS, RowsForm
@@ -135,7 +134,6 @@ def _spelled(column: Column) -> Array:
     return words[column.values]
 
 
-@renamed(timing_models="timing_model", with_circle="circle")
 def sweep(
     profile: ProfileLike,
     *,

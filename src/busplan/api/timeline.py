@@ -1,59 +1,29 @@
 """`busplan.timeline`."""
 
-from dataclasses import dataclass
-
-from busplan.analysis.capacity.figures import CapacityFigures
-from busplan.analysis.timeline.schedule import Event, Schedule, Total, schedule, totals, zoom
+from busplan.analysis.timeline.schedule import Schedule, Total, schedule, totals, zoom
 from busplan.answers.timeline import timeline_report
 from busplan.api.answer import Answer
 from busplan.api.inputs import ProfileLike, checked_models, finite, load_profile, whole
 from busplan.drawings.timeline.svg import timeline_svg
 from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
-from busplan.sections.profile import Profile
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class TimelineAnswer(Answer):
-    """Answer of `timeline`.
+class TimelineAnswer(Answer, Schedule):
+    """Answer of `timeline`: the `events` inside the window, and of the whole cycle."""
 
-    Parameters
-    ----------
-    profile
-        The network.
-    figures
-        Capacity of the cycle: time needed, time available, and whether it fits.
-    cycle_events
-        Events of the whole cycle, and the idle rest of its slice.
-    from_us, to_us
-        Start and end of the window [us].
-    """
-
-    profile: Profile
-    figures: CapacityFigures
-    cycle_events: tuple[Event, ...]
-    from_us: float
-    to_us: float
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """Events inside the window, clipped to it."""
-        return self._found.events
+    __slots__ = ()
 
     @property
     def totals(self) -> tuple[Total, ...]:
         """Totals of the events in the window, by kind."""
-        return totals(self._found)
+        return totals(self)
 
     def _report(self) -> Report:
-        return timeline_report(self._found)
+        return timeline_report(self)
 
     def _repr_svg_(self) -> str:
-        return timeline_svg(self._found, title=self._headline())
-
-    @property
-    def _found(self) -> Schedule:
-        return Schedule(self.profile, self.figures, self.cycle_events, self.from_us, self.to_us)
+        return timeline_svg(self, title=self._headline())
 
 
 def timeline(

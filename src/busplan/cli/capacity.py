@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
+from busplan.cli.changes import PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
@@ -18,7 +18,7 @@ from busplan.cli.options import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 
-@takes_changes(NODES, GAP_COUNT)
+@takes_changes()
 def capacity_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,

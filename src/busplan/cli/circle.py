@@ -8,10 +8,7 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.changes import (
-    GAP_COUNT,
-    NODES,
     PeriodsOption,
-    ShortForm,
     load_changed,
     periods_us,
     takes_changes,
@@ -29,37 +26,8 @@ from busplan.profile.changes import NO_CHANGES, KeyChanges
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleTest
 
-_FeedOption = Annotated[
-    float | None,
-    typer.Option(
-        "--feed",
-        metavar="MM_PER_MIN",
-        help="Speed along the circle [mm/min].  [default: the profile's circle.feed_mm_per_min]",
-    ),
-]
-_RadiusOption = Annotated[
-    float | None,
-    typer.Option(
-        "--radius", metavar="MM", help="Radius of the circle [mm].  [default: the profile's circle.radius_mm]"
-    ),
-]
-_SeedOption = Annotated[
-    int | None,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        help="Seed of jitter and lost set-points: the same seed, the same run.  [default: the profile's delivery.seed]",
-    ),
-]
 
-
-@takes_changes(
-    NODES,
-    GAP_COUNT,
-    ShortForm("--feed", "circle.feed_mm_per_min", _FeedOption),
-    ShortForm("--radius", "circle.radius_mm", _RadiusOption),
-    ShortForm("--seed", "delivery.seed", _SeedOption),
-)
+@takes_changes()
 def circle_test_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
@@ -131,7 +99,7 @@ def circle_test_command(
             if plot_file is not None and form is not None:
                 _draw(test, plot_file, changes, form)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
-        give(circle_report(test, with_contributions=contributions))
+        give(circle_report(test))
     if test.passed is False:
         raise PlanFailsError
 

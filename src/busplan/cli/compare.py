@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
@@ -32,8 +32,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
 
 
 @takes_changes(
-    period_form(" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"),
-    NODES,
+    period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
     words="Of the profile, before it is put on other kinds.",
 )
 def compare_command(

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
+from busplan.cli.changes import PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
@@ -37,7 +37,7 @@ def complete_figure(incomplete: str) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
-@takes_changes(NODES, GAP_COUNT)
+@takes_changes()
 def explain_command(
     profile: ProfileArgument,
     figure: Annotated[

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
@@ -19,7 +19,7 @@ from busplan.cli.options import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 
-@takes_changes(NODES, GAP_COUNT)
+@takes_changes()
 def latency_command(
     profile: ProfileArgument,
     payload: Annotated[
@@ -57,4 +57,4 @@ def latency_command(
             payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
             timing_models=timing_models(timing, plan),
         )
-        give(latency_report(result, plan))
+        give(latency_report(result))

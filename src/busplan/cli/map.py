@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
@@ -38,9 +38,7 @@ def _along(option: str, *, default: str) -> typer.models.OptionInfo:
 
 
 @takes_changes(
-    period_form(" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"),
-    NODES,
-    GAP_COUNT,
+    period=" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
     words="Of this design; along a key that varies, it moves the mark.",
 )
 def map_command(

@@ -9,7 +9,7 @@ import typer
 
 from busplan.cli.answering import answer, report_with
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.changes import GAP_COUNT, NODES, RESERVE, period_form, takes_changes
+from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument
 from busplan.cli.output import PlanFailsError, emit_document, say
@@ -29,28 +29,21 @@ _PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
 
 
-_NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
-    ),
-]
-
-
 @takes_changes(
-    NODES._replace(annotation=_NodesOption),
-    period_form(
-        " with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
-        "[default: the profile's cycle.period_us, which may be changed]"
-    ),
-    GAP_COUNT,
-    RESERVE,
-    words="Part of the goal: it is kept, and --apply and -o write it.",
+    "Part of the goal: it is kept, and --apply and -o write it.",
+    period=" with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
+    "[default: the profile's cycle.period_us, which may be changed]",
 )
 def plan_command(
     profile: ProfileArgument,
+    nodes: Annotated[
+        int | None,
+        typer.Option(
+            "--nodes",
+            metavar="N",
+            help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
+        ),
+    ] = None,
     changes: KeyChanges = NO_CHANGES,
     axes: Annotated[
         int | None,
@@ -130,6 +123,8 @@ def plan_command(
 
     Example: busplan plan paper-1ms --axes 16
     """
+    if nodes is not None:
+        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.each))
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
     if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
         raise BusplanError(
@@ -172,7 +167,7 @@ def plan_command(
             _apply(loaded, result)
         elif file is not None:
             say(f"wrote {new}")
-        report = plan_report(result, with_circle=with_circle)
+        report = plan_report(result)
         (partial(_say_report, changes) if piped else give)(report)
     if result.recommended is None:
         raise PlanFailsError

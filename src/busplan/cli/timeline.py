@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     AllOption,
@@ -33,9 +33,7 @@ _ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **PIC
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
-@takes_changes(
-    period_form(" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"), NODES, GAP_COUNT
-)
+@takes_changes(period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]")
 def timeline_command(
     profile: ProfileArgument,
     from_: Annotated[

@@ -1,18 +1,13 @@
 """From measured latencies to the execution time of a node: the inverse of equation (3)."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from math import ceil
+from math import ceil, sqrt
 from statistics import fmean, median, stdev
 from typing import Final, Literal, NamedTuple
 
-from busplan.analysis.calibration.execution_fit import (
-    METHODS,
-    ExecutionForm,
-    Method,
-    fit_execution,
-)
-from busplan.analysis.calibration.outliers import DEVIATION_PER_MAD, Sample, Screening, screen
+from busplan.analysis.calibration.execution_fit import METHODS, ExecutionForm, Method, fit_execution
+from busplan.analysis.calibration.outliers import Sample, Screening, screen
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.parts import Halves, Value
 from busplan.elementwise import plain
@@ -75,10 +70,10 @@ class PayloadFit(NamedTuple):
     payload_bytes: int
     measurements: int
     latency_us: float
-    """T_lant: the mean, or the median of a robust fit."""
+    """T_lant: the median."""
     packets_us: float
     execution_us: float
-    """T_exec: the mean, or the median of a robust fit."""
+    """T_exec: the median."""
     deviation_us: float | None
     """Standard deviation of T_exec over the repetitions; None for a single measurement."""
     range_us: float
@@ -120,8 +115,6 @@ class Calibration(NamedTuple):
     """The measurement farthest from the fit."""
     outliers: tuple[Outlier, ...]
     """Measurements far from the others, slow or fast."""
-    outliers_kept: bool
-    """Whether the outliers are in the fit, because that was asked for."""
     worst_extra_us: float | None
     """What the slowest execution takes beyond the fit; None where no measurement outside the fit is slow."""
     unchecked_bytes: tuple[int, ...]
@@ -132,8 +125,6 @@ class Calibration(NamedTuple):
     """Further keys of [node.execution]: what it was fitted against."""
     at_most_us: float
     """A shorter execution cannot be told from a latency."""
-    robust: bool
-    """Whether the fit is the robust one, which outliers do not influence."""
 
 
 def calibrate(
@@ -144,8 +135,6 @@ def calibrate(
     group: str | None = None,
     timing_model: str | None = None,
     form: ExecutionForm | None = None,
-    robust: bool = False,
-    keep_outliers: bool = False,
     grade: Literal["measured", "derived"] = "measured",
 ) -> Calibration:
     """Find the execution time of a node from measured latencies.
@@ -167,17 +156,12 @@ def calibrate(
     timing_model
         Timing model; by default the one that decides.
     form
-        Form of the execution time; by default the profile's own. A table has the mean at each payload, a line is fitted
-        by least squares to all measurements.
-    robust
-        If True, use the median at each payload, and the Theil-Sen line through these medians: its slope is the median
-        of the slopes between any two payloads, its base the median of the remainders. The line has no tuning constant
-        and tolerates about 29 % of wrong payloads.
-    keep_outliers
-        If True, outliers are in the fit, too; by default they are left out of it, in every form: the slow ones are what
-        the slowest execution takes more, and the others contradict the fast ones.
+        Form of the execution time; by default the profile's own. A table has the median at each payload, a line is that
+        of Theil and Sen through these medians, which has no tuning constant and tolerates about 29 % of wrong payloads.
+        Outliers are in neither: the slow ones are what the slowest execution takes more, and the others contradict the
+        fast ones.
     grade
-        How the execution time is known. It is "assumed" where the fit holds an outlier: no measurement confirms it.
+        How the execution time is known.
 
     Returns
     -------
@@ -204,7 +188,7 @@ def calibrate(
     screening = screen(
         [Sample(one.transaction, one.payload_bytes, one.latency_us, one.latency_us - us) for one, us in raw]
     )
-    left_out = frozenset() if keep_outliers else frozenset(screening.expected_us)
+    left_out = frozenset(screening.expected_us)
     kept = [place for place in range(len(raw)) if place not in left_out]
     if left_out:
         # The smallest payload gives T4 + T5 to all others: that of an outlier would stay in them.
@@ -213,8 +197,7 @@ def calibrate(
     for one, packets_us in (raw[place] for place in kept):
         groups[one.payload_bytes].append(one.latency_us - packets_us)
     chosen = form or nodes.node.execution.kind
-    doubtful = keep_outliers and screening.expected_us
-    fit = fit_execution(groups, chosen, robust=robust, grade="assumed" if doubtful else grade, source=source)
+    fit = fit_execution(groups, chosen, grade=grade, source=source)
     compared = _compared(raw, fit)
     residuals = tuple(_residual(compared[place]) for place in kept)
     outliers = _outliers(compared, screening)
@@ -223,21 +206,19 @@ def calibrate(
         nodes=nodes,
         timing_model=model,
         way=way,
-        method=METHODS[chosen, robust],
+        method=METHODS[chosen],
         execution=fit,
         measurements=len(measurements),
         residuals=residuals,
-        payloads=tuple(_payload_fits(compared, halves, left_out=left_out, robust=robust)),
+        payloads=tuple(_payload_fits(compared, halves, left_out=left_out)),
         rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
         largest=max(residuals, key=lambda one: abs(one.residual_us)),
         outliers=outliers,
-        outliers_kept=keep_outliers,
-        worst_extra_us=None if keep_outliers else _worst_extra_us(outliers, residuals),
+        worst_extra_us=_worst_extra_us(outliers, residuals),
         unchecked_bytes=screening.unchecked_bytes,
-        uncertainty_us=_uncertainty_us(residuals, fit, robust=robust),
+        uncertainty_us=_uncertainty_us(residuals, fit),
         fit_keys=bus_of(profile).fit_keys(network_of(profile), model=model if way == "timing-model" else None),
         at_most_us=max(one.shortest_us for one in halves.values()),
-        robust=robust,
     )
 
 
@@ -303,25 +284,14 @@ def _packets_us(one: Measurement, halves: _Halves, second_us: Mapping[tuple[str,
     return halves[key].latency_us
 
 
-def _uncertainty_us(
-    residuals: Sequence[Residual], fit: LinearExecution | TableExecution, *, robust: bool
-) -> float | None:
+def _uncertainty_us(residuals: Sequence[Residual], fit: LinearExecution | TableExecution) -> float | None:
     """Standard deviation of the measurements about the fit [us]; None where the fit uses all of them up."""
     parameters = len(fit.payload_bytes) if isinstance(fit, TableExecution) else 2
     free = len(residuals) - parameters
     if free <= 0:
         return None
-    if robust:
-        spread_us = DEVIATION_PER_MAD * median(abs(one.residual_us) for one in _telling(residuals, fit))
-    else:
-        spread_us = (sum(one.residual_us**2 for one in residuals) / free) ** 0.5
+    spread_us = sqrt(sum(one.residual_us**2 for one in residuals) / free)
     return round(max(spread_us, float(MEASURED_UNCERTAINTY_US)), 3)
-
-
-def _telling(residuals: Sequence[Residual], fit: LinearExecution | TableExecution) -> list[Residual]:
-    """Those that say how far measurements scatter: in a table, not the only one of a payload."""
-    counts = Counter(one.payload_bytes for one in residuals)
-    return [one for one in residuals if isinstance(fit, LinearExecution) or counts[one.payload_bytes] > 1]
 
 
 def _require_possible(
@@ -431,9 +401,7 @@ def _payload_fits(
     halves: _Halves,
     *,
     left_out: frozenset[int],
-    robust: bool,
 ) -> list[PayloadFit]:
-    middle = median if robust else fmean
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for place, one in enumerate(compared):
         groups[one.measured.payload_bytes].append(place)
@@ -447,19 +415,19 @@ def _payload_fits(
         halves_us = (one.measured.request_and_acknowledge_us for one in group)
         measured_us = [us for us in halves_us if us is not None]
         fitted_us = group[0].fitted_us
-        half_us = middle(measured_us) if measured_us else None
-        model_us = middle([halves[one.measured.transaction, size].request_and_acknowledge_us for one in group])
+        half_us = median(measured_us) if measured_us else None
+        model_us = median([halves[one.measured.transaction, size].request_and_acknowledge_us for one in group])
         return PayloadFit(
             payload_bytes=size,
             measurements=len(places),
-            latency_us=middle([one.measured.latency_us for one in group]),
-            packets_us=middle([one.packets_us for one in group]),
-            execution_us=middle(times_us),
+            latency_us=median([one.measured.latency_us for one in group]),
+            packets_us=median([one.packets_us for one in group]),
+            execution_us=median(times_us),
             deviation_us=stdev(times_us) if len(group) > 1 else None,
             range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),
             fitted_us=fitted_us,
-            residual_us=None if fitted_us is None else round(middle(times_us) - fitted_us, _EXACT_DECIMALS),
-            read_less_write_us=middle(by_kind["read"]) - middle(by_kind["write"]) if all(by_kind.values()) else None,
+            residual_us=None if fitted_us is None else round(median(times_us) - fitted_us, _EXACT_DECIMALS),
+            read_less_write_us=median(by_kind["read"]) - median(by_kind["write"]) if all(by_kind.values()) else None,
             request_and_acknowledge_us=half_us,
             model_request_and_acknowledge_us=model_us,
             unexplained_us=None if half_us is None else half_us - model_us,

@@ -1,25 +1,20 @@
-"""Fit the execution time to measurements: a table or a line, plain or robust."""
+"""Fit the execution time to measurements: a table of medians, or a line through them."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from statistics import fmean, linear_regression, median
+from statistics import median
 from typing import Final, Literal
 
 from busplan.errors import BusplanError
 from busplan.sections.execution import LinearExecution, TableExecution
 
 ExecutionForm = Literal["table", "linear"]
-Method = Literal["mean", "median", "least squares", "Theil-Sen"]
+Method = Literal["median", "Theil-Sen"]
 Groups = Mapping[int, Sequence[float]]
 """T_exec of the measurements at each payload [us]."""
 
-METHODS: Final[Mapping[tuple[ExecutionForm, bool], Method]] = {
-    ("table", False): "mean",
-    ("table", True): "median",
-    ("linear", False): "least squares",
-    ("linear", True): "Theil-Sen",
-}
-"""Fit method by form and robustness."""
+METHODS: Final[Mapping[ExecutionForm, Method]] = {"table": "median", "linear": "Theil-Sen"}
+"""Fit method by form."""
 
 _TIME_DECIMALS: Final = 3
 _PER_BYTE_DECIMALS: Final = 6
@@ -27,7 +22,7 @@ _PER_BYTE_DECIMALS: Final = 6
 
 
 def fit_execution(
-    groups: Groups, form: ExecutionForm, *, robust: bool, grade: Literal["measured", "derived", "assumed"], source: str
+    groups: Groups, form: ExecutionForm, *, grade: Literal["measured", "derived"], source: str
 ) -> LinearExecution | TableExecution:
     """Fit an execution time to T_exec by payload, in whole nanoseconds.
 
@@ -37,8 +32,6 @@ def fit_execution(
         T_exec of the measurements at each payload [us].
     form
         "table" or "linear".
-    robust
-        If True, use the median instead of the mean, and the Theil-Sen line instead of least squares.
     grade
         How the execution time is known.
     source
@@ -50,38 +43,25 @@ def fit_execution(
         A line through one payload, or with a negative part.
     """
     if form == "table":
-        times_us = {size: round(time_us, _TIME_DECIMALS) for size, time_us in middles(groups, robust=robust).items()}
+        times_us = {size: round(time_us, _TIME_DECIMALS) for size, time_us in medians(groups).items()}
         return TableExecution(
             kind="table", payload_bytes=tuple(times_us), time_us=tuple(times_us.values()), grade=grade
         )
     if len(groups) == 1:
         raise BusplanError(f"{source}: all payloads are {min(groups)} bytes: a line needs two, or use --form table")
-    base_us, per_byte_us = theil_sen(groups) if robust else least_squares(groups)
+    base_us, per_byte_us = theil_sen(groups)
     base_us, per_byte_us = round(base_us, _TIME_DECIMALS), round(per_byte_us, _PER_BYTE_DECIMALS)
     if base_us < 0 or per_byte_us < 0:
         line = f"{base_us:g} us + {per_byte_us:g} us/byte * payload"
-        ways = "--form table" if robust else "--form table, or --robust if there are outliers"
-        raise BusplanError(f"{source}: the line is {line}, and no part of an execution time is negative: use {ways}")
+        raise BusplanError(
+            f"{source}: the line is {line}, and no part of an execution time is negative: use --form table"
+        )
     return LinearExecution(kind="linear", base_us=base_us, per_byte_us=per_byte_us, grade=grade)
 
 
-def middles(groups: Groups, *, robust: bool) -> dict[int, float]:
-    """Mean or median at each payload [us], by payload."""
-    middle = median if robust else fmean
-    return {size: middle(groups[size]) for size in sorted(groups)}
-
-
-def least_squares(groups: Groups) -> tuple[float, float]:
-    """Base [us] and slope [us/byte] of the least-squares line through all measurements.
-
-    Examples
-    --------
-    >>> least_squares({4: [40.0, 42.0], 8: [45.0]})
-    (37.0, 1.0)
-    """
-    points = [(size, value) for size, values in groups.items() for value in values]
-    slope, base = linear_regression(*zip(*points, strict=True))
-    return base, slope
+def medians(groups: Groups) -> dict[int, float]:
+    """Median at each payload [us], by payload."""
+    return {size: median(groups[size]) for size in sorted(groups)}
 
 
 def theil_sen(groups: Groups) -> tuple[float, float]:
@@ -98,6 +78,6 @@ def theil_sen(groups: Groups) -> tuple[float, float]:
     >>> theil_sen({4: [40.0], 8: [44.0], 12: [48.0, 48.0, 900.0], 16: [700.0], 20: [56.0]})
     (36.0, 1.0)
     """
-    points = list(middles(groups, robust=True).items())
+    points = list(medians(groups).items())
     slope = median((y2 - y1) / (x2 - x1) for (x1, y1), (x2, y2) in combinations(points, 2))
     return median(y - slope * x for x, y in points), slope

@@ -129,6 +129,8 @@ class CircleTest(NamedTuple):
     profile: Profile
     results: tuple[CircleFigures, ...]
     runs: tuple[CircleRun | None, ...]
+    with_contributions: bool = False
+    """If True, document and report rank the error sources."""
 
     @property
     def passed(self) -> bool | None:
@@ -192,7 +194,7 @@ def circle_test(
         _test(variant, capacity, one, without if with_contributions else None, explain=explain, counter=counter)
         for variant, capacity, one, without in zip(variants, capacities, setups, ranked, strict=True)
     ]
-    return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs))
+    return CircleTest(profile, tuple(result for result, _ in pairs), tuple(run for _, run in pairs), with_contributions)
 
 
 def _timing(profile: Profile) -> LoopTiming:

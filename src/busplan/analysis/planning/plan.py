@@ -33,7 +33,9 @@ class Plan(NamedTuple):
     binding: Need | None
     """The constraint that stands in the way; None if there is a plan."""
     relaxations: tuple[Relaxation, ...]
-    """What would make a plan possible; empty if there is one."""
+    """What alone would make a plan possible, with what to set then; empty if there is a plan."""
+    with_circle: bool
+    """Whether the circle test was run."""
 
     @property
     def recommended(self) -> Option | None:
@@ -44,6 +46,11 @@ class Plan(NamedTuple):
     def period_is_kept(self) -> bool | None:
         """Whether the recommended option leaves the period of the goal as it is; None without a plan."""
         return None if self.recommended is None else PERIOD not in self.recommended.changes
+
+    @property
+    def recommended_changes(self) -> dict[str, Value] | None:
+        """Changes from the original profile to the recommended one; None without a plan."""
+        return None if self.recommended is None else self.all_changes(self.recommended)
 
     def all_changes(self, option: Option) -> dict[str, Value]:
         """All changes from the original profile to an option."""
@@ -113,6 +120,7 @@ def plan(
         relaxations=()
         if has_plan
         else tuple(relaxations(goal, levels, kept=kept, circle=circle, max_circles=max_circles)),
+        with_circle=circle is not None,
     )
 
 

@@ -12,7 +12,7 @@ from busplan.answers.map import headline, map_chart, regions_table
 from busplan.answers.page.commands import Sources
 from busplan.answers.sensitivity import sensitivity_blocks
 from busplan.answers.timeline import timeline_chart, totals_table
-from busplan.answers.verdict import places_of, verdict_sentences
+from busplan.answers.verdict import verdict_sentences
 from busplan.buses.figure import (
     AXES,
     BINDING_TERM,
@@ -59,41 +59,36 @@ _CLOSED: Final = (MAX_NODES, MAX_AXES, LIMITED_BY)
 """Under another timing model."""
 
 
-def bus_question(answer: AllAnswers, sources: Sources) -> Question:
+def bus_question(answer: AllAnswers) -> Question:
     """The question whether the cycle fits, with its verdict."""
-    verdict, results = answer.verdict, answer.capacity.results
+    verdict = answer.verdict
     word = str(verdict.deciding.verdict).upper()
     if verdict.deciding.verdict == FITS and not verdict.deciding.safe:
         word = f"UNSAFE {bus_of(answer.profile).safety.upper()}"
-    places = places_of(results, start=0, change=0)
     facts = tuple(
-        (figure.label, attribute_value(figure, verdict.deciding, at=places[verdict.deciding.timing_model]))
+        (figure.label, attribute_value(figure, verdict.deciding))
         for figure in (MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES, UTILISATION, BINDING_TERM)
         if figure is not SAFE_AXES or not answer.profile.group
     )
-    question = Question(
+    return Question(
         "Does the cycle fit its period?",
         Words(word, state_of(verdict.deciding.verdict == FITS and verdict.deciding.safe)),
-        tuple(verdict_sentences(verdict, answer.profile, places=places)),
+        tuple(verdict_sentences(verdict, answer.profile)),
         Facts(facts),
-        "/verdicts/0/text",
-        sources["capacity"].command.key,
     )
-    return sources["capacity"].gives(question)
 
 
 def models_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """Capacity and latencies, the timing models side by side."""
-    capacity, latency = sources["capacity"], sources["latency"]
     several = len(bus_of(answer.profile).timing_models) > 1
     return Chapter(
         Sentence(("The timing models, side by side" if several else "The timing model",)),
         (
-            capacity.gives(capacity_table(answer.capacity)),
-            *(map(capacity.gives, [groups_table(answer.capacity)] if answer.profile.group else [])),
-            *map(latency.gives, latency_tables(answer.latency, answer.profile)),
-            capacity.line,
-            latency.line,
+            capacity_table(answer.capacity),
+            *([groups_table(answer.capacity)] if answer.profile.group else []),
+            *latency_tables(answer.latency),
+            sources["capacity"].line,
+            sources["latency"].line,
         ),
         "models",
     )
@@ -114,8 +109,8 @@ def _timeline(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     if limit is not None and limit.is_broken(network):
         yield Sentence((f"Not drawn: {limit.words(network)}.",))
     else:
-        yield source.gives(timeline_chart(answer.schedule))
-    yield source.gives(totals_table(answer.schedule))
+        yield timeline_chart(answer.schedule)
+    yield totals_table(answer.schedule)
     yield source.line
 
 
@@ -132,34 +127,30 @@ def terms_part(answer: AllAnswers, sources: Sources) -> Chapter:
         Sentence(("Terms of the cycle, us",)),
     )
     chart = Chart(TermsDrawing(results), _largest_term(answer), Sentence((_ORDER,)))
-    blocks = (source.gives(chart), source.gives(table), source.line)
+    blocks = (chart, table, source.line)
     return Chapter(Sentence(("Where the microseconds go",)), blocks, "terms")
 
 
 def _largest_term(answer: AllAnswers) -> Sentence:
     """Say which term takes most, by the model that decides."""
-    results, deciding = answer.capacity.results, answer.verdict.deciding
-    number = next(at for at, one in enumerate(results) if one.timing_model == deciding.timing_model)
-    at = f"/results/{number}"
+    deciding = answer.verdict.deciding
     term = max(bus_of(answer.profile).term_figures, key=lambda one: getattr(deciding, one.key))
     return sentence(
         f"Of the {{}} that the cycle needs by the {deciding.timing_model} model, {term.label} takes the most, {{}}",
-        attribute_value(REQUIRED, deciding, at=at),
-        attribute_value(term, deciding, at=at),
+        attribute_value(REQUIRED, deciding),
+        attribute_value(term, deciding),
     )
 
 
 def _of(term: Figure, answer: AllAnswers) -> Iterator[ShownValue]:
     """A term under each timing model."""
-    for number, one in enumerate(answer.capacity.results):
-        yield attribute_value(term, one, at=f"/results/{number}")
+    return (attribute_value(term, one) for one in answer.capacity.results)
 
 
 def sensitivity_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """What moves the margin, and what binds next."""
-    source = sources["capacity"]
-    blocks = map(source.gives, sensitivity_blocks(answer.sensitivity, at="/verdicts/0"))
-    return Chapter(Sentence(("What moves the margin",)), (*blocks, source.line), "sensitivity")
+    blocks = (*sensitivity_blocks(answer.sensitivity), sources["capacity"].line)
+    return Chapter(Sentence(("What moves the margin",)), blocks, "sensitivity")
 
 
 def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
@@ -192,16 +183,14 @@ def axes_part(answer: AllAnswers, sources: Sources) -> Chapter:
         Sentence(("Nodes and axes at the profile's own period and about it",)),
     )
     chart = Chart(AxesDrawing(answer.profile, steps), caption, Sentence((_curves(answer),)))
-    return Chapter(Sentence(("Axes against period",)), (chart, source.gives(table), source.line), "axes")
+    return Chapter(Sentence(("Axes against period",)), (chart, table, source.line), "axes")
 
 
 def map_part(answer: AllAnswers, sources: Sources) -> Chapter:
     """The map of period against axes, and what limits each region."""
-    source, found = sources["map"], answer.trade_off
-    table = source.gives(regions_table(found))
-    return Chapter(
-        Sentence(("What fits, and what limits it",)), (headline(found), map_chart(found), table, source.line), "map"
-    )
+    found = answer.trade_off
+    blocks = (headline(found), map_chart(found), regions_table(found), sources["map"].line)
+    return Chapter(Sentence(("What fits, and what limits it",)), blocks, "map")
 
 
 def _groups_part(answer: AllAnswers, sources: Sources) -> Chapter:
@@ -212,30 +201,26 @@ def _groups_part(answer: AllAnswers, sources: Sources) -> Chapter:
             TableColumn(SAFE_NODES.label, group=one.name),
             TableColumn("limited by", kind="words", group=one.name),
         )
-    rows, number = [], 0
+    rows = []
     for results in answer.periods.periods:
-        cells = [attribute_value(PERIOD, results[0], at=f"/results/{number}")]
-        for place, figures in enumerate(results, start=number):
-            for index, group in enumerate(figures.groups if figures.verdict is not None else ()):
-                at = f"/results/{place}/groups/{index}"
-                cells += (attribute_value(figure, group, at=at) for figure in (SAFE_NODES, SAFE_LIMITED_BY))
-        number += len(results)
+        cells = [attribute_value(PERIOD, results[0])]
+        for figures in results:
+            for group in figures.groups if figures.verdict is not None else ():
+                cells += (attribute_value(figure, group) for figure in (SAFE_NODES, SAFE_LIMITED_BY))
         rows.append(TableRow(tuple(cells), highlighted=results[0].period_us == answer.profile.cycle.period_us))
     caption = Sentence(("Nodes of each group that a period carries, the others as they are, all shown to fit",))
     table = Table(tuple(columns), tuple(rows), caption)
-    return Chapter(Sentence(("Nodes against period",)), (source.gives(table), source.line), "axes")
+    return Chapter(Sentence(("Nodes against period",)), (table, source.line), "axes")
 
 
 def _over_period(answer: AllAnswers) -> Iterator[TableRow]:
     """One row for each period; the timing models one after the other."""
-    number = 0
     for results in answer.periods.periods:
         period_us = results[0].period_us
-        cells = [attribute_value(PERIOD, results[0], at=f"/results/{number}")]
+        cells = [attribute_value(PERIOD, results[0])]
         for one in results:
             shown = _shown_of(one.verdict is not None)
-            cells += (attribute_value(figure, one, at=f"/results/{number}") for figure in shown)
-            number += 1
+            cells += (attribute_value(figure, one) for figure in shown)
         yield TableRow(tuple(cells), highlighted=period_us == answer.profile.cycle.period_us)
 
 

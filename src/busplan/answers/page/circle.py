@@ -17,7 +17,7 @@ _KEYS: Final = (
 )
 
 
-def circle_question(answer: AllAnswers, sources: Sources) -> Question:
+def circle_question(answer: AllAnswers) -> Question:
     """The question whether the circle is round, with its verdict."""
     result = answer.circle_figures
     if result is None:
@@ -28,14 +28,13 @@ def circle_question(answer: AllAnswers, sources: Sources) -> Question:
             Facts(()),
         )
     known = (key for key in _KEYS if getattr(result, key) is not None)
-    facts = ((CIRCLE_BY_KEY[key].label, attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0")) for key in known)
-    question = Question(
+    facts = ((CIRCLE_BY_KEY[key].label, attribute_value(CIRCLE_BY_KEY[key], result)) for key in known)
+    return Question(
         _QUESTION,
         verdict_words(result),
-        (*circle_sentences(answer.profile, result, at="/results/0"), *servo_sentence(answer.profile, result)),
+        (*circle_sentences(answer.profile, result), *servo_sentence(answer.profile, result)),
         Facts(tuple(facts)),
     )
-    return sources["circle"].gives(question)
 
 
 def _why_not(answer: AllAnswers) -> tuple[str, ...]:
@@ -56,9 +55,8 @@ def _circle(answer: AllAnswers, sources: Sources) -> Iterator[Block]:
     if result is None:
         yield from (Sentence((why,)) for why in _why_not(answer))
         return
-    drawing = circle_drawing(answer.contour, result, answer.profile, at="/results/0")
-    yield sources["circle"].gives(drawing)
-    yield sources["circle"].gives(circle_table((result,)))
+    yield circle_drawing(answer.contour, result, answer.profile)
+    yield circle_table((result,))
     yield sources["circle"].line
 
 
@@ -67,8 +65,7 @@ def sources_part(answer: AllAnswers, sources: Sources) -> Chapter | None:
     result = answer.circle_figures
     if result is None or result.contributions is None:
         return None
-    title, source = Sentence(("What to attack",)), sources["circle"]
+    title = Sentence(("What to attack",))
     if not result.contributions:
         return Chapter(title, (NO_SOURCES,), "sources")
-    table = contributions_table(result, at="/results/0")
-    return Chapter(title, (source.gives(table), ACT_TOGETHER, source.line), "sources")
+    return Chapter(title, (contributions_table(result), ACT_TOGETHER, sources["circle"].line), "sources")

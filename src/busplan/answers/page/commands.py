@@ -15,7 +15,7 @@ from busplan.answers.latency import latency_document
 from busplan.answers.map import map_document
 from busplan.answers.sensitivity import sensitivity_document
 from busplan.answers.timeline import timeline_document
-from busplan.forms.blocks import BlockOrPart, Command, JsonDocument, with_values
+from busplan.forms.blocks import Command, JsonDocument
 from busplan.printable import has_controls
 from busplan.profile.changes import KeyChanges
 
@@ -26,13 +26,9 @@ class Source(NamedTuple):
     command: Command
     document: JsonDocument
 
-    def gives(self, block: BlockOrPart) -> BlockOrPart:
-        """Mark every figure of a block that has a place as one of this document."""
-        return with_values(block, lambda value: value._replace(command=self.command.key if value.at else ""))
-
     @property
     def line(self) -> Command:
-        """The command without its purpose and key."""
+        """The command without its purpose."""
         return Command(self.command.line)
 
 
@@ -79,7 +75,7 @@ def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
         yield from period_option(period_us) if one.option == "--period" else (one.option, shell_word(one.text))
 
 
-def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges) -> dict[str, Source]:
+def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[str, Source]:
     """The commands behind one profile's figures, by a short name.
 
     Parameters
@@ -88,8 +84,6 @@ def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges)
         All answers of the profile.
     argument
         The PROFILE argument.
-    key
-        Prefix of the keys.
     changes
         KeyChanges of its file, which the commands repeat.
     """
@@ -100,7 +94,7 @@ def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges)
         changed = change_options(own, period_us=answer.profile.cycle.period_us)
         words = ("busplan", str(document["command"]), shell_word(argument), *options, *changed, "--format", "json")
         line = " ".join(words)
-        found[name] = Source(Command(line, purpose, f"{key}-{name}"), changed_document(document, own))
+        found[name] = Source(Command(line, purpose), changed_document(document, own))
 
     # Neither latency nor the list of explain takes --period.
     elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
@@ -114,7 +108,7 @@ def sources(answer: AllAnswers, *, argument: str, key: str, changes: KeyChanges)
     add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
     add("map", "period against axes, cell by cell", map_document(answer.trade_off))
     if answer.circle is not None:
-        document = circle_document(answer.circle, with_contributions=True)
+        document = circle_document(answer.circle)
         add("circle", "the circle and its error sources", document, "--contributions")
     document = assumptions_document(answer.profile, answer.assumptions)
     add("explain", "what the figures rest on", document, own=elsewhere)

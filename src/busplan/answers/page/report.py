@@ -95,7 +95,7 @@ def page_report(profiles: Sequence[ReportedProfile], *, title: str | None = None
             f"p{number}",
             shell_word(one.argument),
             one.answer,
-            sources(one.answer, argument=one.argument, key=f"p{number}", changes=one.changes),
+            sources(one.answer, argument=one.argument, changes=one.changes),
         )
         for number, one in enumerate(profiles, start=1)
     ]
@@ -135,7 +135,7 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     if answer.profile.description.strip():
         yield Sentence((" ".join(answer.profile.description.split()),))
     yield _facts(subject)
-    questions = (bus_question(answer, found), circle_question(answer, found))
+    questions = (bus_question(answer), circle_question(answer))
     if answer.no_circle:
         questions = questions[::-1]  # the cause first
     lines = (found[name].line for name in ("capacity", "circle") if name in found)
@@ -150,8 +150,8 @@ def _chapter(subject: _Subject) -> Iterator[Block]:
     ranked = sources_part(answer, found)
     if ranked is not None:
         yield ranked
-    assumptions = found["explain"].gives(assumptions_table(answer.assumptions))
-    yield Chapter(Sentence(("What it rests on",)), (assumptions, found["explain"].line), "assumptions")
+    assumptions = (assumptions_table(answer.assumptions), found["explain"].line)
+    yield Chapter(Sentence(("What it rests on",)), assumptions, "assumptions")
     yield _commands(found)
 
 
@@ -179,18 +179,17 @@ def _facts(subject: _Subject) -> Facts:
 
     def item(name: str, figure: Figure) -> tuple[str, ShownValue]:
         unit = "us" if figure.unit == "us" else ""
-        return name, ShownValue(getattr(figures, figure.key), figure.key, unit, at=f"/results/0/{figure.key}")
+        return name, ShownValue(getattr(figures, figure.key), figure.key, unit)
 
-    items = (
-        *(item("nodes", NODES), item("axes", AXES)),
-        *(item(one.label, one) for one in setup),
-        *(item("period", PERIOD), item("slice", AVAILABLE)),
+    return Facts(
         (
-            "deciding model",
-            ShownValue(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key, at="/verdicts/0/timing_model"),
-        ),
+            *(item("nodes", NODES), item("axes", AXES)),
+            *(item(one.label, one) for one in setup),
+            *(item("period", PERIOD), item("slice", AVAILABLE)),
+            ("deciding model", ShownValue(subject.answer.verdict.deciding.timing_model, TIMING_MODEL.key)),
+            ("profile", Code(subject.origin)),
+        )
     )
-    return Facts((*subject.sources["capacity"].gives(items), ("profile", Code(subject.origin))))
 
 
 def _commands(found: Sources) -> Chapter:
@@ -220,14 +219,10 @@ def _comparison(subjects: Sequence[_Subject]) -> Table:
 
 
 def _compared(subject: _Subject) -> tuple[Cell, ...]:
-    verdict, results, found = subject.answer.verdict, subject.answer.capacity.results, subject.sources
-    numbers = {one.timing_model: number for number, one in enumerate(results)}
-    own, figures = f"/results/{numbers[verdict.deciding.timing_model]}", verdict.deciding
-
     shown = (VERDICT, PERIOD, NODES, AXES, UTILISATION, MARGIN_CORRECTED, UNCERTAINTY, SAFE_AXES)
-    bus = tuple(attribute_value(figure, figures, at=own) for figure in shown)
+    bus = (attribute_value(figure, subject.answer.verdict.deciding) for figure in shown)
     link = SectionLink(subject.name, subject.key, subject.origin)
-    return link, *found["capacity"].gives(bus), *_compared_circle(subject)
+    return link, *bus, *_compared_circle(subject)
 
 
 def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
@@ -235,6 +230,6 @@ def _compared_circle(subject: _Subject) -> tuple[Cell, ...]:
     if result is None:
         refused = Words("cannot be run", "fails") if subject.answer.no_circle else "not run"
         return MISSING, MISSING, MISSING, refused
-    figures = tuple(attribute_value(CIRCLE_BY_KEY[key], result, at="/results/0") for key in _MEASURES)
+    figures = tuple(attribute_value(CIRCLE_BY_KEY[key], result) for key in _MEASURES)
     verdict = verdict_words(result)
-    return *subject.sources["circle"].gives(figures), Words(verdict.text.lower(), verdict.state)
+    return *figures, Words(verdict.text.lower(), verdict.state)

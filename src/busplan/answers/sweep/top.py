@@ -122,7 +122,7 @@ class Tally:
 
     def sentences(self) -> Iterator[Sentence]:
         """Summary of the counts."""
-        whole = count_value(self.expected, "points", at="/points", grouped=True)
+        whole = count_value(self.expected, "points", grouped=True)
         found = whole if self.points == self.expected else count_value(self.points, grouped=True)
         cut = Sentence(()) if self.points == self.expected else sentence(" of {} (interrupted)", whole)
         head = sentence(f"{{}}: {{}} {nouns(self.points, 'point')}", Code(self.profile.name), found)
@@ -198,8 +198,6 @@ class TopRow(NamedTuple):
 
     rank: float
     """Sort key, the smallest first."""
-    number: int
-    """Index among all rows."""
     record: Record
 
 
@@ -240,8 +238,7 @@ class TopRows:
         self.kept = sorted(self.kept, key=lambda row: row.rank)[: self._top]
 
     def _row(self, block: SweepBlock, index: int, *, rank: float) -> TopRow:
-        number = block.chunk.start * len(block.models) + index
-        return TopRow(rank, number, block.row(index, self.columns))
+        return TopRow(rank, block.row(index, self.columns))
 
     @property
     def order(self) -> str:
@@ -301,13 +298,12 @@ def _column(name: str, figure: Figure | None, *, rank: int) -> TableColumn:
 
 def _cells(row: TopRow, figures: Mapping[str, Figure]) -> Iterator[ShownValue]:
     for name, own in row.record.items():
-        at = f"/rows/{row.number}/{name}"
         value = None if isinstance(own, float) and isnan(own) else own
         figure = figures.get(name)
         if figure is None:
-            yield ShownValue(value, name, at=at)
+            yield ShownValue(value, name)
         else:
-            shown = figure_value(figure, value, at=at)
+            shown = figure_value(figure, value)
             # In the unit of the column's name; a length in mm has three more decimals than one in um.
             finer = 3 if figure.unit == "mm" and figure.column == "um" else 0
             yield shown._replace(unit=figure.unit or shown.unit, decimals=shown.decimals and shown.decimals + finer)
