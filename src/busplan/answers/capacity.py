@@ -11,7 +11,8 @@ from busplan.analysis.capacity.verdict import Verdict
 from busplan.analysis.network import bus_of, leading_model, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
-from busplan.answers.verdict import uncertainty_parts, verdict_sentences, warnings
+from busplan.answers.sentences import safety_record, warnings
+from busplan.answers.verdict import uncertainty_parts, verdict_sentences
 from busplan.buses import figure
 from busplan.buses.bus import Bus
 from busplan.buses.figure import Figure
@@ -34,7 +35,6 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import nouns, period
-from busplan.sections.profile import Profile
 
 
 def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
@@ -250,9 +250,3 @@ def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
 def certainty_record(figures: CapacityFigures) -> Record:
     """Figures of how sure the verdict is, without its word."""
     return {one.key: getattr(figures, one.key) for one in figure.CERTAINTY if one is not figure.VERDICT}
-
-
-def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
-    """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
-    safety = bus_of(profile).safety_figure
-    return {} if safety is None else {safety.key: figures.safe}

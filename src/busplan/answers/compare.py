@@ -9,7 +9,7 @@ from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, Not
 from busplan.analysis.network import bus_of
 from busplan.answers.compare_document import compare_document, compare_records
 from busplan.answers.compare_notes import notes
-from busplan.answers.verdict import execution_sentence, refused_circle
+from busplan.answers.sentences import execution_sentence, refused_circle
 from busplan.buses import kind_named
 from busplan.buses.figure import SAFE_AXES, VERDICT
 from busplan.drawings.compare.characters import compare_lines

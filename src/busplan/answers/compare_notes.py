@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from busplan.analysis.capacity.certainty import limits_behind
 from busplan.analysis.comparison.kinds import KindComparison, MachineOnKind, NotOnKind
 from busplan.analysis.network import bus_of, network_of
-from busplan.answers.verdict import evidence_sentence, reset_sentence
+from busplan.answers.sentences import evidence_sentence, reset_sentence
 from busplan.buses import kind_named
 from busplan.forms.blocks import Code, Sentence, joined
 from busplan.forms.numbers import listed, period

@@ -9,7 +9,7 @@ from busplan.analysis.comparison.difference import CircleSide, ComparedFigure, D
 from busplan.answers.changes import change_document, change_table
 from busplan.answers.diff_headline import STATES, headline, named
 from busplan.answers.documents import document
-from busplan.answers.verdict import execution_grades, not_applicable, refused_circle
+from busplan.answers.sentences import execution_grades, not_applicable, refused_circle
 from busplan.buses.figure import PERIOD, TIMING_MODEL
 from busplan.forms.blocks import (
     Block,

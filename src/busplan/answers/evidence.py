@@ -6,7 +6,7 @@ from typing import Final
 
 from busplan.analysis.evidence import KindEvidence
 from busplan.answers.documents import document, parts_by
-from busplan.answers.verdict import evidence_sentence
+from busplan.answers.sentences import evidence_sentence
 from busplan.buses import kind_named
 from busplan.buses.published import Comparison, EvidenceSection
 from busplan.forms.blocks import (

@@ -8,7 +8,7 @@ from busplan.analysis.latency import LatencyResult, Transaction, with_payload
 from busplan.analysis.network import bus_of, network_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.figure_tables import Owner, figure_table
-from busplan.answers.verdict import execution_sentence, not_applicable, warning_sentences
+from busplan.answers.sentences import execution_sentence, not_applicable, warning_sentences
 from busplan.buses.figure import REQUIRED, Figure
 from busplan.forms.blocks import (
     Block,

@@ -7,8 +7,8 @@ from busplan.analysis.map.cells import Cell, Region
 from busplan.analysis.map.trade_off import TradeOff
 from busplan.analysis.network import bus_of
 from busplan.answers.documents import document, with_profile
+from busplan.answers.sentences import refused_circle
 from busplan.answers.sweep.top import payload_sentences
-from busplan.answers.verdict import refused_circle
 from busplan.drawings.map.characters import map_lines
 from busplan.drawings.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
 from busplan.drawings.map.svg import STYLE, map_svg

@@ -13,7 +13,7 @@ from busplan.analysis.planning.relaxations import Relaxation
 from busplan.answers.documents import document, with_profile
 from busplan.answers.key_values import NewValues, settings_sentence
 from busplan.answers.plan_options import options_table
-from busplan.answers.verdict import margin_parts, reset_sentence, warning_sentences
+from busplan.answers.sentences import margin_parts, reset_sentence, warning_sentences
 from busplan.buses.figure import AXES, NODES
 from busplan.forms.blocks import (
     Block,

@@ -7,9 +7,8 @@ from typing import Final
 from busplan.analysis.capacity.certainty import FITS
 from busplan.analysis.network import bus_of
 from busplan.analysis.timeline.schedule import EVENTS, SHARE, TOTAL, Schedule, Total, totals
-from busplan.answers.capacity import safety_record
 from busplan.answers.documents import document
-from busplan.answers.verdict import refused_circle, story, warnings
+from busplan.answers.sentences import refused_circle, safety_record, story, warnings
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
 from busplan.buses.parts import IDLE
 from busplan.drawings.own_picture import OwnPicture
