@@ -51,22 +51,22 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from busplan.api.calibrate import CalibrateAnswer, calibrate
-    from busplan.api.capacity import CapacityAnswer, capacity
-    from busplan.api.check import CheckAnswer, check
-    from busplan.api.circle import CircleTestAnswer, circle_test
-    from busplan.api.compare import CompareAnswer, compare
-    from busplan.api.diff import DiffAnswer, diff
-    from busplan.api.evidence import EvidenceAnswer, evidence
-    from busplan.api.explain import ExplainAnswer, explain
-    from busplan.api.inputs import load_profile
-    from busplan.api.latency import LatencyAnswer, latency
-    from busplan.api.map import MapAnswer, map_
-    from busplan.api.plan import PlanAnswer, plan
-    from busplan.api.report import ReportAnswer, report
-    from busplan.api.sweep import SweepAnswer, sweep
-    from busplan.api.timeline import TimelineAnswer, timeline
     from busplan.errors import BusplanError
+    from busplan.gate.check import CheckAnswer, check
+    from busplan.questions.base.inputs import load_profile
+    from busplan.questions.calibrate import CalibrateAnswer, calibrate
+    from busplan.questions.capacity import CapacityAnswer, capacity
+    from busplan.questions.circle import CircleTestAnswer, circle_test
+    from busplan.questions.compare import CompareAnswer, compare
+    from busplan.questions.diff import DiffAnswer, diff
+    from busplan.questions.evidence import EvidenceAnswer, evidence
+    from busplan.questions.explain import ExplainAnswer, explain
+    from busplan.questions.latency import LatencyAnswer, latency
+    from busplan.questions.map import MapAnswer, map_
+    from busplan.questions.plan import PlanAnswer, plan
+    from busplan.questions.report import ReportAnswer, report
+    from busplan.questions.sweep import SweepAnswer, sweep
+    from busplan.questions.timeline import TimelineAnswer, timeline
     from busplan.sections.profile import Profile
 else:
     # Loaded at first use, because the command line imports this package, too. Hidden from type checkers, so that they
@@ -74,16 +74,18 @@ else:
     _HOMES = {
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",
-        "load_profile": "busplan.api.inputs",
+        "load_profile": "busplan.questions.base.inputs",
+        "check": "busplan.gate.check",
+        "CheckAnswer": "busplan.gate.check",
     }
-    """Where a name is that is neither a question nor its answer."""
+    """Where a name is that is no question and no answer of one."""
 
     def __getattr__(name: str) -> object:
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         # `circle_test` and `CircleTestAnswer` are in module `circle`, `map_` and `MapAnswer` in `map`.
         question = name.removesuffix("Answer").lower().replace("_", "").removesuffix("test")
-        home = _HOMES.get(name, f"busplan.api.{question}")
+        home = _HOMES.get(name, f"busplan.questions.{question}")
         globals()[name] = value = getattr(import_module(home), name)
         return value
 

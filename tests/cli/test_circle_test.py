@@ -249,7 +249,7 @@ def test_a_report_that_cannot_be_written_is_said_before_the_simulation(
     def simulated(*_: object, **__: object) -> None:
         pytest.fail("a simulation")
 
-    monkeypatch.setattr("busplan.analysis.circle.roundness.circle_test", simulated)
+    monkeypatch.setattr("busplan.questions.circle.roundness.circle_test", simulated)
     run = circle_test(profile, "-o", "no/where.md", cwd=profile.parent)
     assert run.returncode == 2
     assert "no folder" in run.stderr

@@ -94,11 +94,11 @@ def calibrate_command(
         require_own_file(profile)
     files = chain(profile_files(profile), _measurements_file(measurements))
     with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
-        from busplan.analysis.calibration.calibrate import calibrate
-        from busplan.answers import calibration as said
         from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
         from busplan.profile.shipped import load, locate_measurements
         from busplan.profile.toml import read_bytes
+        from busplan.questions.calibrate import report as said
+        from busplan.questions.calibrate.calibration import calibrate
 
         loaded = load(profile)
         bench = changes.applied(loaded.profile)

@@ -24,7 +24,7 @@ from busplan.forms import Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.circle.roundness import CircleTest
+    from busplan.questions.circle.roundness import CircleTest
 
 
 @takes_changes()
@@ -79,8 +79,8 @@ def circle_test_command(
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     form = None if plot is None else plot_form(plot)
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.circle.roundness import circle_test
-        from busplan.answers.circle import circle_report
+        from busplan.questions.circle.report import circle_report
+        from busplan.questions.circle.roundness import circle_test
 
         plan = load_changed(profile, changes)
         with ExitStack() as files:
@@ -109,8 +109,8 @@ def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, form: Picture)
     if all(run is None for run in test.runs):
         file.abandon()
         return
-    from busplan.drawings.circle_plot import circle_svg
     from busplan.forms.raster import picture
+    from busplan.questions.circle.plot import circle_svg
 
     file.write(document_bytes(picture(circle_svg(test, note=changes.words), form)))
 
@@ -123,7 +123,7 @@ def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
 
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
-    from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
     from busplan.forms.csv_rows import csv_blocks
+    from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
 
     file.writelines(block.encode() for block in csv_blocks(trace_records(test, every=every), columns=TRACE_COLUMNS))

@@ -48,8 +48,8 @@ def latency_command(
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.latency import latency
-        from busplan.answers.latency import latency_report
+        from busplan.questions.latency.figures import latency
+        from busplan.questions.latency.report import latency_report
 
         plan = load_changed(profile, changes)
         result = latency(

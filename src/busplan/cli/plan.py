@@ -20,9 +20,9 @@ from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.planning.plan import Plan
     from busplan.forms.blocks import Report
     from busplan.profile.toml import LoadedProfile
+    from busplan.questions.plan.planning import Plan
     from busplan.sections.profile import Profile
 
 _PROFILE_ENDINGS = ("", ".toml")
@@ -136,12 +136,12 @@ def plan_command(
     piped = new == STANDARD_OUTPUT
     require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
     with answer(format_, report_file, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.circle.check import CircleCheck
-        from busplan.analysis.planning.freedoms import freed
-        from busplan.analysis.planning.plan import plan
-        from busplan.answers.plan import plan_report
         from busplan.profile.keys import flat
         from busplan.profile.shipped import load
+        from busplan.questions.circle.check import CircleCheck
+        from busplan.questions.plan.freedoms import freed
+        from busplan.questions.plan.planning import plan
+        from busplan.questions.plan.report import plan_report
 
         if apply:
             require_own_file(profile)
@@ -199,7 +199,7 @@ def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> Key
     """The changes, with the nodes that --axes needs."""
     if axes is None:
         return changes
-    from busplan.analysis.planning.machine import nodes_for_axes
+    from busplan.questions.plan.machine import nodes_for_axes
 
     of_nodes = KeyChanges(tuple(one for one in changes.each if one.key in ("node", "node.axes")))
     nodes = nodes_for_axes(of_nodes.applied(profile), axes)
@@ -208,9 +208,9 @@ def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> Key
 
 def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     """Write the recommended values into the profile's file."""
-    from busplan.answers.plan import settings
     from busplan.profile.keys import flat
     from busplan.profile.write import whole
+    from busplan.questions.plan.report import settings
 
     if result.recommended is None:
         return

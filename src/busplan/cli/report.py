@@ -78,8 +78,8 @@ def report_command(
 def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, changes: KeyChanges, circle: bool
 ) -> "Report":
-    from busplan.analysis.all_answers import answers_of_each
-    from busplan.answers.page.report import ReportedProfile, page_report
+    from busplan.questions.report.all_answers import answers_of_each
+    from busplan.questions.report.page import ReportedProfile, page_report
 
     with progress_bar("circle tests") as progress:
         found = answers_of_each(plans, with_circle=circle, progress=progress)
