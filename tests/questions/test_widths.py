@@ -32,8 +32,8 @@ from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import sweep
 from busplan.questions.sweep.grid import Listed, checked_grid
 from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
+from busplan.questions.timeline.events import schedule
 from busplan.questions.timeline.report import timeline_report
-from busplan.questions.timeline.schedule import schedule
 from busplan.sections.profile import Profile
 
 FIGURE = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")

@@ -24,7 +24,7 @@ from busplan.forms import Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.roundness import CircleTest
+    from busplan.questions.circle.record import CircleTest
 
 
 @takes_changes()

@@ -11,7 +11,7 @@ from busplan.cli.progress import progress_bar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.questions.circle.roundness import CircleFigures
+    from busplan.questions.circle.record import CircleFigures
 
 
 def complete_kind(incomplete: str) -> list[str]:

@@ -24,7 +24,7 @@ from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.questions.timeline.schedule import Schedule
+    from busplan.questions.timeline.events import Schedule
     from busplan.sections.profile import Profile
 
 TimelineForm = Literal[Form, Picture]
@@ -104,7 +104,7 @@ def timeline_command(
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
 
     def shown() -> "Schedule":
-        from busplan.questions.timeline.schedule import schedule, zoom
+        from busplan.questions.timeline.events import schedule, zoom
 
         plan = load_changed(profile, changes)
         one = None if transaction is None else _transaction(transaction, plan)

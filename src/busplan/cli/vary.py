@@ -58,7 +58,7 @@ def parse_axis(text: str, *, profile: "Profile", option: str) -> "tuple[str, Val
         Not KEY=VALUES, or invalid values.
     """
     from busplan.profile.kinds import words_of
-    from busplan.questions.sweep.axis_values import parse_values
+    from busplan.questions.sweep.values import parse_values
 
     key, equals, spec = (part.strip() for part in text.partition("="))
     if not equals or not key or not spec:

@@ -12,7 +12,8 @@ import pytest
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.circle.plot import circle_svg
-from busplan.questions.circle.roundness import CircleTest, circle_test
+from busplan.questions.circle.record import CircleTest
+from busplan.questions.circle.roundness import circle_test
 
 SVG = "{http://www.w3.org/2000/svg}"
 SMALL = {"circle.radius_mm": 25.0, "circle.ramp_periods": 20}

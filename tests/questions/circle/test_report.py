@@ -15,6 +15,7 @@ from busplan.forms.numbers import figure_text
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.circle.failures import Failure, Stated
+from busplan.questions.circle.record import CircleTest
 from busplan.questions.circle.report import (
     circle_document,
     circle_records,
@@ -22,7 +23,7 @@ from busplan.questions.circle.report import (
     circle_table,
     contributions_table,
 )
-from busplan.questions.circle.roundness import CircleTest, circle_test
+from busplan.questions.circle.roundness import circle_test
 from busplan.questions.circle.sentences import circle_sentences, servo_sentence, verdict_words
 from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
 

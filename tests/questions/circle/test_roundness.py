@@ -13,10 +13,11 @@ from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
 from busplan.questions.circle.contour_profile import CONTOUR_SECTORS, contour_profile, drawn_profile
+from busplan.questions.circle.record import CircleFigures
 from busplan.questions.circle.report import circle_document
-from busplan.questions.circle.roundness import CircleFigures, circle_test, to_attack
+from busplan.questions.circle.roundness import circle_test, to_attack
 from busplan.questions.fit.figures import figures
-from busplan.questions.timeline.schedule import schedule
+from busplan.questions.timeline.events import schedule
 from busplan.sections.profile import Profile
 from busplan.servo.checks import ParameterError
 

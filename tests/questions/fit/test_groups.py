@@ -27,9 +27,9 @@ from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.questions.fit.network import bus_of, model_names, network_of
 from busplan.questions.plan.machine import nodes_for_axes, rooms
 from busplan.questions.plan.planning import plan
-from busplan.questions.sweep.axis_values import listed
 from busplan.questions.sweep.blocks import figure_names, sweep
 from busplan.questions.sweep.grid import checked_grid
+from busplan.questions.sweep.values import listed
 from busplan.sections.profile import Profile
 
 SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

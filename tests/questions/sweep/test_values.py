@@ -5,7 +5,7 @@ import re
 import pytest
 
 from busplan.errors import BusplanError
-from busplan.questions.sweep.axis_values import listed
+from busplan.questions.sweep.values import listed
 
 
 def test_a_float_that_is_whole_may_stand_for_a_count() -> None:

@@ -19,6 +19,7 @@ from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.questions.fit.figures import capacity
 from busplan.questions.timeline import svg
+from busplan.questions.timeline.events import Schedule, schedule, totals, zoom
 from busplan.questions.timeline.lanes import node_lanes, stretches
 from busplan.questions.timeline.report import (
     headline,
@@ -28,7 +29,6 @@ from busplan.questions.timeline.report import (
     timeline_report,
     totals_table,
 )
-from busplan.questions.timeline.schedule import Schedule, schedule, totals, zoom
 
 ValuesIn = Callable[[object], Iterator[ShownValue]]
 

@@ -16,7 +16,7 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load, shipped_names
 from busplan.questions.fit.figures import figures
 from busplan.questions.fit.network import bus_of, model_names, network_of
-from busplan.questions.timeline.schedule import MOST_NODES, schedule, totals, zoom
+from busplan.questions.timeline.events import MOST_NODES, schedule, totals, zoom
 from busplan.sections.profile import Profile
 
 Maker = Callable[..., Profile]

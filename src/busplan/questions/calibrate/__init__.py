@@ -16,8 +16,6 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Path, ProfileLike, checked_models, load_profile
 from busplan.questions.calibrate import calibration as analysis
 from busplan.questions.calibrate.calibration import Calibration, Outlier, PayloadFit
-from busplan.questions.calibrate.report import calibration_report, execution_section, section
-from busplan.questions.calibrate.sentences import fit_sentences
 from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.sections.profile import Profile
 
@@ -76,13 +74,19 @@ class CalibrateAnswer(Answer):
     @property
     def changes(self) -> dict[str, object]:
         """The section that `--apply` would write, by its key, for `load_profile(profile, changes=...)`."""
+        from busplan.questions.calibrate.report import execution_section, section
+
         return {section(self.calibration): execution_section(self.calibration)}
 
     def _headline(self) -> str:
+        from busplan.questions.calibrate.sentences import fit_sentences
+
         _, form, *_ = fit_sentences(self.calibration)
         return f"{self.profile.name}: {sentence_text(form)}"
 
     def _report(self) -> Report:
+        from busplan.questions.calibrate.report import calibration_report
+
         return calibration_report(self.calibration, source=self.source, applied_to=None)
 
 

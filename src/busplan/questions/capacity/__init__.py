@@ -1,16 +1,18 @@
 """`busplan.capacity`."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
-from busplan.questions.capacity.report import capacity_report
-from busplan.questions.capacity.sensitivity import Sensitivity, sensitivities
 from busplan.questions.capacity.verdict import Verdict, verdicts
 from busplan.questions.fit import figures as analysis
 from busplan.questions.fit.figures import Capacity, CapacityFigures
 from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.questions.capacity.sensitivity import Sensitivity
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -32,7 +34,7 @@ class CapacityAnswer(Answer):
     profile: Profile
     periods: tuple[tuple[CapacityFigures, ...], ...]
     verdicts: tuple[Verdict, ...]
-    sensitivities: tuple[Sensitivity, ...] = ()
+    sensitivities: "tuple[Sensitivity, ...]" = ()
 
     @property
     def results(self) -> tuple[CapacityFigures, ...]:
@@ -40,6 +42,8 @@ class CapacityAnswer(Answer):
         return self._found.results
 
     def _report(self) -> Report:
+        from busplan.questions.capacity.report import capacity_report
+
         if not self.sensitivities:
             return capacity_report(self._found, self.verdicts)
         from busplan.questions.capacity.sensitivity_report import sensitivity_report
@@ -108,4 +112,8 @@ def capacity(
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         timing_models=checked_models(timing_model, network),
     )
-    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found) if sensitivity else ())
+    if not sensitivity:
+        return CapacityAnswer(*found, verdicts=verdicts(found))
+    from busplan.questions.capacity.sensitivity import sensitivities
+
+    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found))

@@ -4,10 +4,7 @@ from busplan.forms.blocks import Report
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Periods, ProfileLike, load_profile, one_or_several
-from busplan.questions.circle import roundness as analysis
-from busplan.questions.circle.plot import circle_svg
-from busplan.questions.circle.report import circle_report
-from busplan.questions.circle.roundness import CircleTest
+from busplan.questions.circle.record import CircleTest
 
 
 class CircleTestAnswer(Answer, CircleTest):
@@ -22,9 +19,13 @@ class CircleTestAnswer(Answer, CircleTest):
     __hash__ = object.__hash__
 
     def _report(self) -> Report:
+        from busplan.questions.circle.report import circle_report
+
         return circle_report(self)
 
     def _repr_svg_(self) -> str | None:
+        from busplan.questions.circle.plot import circle_svg
+
         return circle_svg(self) if any(self.runs) else None
 
 
@@ -72,7 +73,9 @@ def circle_test(
     >>> answer.runs[0].trace(every=10).contour_error_mm.shape
     (48656,)
     """
-    found = analysis.circle_test(
+    from busplan.questions.circle import roundness
+
+    found = roundness.circle_test(
         load_profile(profile),
         periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
         with_contributions=contributions,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from busplan.progress import Progress, part_of
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.roundness import CircleFigures
+    from busplan.questions.circle.record import CircleFigures
     from busplan.sections.profile import Profile
 
 ComputeCircleFigures = Callable[["Profile"], "CircleFigures"]

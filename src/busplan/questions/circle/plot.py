@@ -13,7 +13,7 @@ from busplan.forms.plot_area import MARGIN_PERCENT, PlotArea, draw_plot_area, nu
 from busplan.forms.svg import LINE, Scale, drawing, inside, markup, paragraph, text_at
 from busplan.questions.circle.contour_profile import contour_profile
 from busplan.questions.circle.drawing import HEIGHT, CircleDrawing
-from busplan.questions.circle.roundness import CircleTest
+from busplan.questions.circle.record import CircleTest
 from busplan.questions.circle.rows import CircleRow, Curve, Scales, circle_rows, common_scales
 
 _ERRORS: Final = 220

@@ -25,7 +25,7 @@ from busplan.forms.numbers import period
 from busplan.questions.circle.contour_profile import ContourProfile, drawn_profile
 from busplan.questions.circle.drawing import CircleDrawing
 from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER
-from busplan.questions.circle.roundness import CircleFigures, CircleTest
+from busplan.questions.circle.record import CircleFigures, CircleTest
 from busplan.questions.circle.sentences import (
     circle_sentences,
     failure_words,

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from busplan.questions.circle.roundness import CircleFigures, CircleTest
+from busplan.questions.circle.record import CircleFigures, CircleTest
 from busplan.questions.circle.scale import ErrorRange, LengthUnit, Magnified, error_range, length_unit, magnified
 from busplan.sections.machine import ToleranceSection
 from busplan.servo.circle import CircleRun

@@ -6,7 +6,8 @@ from busplan.forms.blocks import Code, Part, Sentence, ShownValue, State, Words,
 from busplan.forms.numbers import period_value
 from busplan.questions.circle.failures import MARGINS, Stated
 from busplan.questions.circle.figures import CIRCLE_BY_KEY
-from busplan.questions.circle.roundness import CircleFigures, failed_measure, to_attack
+from busplan.questions.circle.record import CircleFigures
+from busplan.questions.circle.roundness import failed_measure, to_attack
 from busplan.sections.profile import Profile
 
 

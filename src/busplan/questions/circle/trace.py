@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from busplan.forms.blocks import Record
-from busplan.questions.circle.roundness import CircleTest
+from busplan.questions.circle.record import CircleTest
 
 TRACE_COLUMNS: Final = (
     "period_us",

@@ -9,8 +9,6 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
 from busplan.questions.compare import kinds as analysis
 from busplan.questions.compare.kinds import KindComparison, MachineOnKind, NotOnKind
-from busplan.questions.compare.report import compare_report, headline, require_drawn
-from busplan.questions.compare.svg import compare_svg
 
 
 class CompareAnswer(Answer, KindComparison):
@@ -33,6 +31,9 @@ class CompareAnswer(Answer, KindComparison):
         return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
 
     def _svg(self) -> str:
+        from busplan.questions.compare.report import headline, require_drawn
+        from busplan.questions.compare.svg import compare_svg
+
         require_drawn(self)
         return compare_svg(self, title=sentence_text(headline(self)))
 
@@ -40,6 +41,8 @@ class CompareAnswer(Answer, KindComparison):
         return self._svg() if self.compared else None
 
     def _report(self) -> Report:
+        from busplan.questions.compare.report import compare_report
+
         return compare_report(self)
 
 

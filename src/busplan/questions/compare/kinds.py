@@ -25,7 +25,7 @@ from busplan.sections.profile import Profile
 from busplan.servo.checks import dividing_step_us
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.roundness import CircleFigures
+    from busplan.questions.circle.record import CircleFigures
 
 _ROUND_US: Final = 1000.0
 """Periods of a curve are halves and doubles of it, which buses with some periods alone know, too [us]."""

@@ -12,7 +12,6 @@ from busplan.questions.base.inputs import Models, ProfileLike, argument, checked
 from busplan.questions.circle.circle_tests import circle_tests
 from busplan.questions.diff import difference as analysis
 from busplan.questions.diff.difference import CircleSide, ComparedFigure, Difference, KeyDifference
-from busplan.questions.diff.report import diff_report
 from busplan.sections.profile import Profile
 
 
@@ -65,6 +64,8 @@ class DiffAnswer(Answer):
         return tuple(self._found.regressions(tolerance=allowed / 100))
 
     def _report(self) -> Report:
+        from busplan.questions.diff.report import diff_report
+
         return diff_report(self._found, arguments=self.arguments)
 
     @property

@@ -20,7 +20,7 @@ from busplan.questions.fit.network import bus_of, model_names
 from busplan.sections.profile import Profile
 
 if TYPE_CHECKING:
-    from busplan.questions.circle.roundness import CircleFigures
+    from busplan.questions.circle.record import CircleFigures
 
 Judgement = Literal["better", "worse", "same", "neutral"]
 

@@ -8,7 +8,6 @@ from busplan.forms.numbers import plural
 from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.evidence.figures import KindEvidence, kind_evidence, known_kinds, paper_circles
-from busplan.questions.evidence.report import evidence_report
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -25,6 +24,8 @@ class EvidenceAnswer(Answer):
     kinds: tuple[KindEvidence, ...]
 
     def _report(self) -> Report:
+        from busplan.questions.evidence.report import evidence_report
+
         return evidence_report(self.kinds)
 
     def _headline(self) -> str:

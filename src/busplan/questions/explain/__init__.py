@@ -10,10 +10,8 @@ from busplan.progress import Progress
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
 from busplan.questions.explain import derivation as analysis
-from busplan.questions.explain.assumptions import assumptions_report
 from busplan.questions.explain.derivation import Derivation, Explanation
 from busplan.questions.explain.latency import latency_names
-from busplan.questions.explain.report import explain_report
 from busplan.sections.profile import Profile
 from busplan.sourced import Input
 
@@ -38,6 +36,9 @@ class ExplainAnswer(Answer):
     assumptions: tuple[Input, ...]
 
     def _report(self) -> Report:
+        from busplan.questions.explain.assumptions import assumptions_report
+        from busplan.questions.explain.report import explain_report
+
         if self.derivations:
             return explain_report(Explanation(self.profile, self.derivations))
         return assumptions_report(self.profile, self.assumptions)

@@ -8,7 +8,6 @@ from busplan.questions.base.inputs import Models, ProfileLike, checked_models, l
 from busplan.questions.fit.network import bus_of, network_of
 from busplan.questions.latency import figures as analysis
 from busplan.questions.latency.figures import LatencyResult
-from busplan.questions.latency.report import latency_report
 
 
 class LatencyAnswer(Answer, LatencyResult):
@@ -17,6 +16,8 @@ class LatencyAnswer(Answer, LatencyResult):
     __slots__ = ()
 
     def _report(self) -> Report:
+        from busplan.questions.latency.report import latency_report
+
         return latency_report(self)
 
     def _headline(self) -> str:

@@ -9,8 +9,6 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, load_profile
 from busplan.questions.map import trade_off as analysis
 from busplan.questions.map.direction import Direction, checked_direction
-from busplan.questions.map.report import headline, map_report
-from busplan.questions.map.svg import map_svg
 from busplan.questions.map.trade_off import TradeOff
 from busplan.questions.sweep import axis_values
 from busplan.sections.profile import Profile
@@ -24,9 +22,14 @@ class MapAnswer(Answer, TradeOff):
     __slots__ = ()
 
     def _repr_svg_(self) -> str:
+        from busplan.questions.map.report import headline
+        from busplan.questions.map.svg import map_svg
+
         return map_svg(self, title=sentence_text(headline(self)))
 
     def _report(self) -> Report:
+        from busplan.questions.map.report import map_report
+
         return map_report(self)
 
 

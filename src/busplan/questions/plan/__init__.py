@@ -11,7 +11,6 @@ from busplan.questions.circle.check import CircleCheck
 from busplan.questions.plan import planning as analysis
 from busplan.questions.plan.machine import nodes_for_axes
 from busplan.questions.plan.planning import Plan
-from busplan.questions.plan.report import plan_report
 from busplan.questions.plan.search import MAX_CIRCLES
 
 
@@ -21,6 +20,8 @@ class PlanAnswer(Answer, Plan):
     __slots__ = ()
 
     def _report(self) -> Report:
+        from busplan.questions.plan.report import plan_report
+
         return plan_report(self)
 
 

@@ -8,7 +8,8 @@ from busplan.progress import Progress, part_of
 from busplan.questions.capacity.sensitivity import Sensitivity, sensitivity
 from busplan.questions.capacity.verdict import Verdict, verdicts
 from busplan.questions.circle.contour_profile import ContourProfile, drawn_profile
-from busplan.questions.circle.roundness import CircleFigures, CircleTest, circle_test
+from busplan.questions.circle.record import CircleFigures, CircleTest
+from busplan.questions.circle.roundness import circle_test
 from busplan.questions.explain.derivation import assumptions
 from busplan.questions.fit.circle_refusal import circle_refusals
 from busplan.questions.fit.figures import Capacity, capacity
@@ -16,7 +17,7 @@ from busplan.questions.fit.network import bus_of, model_names
 from busplan.questions.fit.node_steps import NodeSteps, node_steps
 from busplan.questions.latency.figures import LatencyResult, latency
 from busplan.questions.map.trade_off import TradeOff, trade_off
-from busplan.questions.timeline.schedule import Schedule, schedule
+from busplan.questions.timeline.events import Schedule, schedule
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
 from busplan.sourced import Input

@@ -18,13 +18,13 @@ from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, items, load_profile
 from busplan.questions.sweep import blocks as analysis
 from busplan.questions.sweep.asked import Names, Sweep, checked_sweep
-from busplan.questions.sweep.axis_values import listed, parse_values, stepped
 from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.circle_run import circle_blocks, require_circles
 from busplan.questions.sweep.execution import Here
 from busplan.questions.sweep.grid import Array, Grid, Values
 from busplan.questions.sweep.plot import FigureData, require_drawable
 from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
+from busplan.questions.sweep.values import listed, parse_values, stepped
 from busplan.questions.sweep.writers import rows_writer
 from busplan.sections.profile import Profile
 

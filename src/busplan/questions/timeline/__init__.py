@@ -4,9 +4,7 @@ from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, checked_models, finite, load_profile, whole
-from busplan.questions.timeline.report import timeline_report
-from busplan.questions.timeline.schedule import Schedule, Total, schedule, totals, zoom
-from busplan.questions.timeline.svg import timeline_svg
+from busplan.questions.timeline.events import Schedule, Total, schedule, totals, zoom
 
 
 class TimelineAnswer(Answer, Schedule):
@@ -20,9 +18,13 @@ class TimelineAnswer(Answer, Schedule):
         return totals(self)
 
     def _report(self) -> Report:
+        from busplan.questions.timeline.report import timeline_report
+
         return timeline_report(self)
 
     def _repr_svg_(self) -> str:
+        from busplan.questions.timeline.svg import timeline_svg
+
         return timeline_svg(self, title=self._headline())
 
 

@@ -8,6 +8,7 @@ from busplan.forms.legend import legend_lines
 from busplan.forms.lines import BLANK, Line
 from busplan.forms.scale import ticks
 from busplan.questions.fit.network import bus_of
+from busplan.questions.timeline.events import Event, Schedule
 from busplan.questions.timeline.kinds import kind_of
 from busplan.questions.timeline.lanes import (
     Lane,
@@ -33,7 +34,6 @@ from busplan.questions.timeline.period import (
     period_title,
     rest,
 )
-from busplan.questions.timeline.schedule import Event, Schedule
 
 NARROWEST: Final = 60
 """Least columns of a drawing."""

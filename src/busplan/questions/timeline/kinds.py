@@ -2,7 +2,7 @@
 
 from busplan.buses.parts import EventKind
 from busplan.questions.fit.network import bus_of
-from busplan.questions.timeline.schedule import Event
+from busplan.questions.timeline.events import Event
 from busplan.sections.profile import Profile
 
 

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 from busplan.forms.blocks import Sentence, ShownValue, count_value, figure_value, joined, sentence
 from busplan.forms.numbers import figure_text, nouns
 from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.timeline.events import TOTAL, Event, Schedule
 from busplan.questions.timeline.kinds import event_title
-from busplan.questions.timeline.schedule import TOTAL, Event, Schedule
 
 MOST_EVENT_LANES: Final = 20
 """Up to this many events have a row each; more are drawn in a row for each node. A cycle of one node has 20."""

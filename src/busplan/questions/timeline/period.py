@@ -8,8 +8,8 @@ from busplan.forms.blocks import figure_value
 from busplan.forms.numbers import with_unit
 from busplan.questions.fit.figures import CapacityFigures, figures
 from busplan.questions.fit.network import model_names
+from busplan.questions.timeline.events import Event, Schedule
 from busplan.questions.timeline.lanes import overruns, time_text
-from busplan.questions.timeline.schedule import Event, Schedule
 
 REST: Final = "rest of the period"
 NEEDED: Final = "needed"

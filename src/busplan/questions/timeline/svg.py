@@ -9,6 +9,7 @@ from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import figure_text
 from busplan.forms.picture import styled
 from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
+from busplan.questions.timeline.events import SHARE, Event, Schedule, totals
 from busplan.questions.timeline.kinds import event_title, kind_of
 from busplan.questions.timeline.lanes import (
     Stretch,
@@ -36,7 +37,6 @@ from busplan.questions.timeline.period import (
     period_title,
     rest,
 )
-from busplan.questions.timeline.schedule import SHARE, Event, Schedule, totals
 
 _BAR: Final = 18
 _GAP: Final = 14
