@@ -12,7 +12,7 @@ import busplan
 
 HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "resvg_py", "scipy", "tomllib", "tomli_w", "json"}
 FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
-WITH_NUMPY = ("circle_test", "evidence", "sweep", "map_", "report")
+WITH_NUMPY = ("evidence", "sweep", "map_", "report")
 WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
 
 
@@ -48,7 +48,7 @@ def test_an_error_or_a_type_loads_no_analysis() -> None:
         "busplan",
         "busplan.errors",
     }
-    assert not loaded("import busplan; busplan.Profile") & {"numpy", "busplan.analysis", "busplan.answers"}
+    assert not loaded("import busplan; busplan.Profile") & {"numpy", "busplan.questions", "busplan.forms"}
 
 
 def test_a_name_loads_what_it_needs() -> None:
@@ -87,19 +87,16 @@ def test_what_simulates_nothing_loads_no_numpy() -> None:
     assert not loaded(f"import busplan{program}") & {"numpy", "typer", "rich", "resvg_py"}
 
 
-def test_the_command_line_does_not_load_the_interface() -> None:
-    found = loaded(CAPACITY)
-    assert "busplan.cli.capacity" in found
-    assert not {name for name in found if name.startswith("busplan.api")}
-
-
 def test_all_names_are_there_and_listed() -> None:
     assert set(busplan.__all__) <= set(dir(busplan))
     for name in busplan.__all__:
         assert getattr(busplan, name) is getattr(busplan, name)
     for name in FUNCTIONS:
         function = getattr(busplan, name)
-        assert (function.__name__, function.__module__.startswith("busplan.api.")) == (name, True)
+        assert (function.__name__, function.__module__.startswith(("busplan.questions.", "busplan.gate."))) == (
+            name,
+            True,
+        )
 
 
 def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
