@@ -587,6 +587,7 @@ def main() -> int:
     parser.add_argument("profiles", type=int, help="how many profiles")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--calls", type=int, default=6, help="calls of each profile")
+    parser.add_argument("--stories", type=int, default=3, help="one profile in so many is asked of every command")
     parser.add_argument("--quiet", action="store_true", help="failures without their profiles")
     options = parser.parse_args()
     counts, kinds, failures = Counter[str](), kind_names(), 0
@@ -602,7 +603,7 @@ def main() -> int:
                 kinds[number % len(kinds)],
                 asked=rng.sample(every, options.calls),
                 counts=counts,
-                story=number % 3 == 0,
+                story=number % options.stories == 0,
             ):
                 failures += 1
                 print(f"\n{options.seed} {number}: busplan {' '.join(one.arguments)}\n{one.message.strip()}")  # noqa: T201

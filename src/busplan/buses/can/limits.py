@@ -7,8 +7,8 @@ from typing import Final
 
 from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.streams import Stream, collisions, streams
-from busplan.buses.can.traffic import Traffic, traffic_of, without_times
+from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
+from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import messages
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
@@ -52,10 +52,11 @@ def _late(one: Stream, share: float, traffic: Traffic) -> str:
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
-def _slowest(traffic: Traffic, *numbers: float) -> float:
-    """The largest response over deadline of any message [1]."""
-    each, found = messages(traffic.with_numbers(*numbers), is_stuffed=True), 0.0
-    # The lowest priorities first: one of them has no response time, or none has.
+def _slowest(traffic: Traffic, bound: float) -> float:
+    """The largest response over deadline of any message, of plain numbers, where a bound of it does not tell [1]."""
+    if bound <= 1 or bound == inf:
+        return bound
+    each, found = messages(traffic, is_stuffed=True), 0.0
     for one in each.by_priority():
         found = max(found, each.deadline_share(one))
         if found == inf:
@@ -66,8 +67,10 @@ def _slowest(traffic: Traffic, *numbers: float) -> float:
 def _deadline(network: Network) -> Number:
     if not network.profile.message:
         return 0.0
-    traffic = traffic_of(network)
-    return pointwise(partial(_slowest, traffic), *traffic.numbers(), words="busy periods of all messages")
+    sent, words = Sent(traffic_of(network)), "busy periods of all messages"
+    return sent.of_points(
+        _slowest, sent.of(lambda one: messages(one, is_stuffed=True).slowest_share(), words=words), words=words
+    )
 
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
@@ -99,23 +102,17 @@ def _from(first: int, shared: int) -> str:
     return f"{shared} identifiers from {first:#x}" if shared > 1 else f"the identifier {first:#x}"
 
 
-def _shared(traffic: Traffic, *numbers: float) -> float:
-    each = streams(traffic.with_numbers(*numbers), is_stuffed=True)
-    return sum(shared for *_, shared in collisions(each))
-
-
 def _collisions(network: Network) -> Number:
-    traffic = without_times(traffic_of(network))
-    return pointwise(partial(_shared, traffic), *traffic.numbers(), words="identifiers that stand twice")
-
-
-def _last(traffic: Traffic, *numbers: float) -> float:
-    return max(one.last for one in streams(traffic.with_numbers(*numbers), is_stuffed=True))
+    return _of_identifiers(network, identifiers_twice, words="identifiers that stand twice")
 
 
 def _largest_identifier(network: Network) -> Number:
-    traffic = without_times(traffic_of(network))
-    return pointwise(partial(_last, traffic), *traffic.numbers(), words="the largest identifier")
+    return _of_identifiers(network, last_identifier, words="the largest identifier")
+
+
+def _of_identifiers(network: Network, function: Callable[[Sequence[Stream]], Number], *, words: str) -> Number:
+    sent = Sent(without_times(traffic_of(network)))
+    return sent.of(lambda traffic: function(streams(traffic, is_stuffed=True)), words=words)
 
 
 def _most_identifier(network: Network) -> Number:

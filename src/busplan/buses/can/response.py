@@ -7,25 +7,25 @@ revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from itertools import count, repeat
 from math import ceil, inf
 from typing import NamedTuple
 
 from busplan.buses.can.constants import MOST_STEPS, SATURATED
+from busplan.elementwise import Number, choose, is_everywhere, larger, rounded_up, smaller
 
 
 class Sender(NamedTuple):
-    """Frames that one identifier, or several of one kind, put on the bus."""
+    """Frames that one identifier, or several of one kind, put on the bus. The numbers may be arrays."""
 
-    frames_us: float
+    frames_us: Number
     """All frames of one instance, in the worst case [us]."""
-    period_us: float
-    jitter_us: float = 0.0
+    period_us: Number
+    jitter_us: Number = 0.0
     """How late an instance may be queued; negative where the first comes so much behind the start [us]."""
 
     @property
-    def load(self) -> float:
+    def load(self) -> Number:
         """Share of the bus, 0..1 [1]."""
         return self.frames_us / self.period_us
 
@@ -105,8 +105,8 @@ def worst_response(
 
 
 def settled_us(
-    others_us: float, senders: Sequence[Sender], *, more_us: Callable[[float], float] = lambda _: 0.0
-) -> float:
+    others_us: Number, senders: Sequence[Sender], *, more_us: Callable[[Number], Number] = lambda _: 0.0
+) -> Number:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
@@ -130,17 +130,19 @@ def settled_us(
     1200.0
     """
     arrivals = Arrivals(senders)
-    if arrivals.load > _NEARLY_FULL:
-        return arrivals.bound_us(others_us + more_us(inf))
-    return arrivals.settled_us(others_us, repeat(0), more_us=more_us)
+    is_full = arrivals.load > _NEARLY_FULL
+    if is_full is False:
+        return arrivals.settled_us(others_us, repeat(0), more_us=more_us)
+    bound_us = arrivals.bound_us(others_us + more_us(inf))
+    if is_full is True:
+        return bound_us
+    return choose(is_full, bound_us, arrivals.settled_us(others_us, repeat(0), more_us=more_us, is_settled=is_full))
 
 
 _NEARLY_FULL = 0.99
 """Load above which the smallest span takes too many steps to find."""
 _BELOW = 1 - 1e-9
 """A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
-_MANY = 50
-"""Senders from which on arrays are faster."""
 
 
 class _TooManyStepsError(Exception):
@@ -158,56 +160,54 @@ class Arrivals:
 
     def __init__(self, senders: Sequence[Sender]) -> None:
         self._senders = senders
-        self.load = 0.0
+        self.load: Number = 0.0
         """Share of the bus, 0..1 [1]."""
-        self.frames_us = 0.0
+        self.frames_us: Number = 0.0
         """One instance of each [us]."""
-        self._of_jitter_us = 0.0
+        self._of_jitter_us: Number = 0.0
         for frames_us, period_us, jitter_us in senders:
             load = frames_us / period_us
-            self.load += load
-            self.frames_us += frames_us
-            self._of_jitter_us += load * jitter_us
+            self.load = self.load + load
+            self.frames_us = self.frames_us + frames_us
+            self._of_jitter_us = self._of_jitter_us + load * jitter_us
 
-    @cached_property
-    def in_window_us(self) -> Callable[[float], float]:
+    def in_window_us(self, window_us: Number) -> Number:
         """Frames that arrive in a window of time, sum ceil((window + J) / T) C [us]."""
-        if len(self._senders) < _MANY:
-            return lambda window_us: sum(
-                ceil((window_us + jitter_us) / period_us) * us for us, period_us, jitter_us in self._senders
-            )
-        import numpy as np
+        found_us: Number = 0.0
+        up = ceil if isinstance(window_us + self._of_jitter_us, float) else rounded_up
+        for frames_us, period_us, jitter_us in self._senders:
+            found_us = found_us + up((window_us + jitter_us) / period_us) * frames_us
+        return found_us
 
-        us, period_us, jitter_us = np.array(self._senders).T
-        return lambda window_us: float(np.ceil((window_us + jitter_us) / period_us) @ us)
-
-    def bound_us(self, before_us: float, *, bit_us: float = 0.0) -> float:
+    def bound_us(self, before_us: Number, *, bit_us: Number = 0.0) -> Number:
         """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us].
 
         ceil(x) is less than x + 1, so w <= (before + sum (1 + (J + bit) / T) C) / (1 - load).
         """
         most_us = before_us + self.frames_us + self._of_jitter_us + self.load * bit_us
-        return most_us / (1 - min(self.load, SATURATED))
+        return most_us / (1 - smaller(self.load, SATURATED))
 
     def settled_us(
         self,
-        before_us: float,
+        before_us: Number,
         steps: Iterable[int],
         *,
-        bit_us: float = 0.0,
-        from_us: float = 0.0,
-        more_us: Callable[[float], float] = lambda _: 0.0,
-    ) -> float:
+        bit_us: Number = 0.0,
+        from_us: Number = 0.0,
+        more_us: Callable[[Number], Number] = lambda _: 0.0,
+        is_settled: Number = False,
+    ) -> Number:
         """The smallest w = before + more(w) + sum ceil((w + J + bit) / T) C that is no less than `from_us` [us].
 
-        The load is below 1; `steps` are as many as may be taken.
+        The load is below 1, but for the points of an array that are settled; `steps` are as many as may be taken.
         """
         # ceil(x) is no less than x: no solution lies below that of the sum without rounding.
-        least_us = (before_us + self._of_jitter_us + self.load * bit_us) / (1 - self.load)
-        span_us = max(from_us, before_us, least_us * _BELOW)
+        least_us = (before_us + self._of_jitter_us + self.load * bit_us) / (1 - choose(is_settled, 0.0, self.load))
+        span_us = larger(larger(from_us, before_us), least_us * _BELOW)
         for _ in steps:
             further_us = before_us + more_us(span_us) + self.in_window_us(span_us + bit_us)
-            if further_us <= span_us:
+            is_end = further_us <= span_us
+            if is_everywhere(is_end | is_settled):
                 return span_us
-            span_us = further_us
+            span_us = larger(further_us, span_us)
         raise _TooManyStepsError
