@@ -1,7 +1,7 @@
 """What a CAN bus and the CANopen identifiers forbid, the load of the bus, and deadlines."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import partial, reduce
 from math import inf
 from typing import Final
 
@@ -9,7 +9,7 @@ from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES,
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages
+from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
@@ -52,11 +52,10 @@ def _late(one: Stream, share: float, traffic: Traffic) -> str:
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
-def _slowest(traffic: Traffic, bound: float) -> float:
-    """The largest response over deadline of any message, of plain numbers, where a bound of it does not tell [1]."""
-    if bound <= 1 or bound == inf:
-        return bound
+def _slowest(traffic: Traffic) -> float:
+    """The largest response over deadline of any message of plain numbers [1]."""
     each, found = messages(traffic, is_stuffed=True), 0.0
+    # The lowest priorities first: one of them has no response time, or none has.
     for one in each.by_priority():
         found = max(found, each.deadline_share(one))
         if found == inf:
@@ -67,10 +66,32 @@ def _slowest(traffic: Traffic, bound: float) -> float:
 def _deadline(network: Network) -> Number:
     if not network.profile.message:
         return 0.0
-    sent, words = Sent(traffic_of(network)), "busy periods of all messages"
-    return sent.of_points(
-        _slowest, sent.of(lambda one: messages(one, is_stuffed=True).slowest_share(), words=words), words=words
-    )
+    return Sent(traffic_of(network)).of_points(_slowest, words=_DEADLINE_WORDS)
+
+
+def _largest(traffic: Traffic, share: Callable[[Messages, Stream], Number]) -> Number:
+    each = messages(traffic, is_stuffed=True)
+    return reduce(larger, (share(each, one) for one in each.by_priority()))
+
+
+def _is_late(network: Network) -> Number:
+    """Whether any message misses its deadline: exact response times are found only where bounds of them do not tell."""
+    if not network.profile.message:
+        return False
+    sent = Sent(traffic_of(network))
+    least = sent.of(lambda traffic: _largest(traffic, Messages.least_share), words=_DEADLINE_WORDS)
+    most = sent.of(lambda traffic: _largest(traffic, Messages.bound_share), words=_DEADLINE_WORDS)
+
+    def is_late(at: float, least: float, most: float) -> bool:
+        if least > 1 or most <= 1:
+            return least > 1
+        each = messages(sent.at(at), is_stuffed=True)
+        return any(each.deadline_share(one) > 1 for one in each.by_priority())
+
+    return pointwise(is_late, sent.place, least, most, words=_DEADLINE_WORDS)
+
+
+_DEADLINE_WORDS: Final = "busy periods of all messages"
 
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
@@ -212,6 +233,7 @@ LIMITS: Final = (
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         has_rule=True,
         says=lambda network: _all_late(traffic_of(network)),
-        kept_from_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
+        breaks=_is_late,
+        kept_from_us=partial(_kept_from_us, _is_late),
     ),
 )

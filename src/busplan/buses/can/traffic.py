@@ -1,7 +1,7 @@
 """What a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from itertools import islice
 from typing import Any, Final, NamedTuple
 
@@ -98,6 +98,7 @@ class Sent:
 
     def __init__(self, traffic: Traffic) -> None:
         self.traffic = traffic
+        self._known: Callable[[int], Traffic]
 
     def of(self, function: Callable[..., Number], *others: Number, words: str) -> Number:
         """What a function of the traffic gives.
@@ -118,8 +119,11 @@ class Sent:
 
     def of_points(self, function: Callable[..., Number], *others: Number, words: str) -> Number:
         """What a function of traffic of plain numbers gives, point by point; arguments as `of` has them."""
-        each, place = self._points
-        return pointwise(lambda at, *more: function(each[int(at)], *more), place, *others, words=words)
+        return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *others, words=words)
+
+    def at(self, place: float) -> Traffic:
+        """The traffic of plain numbers at a place."""
+        return self._known(int(place))
 
     @cached_property
     def _is_ordered(self) -> bool:
@@ -132,13 +136,15 @@ class Sent:
         )
 
     @cached_property
-    def _points(self) -> tuple[list[Traffic], Number]:
-        """Traffic of plain numbers, each once, and the place of that of each point."""
+    def place(self) -> Number:
+        """The place of the traffic of each point; points that are alike have one."""
         places: dict[tuple[float, ...], int] = {}
         place = pointwise(
             lambda *numbers: places.setdefault(numbers, len(places)), *self.traffic.numbers(), words="all that is sent"
         )
-        return [self.traffic.with_numbers(*numbers) for numbers in places], place
+        rows = tuple(places)
+        self._known = lru_cache(maxsize=1024)(lambda at: self.traffic.with_numbers(*rows[at]))
+        return place
 
 
 class _Senders(NamedTuple):

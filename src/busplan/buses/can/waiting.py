@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
 from busplan.buses.can.equations import bit_us
-from busplan.buses.can.response import Response, Sender, settled_us, worst_response
+from busplan.buses.can.response import BELOW, Response, Sender, settled_us, worst_response
 from busplan.buses.can.streams import Stream, last_identifier, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
 from busplan.elementwise import Number, choose, is_everywhere, larger, plain, rounded_up, smaller, total
@@ -132,6 +132,8 @@ class _Start:
             one.frames_us * (stream.name in late) for one, stream in zip(self.senders, ranked, strict=True)
         )
         # ceil(x) is less than x + 1.
+        # ceil(x) is no less than x.
+        self.least_us = _sums(one.load * (one.jitter_us + bit_us) for one in self.senders)
         self.most_us = _sums(one.frames_us + one.load * (larger(one.jitter_us, 0.0) + bit_us) for one in self.senders)
 
 
@@ -203,6 +205,16 @@ class Messages:
         idle = choose(has_response, 1 - load + sender.load, 1.0)
         return choose(has_response, (own.jitter_us + own.frame_us + most_us / idle) / own.deadline_us, inf)
 
+    def least_share(self, own: Stream) -> Number:
+        """What the response over the deadline is at least, of a busy period that begins with SYNC [1]."""
+        behind, sender = self._behind(own), own.sender()
+        load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
+        waits_us = waits_us - sender.load * (sender.jitter_us + self._bit_us)
+        has_response = load < SATURATED
+        idle = choose(has_response, 1 - load + sender.load, 1.0)
+        least_us = own.jitter_us + own.frame_us + waits_us / idle
+        return choose(has_response, least_us / own.deadline_us * BELOW, inf)
+
     def deadline_share(self, own: Stream) -> float:
         """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1]."""
         bound = plain(self.bound_share(own))
@@ -210,10 +222,6 @@ class Messages:
             return bound
         found = self.response(own)
         return inf if found is None else found.us / plain(own.deadline_us)
-
-    def slowest_share(self) -> Number:
-        """The largest response over deadline of any message, or a bound of it that is no more than 1 [1]."""
-        return reduce(larger, map(self.bound_share, self.by_priority()))
 
     def _behind(self, own: Stream) -> int:
         """The first rank behind a message."""
