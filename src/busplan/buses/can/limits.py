@@ -3,17 +3,18 @@
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial, reduce
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
+from busplan.buses.can.response import TooManyStepsError
 from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
 from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
 from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
-from busplan.elementwise import Number, larger, plain, pointwise, total
+from busplan.elementwise import Number, is_everywhere, larger, plain, pointwise, total
 from busplan.sections.base import MAX_TIME_US
 
 
@@ -26,7 +27,7 @@ def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
     """Messages that miss their deadline, each with its response over its deadline."""
     each = messages(traffic, is_stuffed=True)
     for one in streams(traffic, is_stuffed=True):
-        if one.is_message and (share := each.deadline_share(one)) > 1:
+        if one.is_message and (share := plain(each.deadline_share(one))) > 1:
             yield one, share
 
 
@@ -57,7 +58,7 @@ def _slowest(traffic: Traffic) -> float:
     each, found = messages(traffic, is_stuffed=True), 0.0
     # The lowest priorities first: one of them has no response time, or none has.
     for one in each.by_priority():
-        found = max(found, each.deadline_share(one))
+        found = max(found, plain(each.deadline_share(one)))
         if found == inf:
             break
     return found
@@ -83,12 +84,54 @@ def _is_late(network: Network) -> Number:
     most = sent.of(lambda traffic: _largest(traffic, Messages.bound_share), words=_DEADLINE_WORDS)
 
     def is_late(at: float, least: float, most: float) -> bool:
-        if least > 1 or most <= 1:
-            return least > 1
-        each = messages(sent.at(at), is_stuffed=True)
-        return any(each.deadline_share(one) > 1 for one in each.by_priority())
+        return bool(_has_late(sent.at(at))) if least <= 1 < most else least > 1
 
+    if sent.is_ordered and not isinstance(least + most, float):
+        return _late_points(sent.traffic, least, most)
     return pointwise(is_late, sent.place, least, most, words=_DEADLINE_WORDS)
+
+
+def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
+    """Whether any message misses its deadline at each point of arrays, of which bounds of it are known."""
+    import numpy as np
+
+    numbers: tuple[Any, ...] = traffic.numbers()
+    shape = np.broadcast_shapes(np.shape(least), np.shape(most), *map(np.shape, numbers))
+    least, most = (np.broadcast_to(one, shape).ravel() for one in (least, most))
+    columns = [one if isinstance(one, int | float) else np.broadcast_to(one, shape).ravel() for one in numbers]
+    late = least > 1
+    asked = np.flatnonzero((least <= 1) & (most > 1))
+    # Points of like loads take like numbers of steps.
+    asked = asked[np.argsort(most[asked])]
+    waiting = [asked[first : first + _POINTS_AT_ONCE] for first in range(0, len(asked), _POINTS_AT_ONCE)]
+    while waiting:
+        some = waiting.pop()
+        at = some if len(some) > 1 else some[0]
+        row = (one if isinstance(one, int | float) else one[at] for one in columns)
+        try:
+            late[some] = _has_late(traffic.with_numbers(*map(_as_plain, row)))
+        except TooManyStepsError:
+            waiting += np.array_split(some, 2)
+    return late.reshape(shape)
+
+
+def _as_plain(number: Any) -> Number:
+    """One point of an array as a plain number."""
+    found: Number = getattr(number, "item", lambda: number)() if getattr(number, "ndim", 0) == 0 else number
+    return found
+
+
+_POINTS_AT_ONCE: Final = 4096
+"""Points whose response times are found together."""
+
+
+def _has_late(traffic: Traffic) -> Number:
+    each, found = messages(traffic, is_stuffed=True), False
+    for one in each.by_priority():
+        found = found | (each.deadline_share(one) > 1)
+        if is_everywhere(found):
+            break
+    return found
 
 
 _DEADLINE_WORDS: Final = "busy periods of all messages"

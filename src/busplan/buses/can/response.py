@@ -32,15 +32,15 @@ class Sender(NamedTuple):
 
 
 class Response(NamedTuple):
-    """The worst case of one message: R = J + B + I + q (C - T) + C."""
+    """The worst case of one message: R = J + B + I + q (C - T) + C. The numbers may be arrays."""
 
-    blocking_us: float
+    blocking_us: Number
     """B, the longest frame of a lower priority [us]."""
-    instance: int
+    instance: Number
     """q of the worst instance in the busy period, from 0 [1]."""
-    interference_us: float
+    interference_us: Number
     """I, frames of higher priorities that go before it [us]."""
-    us: float
+    us: Number
     """R [us]."""
 
 
@@ -79,30 +79,50 @@ def worst_response(
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000.0, us=3500.0)
     """
+    try:
+        return worst_instance(own, higher, blocking_us=blocking_us, bit_us=bit_us, first_us=first_us)
+    except TooManyStepsError:
+        return None
+
+
+def worst_instance(
+    own: Sender, higher: Sequence[Sender], *, blocking_us: Number, bit_us: Number, first_us: Number = 0.0
+) -> Response | None:
+    """As `worst_response`, of arrays, too: R is infinite at points that have none, and None says that none has one.
+
+    Raises
+    ------
+    TooManyStepsError
+        It takes over `MOST_STEPS` to find, at all points together.
+    """
     before = Arrivals(higher)
-    if before.load + own.load >= SATURATED:
+    is_over = before.load + own.load >= SATURATED
+    if is_everywhere(is_over):
         return None
     steps, ahead_us = iter(range(int(MOST_STEPS))), blocking_us + first_us
-    bound_us, per_us = before.bound_us(ahead_us, bit_us=bit_us), own.frames_us / (1 - before.load)
-    worst, waits_us = None, 0.0
-    try:
-        for instance in count():
-            late_us = own.jitter_us + own.frames_us - instance * own.period_us
-            if worst and late_us + bound_us + instance * per_us <= worst.us:
-                break  # the bound falls from one instance to the next
+    bound_us = before.bound_us(ahead_us, bit_us=bit_us)
+    per_us = own.frames_us / (1 - choose(is_over, 0.0, before.load))
+    worst, waits_us = Response(blocking_us, 0, 0.0, choose(is_over, inf, 0.0)), 0.0
+    for instance in count():
+        late_us = own.jitter_us + own.frames_us - instance * own.period_us
+        if instance:
+            # The bound falls from one instance to the next.
+            is_over = is_over | (late_us + bound_us + instance * per_us <= worst.us)
+            if is_everywhere(is_over):
+                return worst
             if instance == 1:
                 from_us = ahead_us + own.frames_us + before.frames_us
-                busy_us = Arrivals((own, *higher)).settled_us(ahead_us, steps, from_us=from_us)
-            if instance and instance * own.period_us >= busy_us + own.jitter_us:
-                break
-            # It waits at least as long as the instance before it, and for that one.
-            own_us = instance * own.frames_us
-            waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us)
-            if worst is None or waits_us + late_us > worst.us:
-                worst = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
-    except _TooManyStepsError:
-        return None
-    return worst
+                busy_us = Arrivals((own, *higher)).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
+            is_over = is_over | (instance * own.period_us >= busy_us + own.jitter_us)
+            if is_everywhere(is_over):
+                return worst
+        # It waits at least as long as the instance before it, and for that one.
+        own_us = instance * own.frames_us
+        waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us, is_settled=is_over)
+        found = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
+        is_worse = choose(is_over, False, found.us > worst.us if instance else True)
+        worst = Response(*(choose(is_worse, new, old) for new, old in zip(found, worst, strict=True)))
+    raise AssertionError
 
 
 def settled_us(
@@ -150,7 +170,7 @@ _MANY = 50
 """Senders from which on arrays are faster."""
 
 
-class _TooManyStepsError(Exception):
+class TooManyStepsError(Exception):
     """A span takes too many steps to find."""
 
 
@@ -228,4 +248,4 @@ class Arrivals:
             if is_everywhere(is_end | is_settled):
                 return span_us
             span_us = larger(further_us, span_us)
-        raise _TooManyStepsError
+        raise TooManyStepsError

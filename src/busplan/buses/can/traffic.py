@@ -113,7 +113,7 @@ class Sent:
         words
             What a derivation says of it.
         """
-        if self._is_ordered:
+        if self.is_ordered:
             return function(self.traffic, *others)
         return self.of_points(function, *others, words=words)
 
@@ -126,7 +126,7 @@ class Sent:
         return self._known(int(place))
 
     @cached_property
-    def _is_ordered(self) -> bool:
+    def is_ordered(self) -> bool:
         """Whether identifiers and sizes of messages are plain, and no number is traced."""
         traffic = self.traffic
         messages = (number for one in traffic.messages for number in (one.identifier, one.payload_bytes))

@@ -10,7 +10,15 @@ from typing import Final, NamedTuple
 
 from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
 from busplan.buses.can.equations import bit_us
-from busplan.buses.can.response import BELOW, Response, Sender, settled_us, worst_response
+from busplan.buses.can.response import (
+    BELOW,
+    Response,
+    Sender,
+    TooManyStepsError,
+    settled_us,
+    worst_instance,
+    worst_response,
+)
 from busplan.buses.can.streams import Stream, last_identifier, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
 from busplan.elementwise import Number, choose, is_everywhere, larger, plain, rounded_up, smaller, total
@@ -179,21 +187,26 @@ class Messages:
         return self._loads[self._behind(own)]
 
     def response(self, own: Stream) -> Response | None:
-        """Worst-case response of a message; None where `worst_response` has none."""
-        behind, found = self._behind(own), []
-        at = self._ranked.index(own)
+        """Worst-case response of a message of plain numbers; None where `worst_response` has none."""
+        try:
+            found = [*self._responses(own)]
+        except TooManyStepsError:
+            return None
+        each = [one for one in found if one is not None]
+        return max(each, key=lambda one: plain(one.us)) if len(each) == len(found) else None
+
+    def _responses(self, own: Stream) -> Iterator[Response | None]:
+        """The worst instance of a message from each start of a busy period."""
+        behind = self._behind(own)
+        at = next(place for place, one in enumerate(self._ranked) if one.is_message and one.name == own.name)
         for start in self._starts:
-            one = worst_response(
+            yield worst_instance(
                 own.sender(),
                 start.senders[:at] + start.senders[at + 1 : behind],
                 blocking_us=self._longest_us[behind],
                 bit_us=self._bit_us,
                 first_us=start.first_us[behind],
             )
-            if one is None:
-                return None
-            found.append(one)
-        return max(found, key=lambda one: one.us)
 
     def bound_share(self, own: Stream) -> Number:
         """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
@@ -215,13 +228,23 @@ class Messages:
         least_us = own.jitter_us + own.frame_us + waits_us / idle
         return choose(has_response, least_us / own.deadline_us * BELOW, inf)
 
-    def deadline_share(self, own: Stream) -> float:
-        """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1]."""
-        bound = plain(self.bound_share(own))
-        if bound <= 1 or bound == inf:
+    def deadline_share(self, own: Stream) -> Number:
+        """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1].
+
+        Raises
+        ------
+        TooManyStepsError
+            It takes too many steps to find at some of several points.
+        """
+        bound = self.bound_share(own)
+        tells = (bound <= 1) | (bound == inf)
+        if is_everywhere(tells):
             return bound
-        found = self.response(own)
-        return inf if found is None else found.us / plain(own.deadline_us)
+        if isinstance(bound, float):
+            found = self.response(own)
+            return inf if found is None else found.us / own.deadline_us
+        us = (inf if one is None else one.us for one in self._responses(own))
+        return choose(tells, bound, reduce(larger, us) / own.deadline_us)
 
     def _behind(self, own: Stream) -> int:
         """The first rank behind a message."""
