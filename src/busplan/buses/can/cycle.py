@@ -320,7 +320,8 @@ def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> N
 
 
 def _last(traffic: Traffic) -> Number:
-    return last_cyclic(streams(traffic, is_stuffed=True))
+    found: Number = last_cyclic(streams(traffic, is_stuffed=True))
+    return found
 
 
 def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:

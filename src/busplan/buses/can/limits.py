@@ -112,7 +112,8 @@ def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
             late[some] = _has_late(traffic.with_numbers(*map(_as_plain, row)))
         except TooManyStepsError:
             waiting += np.array_split(some, 2)
-    return late.reshape(shape)
+    found: Number = late.reshape(shape)
+    return found
 
 
 def _as_plain(number: Any) -> Number:

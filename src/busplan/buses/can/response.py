@@ -10,23 +10,26 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property, reduce
 from itertools import count, repeat
 from math import ceil, inf
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from busplan.buses.can.constants import MOST_STEPS, SATURATED
-from busplan.elementwise import Number, choose, is_everywhere, larger, rounded_up, smaller
+from busplan.elementwise import choose, is_everywhere, larger, rounded_up, smaller
+
+Points: TypeAlias = Any
+"""A plain number, or an array with one for each point; never a traced one."""
 
 
 class Sender(NamedTuple):
     """Frames that one identifier, or several of one kind, put on the bus. The numbers may be arrays."""
 
-    frames_us: Number
+    frames_us: Points
     """All frames of one instance, in the worst case [us]."""
-    period_us: Number
-    jitter_us: Number = 0.0
+    period_us: Points
+    jitter_us: Points = 0.0
     """How late an instance may be queued; negative where the first comes so much behind the start [us]."""
 
     @property
-    def load(self) -> Number:
+    def load(self) -> Points:
         """Share of the bus, 0..1 [1]."""
         return self.frames_us / self.period_us
 
@@ -34,13 +37,13 @@ class Sender(NamedTuple):
 class Response(NamedTuple):
     """The worst case of one message: R = J + B + I + q (C - T) + C. The numbers may be arrays."""
 
-    blocking_us: Number
+    blocking_us: Points
     """B, the longest frame of a lower priority [us]."""
-    instance: Number
+    instance: Points
     """q of the worst instance in the busy period, from 0 [1]."""
-    interference_us: Number
+    interference_us: Points
     """I, frames of higher priorities that go before it [us]."""
-    us: Number
+    us: Points
     """R [us]."""
 
 
@@ -86,7 +89,7 @@ def worst_response(
 
 
 def worst_instance(
-    own: Sender, higher: Sequence[Sender], *, blocking_us: Number, bit_us: Number, first_us: Number = 0.0
+    own: Sender, higher: Sequence[Sender], *, blocking_us: Points, bit_us: Points, first_us: Points = 0.0
 ) -> Response | None:
     """As `worst_response`, of arrays, too: R is infinite at points that have none, and None says that none has one.
 
@@ -126,8 +129,8 @@ def worst_instance(
 
 
 def settled_us(
-    others_us: Number, senders: Sequence[Sender], *, more_us: Callable[[Number], Number] = lambda _: 0.0
-) -> Number:
+    others_us: Points, senders: Sequence[Sender], *, more_us: Callable[[Points], Points] = lambda _: 0.0
+) -> Points:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
@@ -185,22 +188,22 @@ class Arrivals:
 
     def __init__(self, senders: Sequence[Sender]) -> None:
         self._senders = senders
-        self.load: Number = 0.0
+        self.load: Points = 0.0
         """Share of the bus, 0..1 [1]."""
-        self.frames_us: Number = 0.0
+        self.frames_us: Points = 0.0
         """One instance of each [us]."""
-        self._of_jitter_us: Number = 0.0
+        self._of_jitter_us: Points = 0.0
         for frames_us, period_us, jitter_us in senders:
             load = frames_us / period_us
             self.load = self.load + load
             self.frames_us = self.frames_us + frames_us
             self._of_jitter_us = self._of_jitter_us + load * jitter_us
 
-    def in_window_us(self, window_us: Number) -> Number:
+    def in_window_us(self, window_us: Points) -> Points:
         """Frames that arrive in a window of time, sum ceil((window + J) / T) C [us]."""
         if isinstance(window_us + self._of_jitter_us, float):
             return self._in_plain_window_us(window_us)
-        found_us: Number = 0.0
+        found_us: Points = 0.0
         for frames_us, period_us, jitter_us in self._senders:
             found_us = found_us + rounded_up((window_us + jitter_us) / period_us) * frames_us
         return found_us
@@ -217,7 +220,7 @@ class Arrivals:
         us, period_us, jitter_us = np.array(self._senders).T
         return lambda window_us: float(np.cumsum(np.ceil((window_us + jitter_us) / period_us) * us)[-1])
 
-    def bound_us(self, before_us: Number, *, bit_us: Number = 0.0) -> Number:
+    def bound_us(self, before_us: Points, *, bit_us: Points = 0.0) -> Points:
         """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us].
 
         ceil(x) is less than x + 1, so w <= (before + sum (1 + (J + bit) / T) C) / (1 - load).
@@ -227,14 +230,14 @@ class Arrivals:
 
     def settled_us(
         self,
-        before_us: Number,
+        before_us: Points,
         steps: Iterable[int],
         *,
-        bit_us: Number = 0.0,
-        from_us: Number = 0.0,
-        more_us: Callable[[Number], Number] = lambda _: 0.0,
-        is_settled: Number = False,
-    ) -> Number:
+        bit_us: Points = 0.0,
+        from_us: Points = 0.0,
+        more_us: Callable[[Points], Points] = lambda _: 0.0,
+        is_settled: Points = False,
+    ) -> Points:
         """The smallest w = before + more(w) + sum ceil((w + J + bit) / T) C that is no less than `from_us` [us].
 
         The load is below 1, but for the points of an array that are settled; `steps` are as many as may be taken.

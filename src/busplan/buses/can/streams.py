@@ -8,9 +8,9 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
 from busplan.buses.can.equations import frame_us
-from busplan.buses.can.response import Sender
+from busplan.buses.can.response import Points, Sender
 from busplan.buses.can.traffic import FOLLOWS, SYNC, Pdos, Traffic
-from busplan.elementwise import Number, choose, larger, plain, rounded_up, smaller, total
+from busplan.elementwise import choose, larger, plain, rounded_up, smaller, total
 
 Found = TypeVar("Found")
 
@@ -22,20 +22,20 @@ class Stream(NamedTuple):
     group: str
     block: int
     """Identifier from which on the first group has them: a message in a block that grows stays behind it."""
-    first: Number
-    identifiers: Number
+    first: Points
+    identifiers: Points
     """How many identifiers; each sends once in a period [1]."""
-    data_bytes: Number
-    frame_us: Number
-    period_us: Number
-    jitter_us: Number
-    deadline_us: Number
+    data_bytes: Points
+    frame_us: Points
+    period_us: Points
+    jitter_us: Points
+    deadline_us: Points
     is_message: bool = False
     is_end: bool = True
     """Whether the PDO, or the message, is complete with it."""
 
     @property
-    def last(self) -> Number:
+    def last(self) -> Points:
         """The last identifier."""
         return self.first + self.identifiers - 1
 
@@ -44,7 +44,7 @@ class Stream(NamedTuple):
         """What it is called."""
         return f"{self.group} {self.name}" if self.group else self.name
 
-    def sender(self, count: Number | None = None) -> Sender:
+    def sender(self, count: Points | None = None) -> Sender:
         """Its frames, or some of them, as a source."""
         return Sender((self.identifiers if count is None else count) * self.frame_us, self.period_us, self.jitter_us)
 
@@ -86,7 +86,7 @@ def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
 
 
 def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
-    def sent(name: str, block: int, size: Number, **more: Any) -> Stream:
+    def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
         us = frame_us(
             size,
             identifier_bits=traffic.identifier_bits,
@@ -104,7 +104,7 @@ def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
 
     yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
     block = {"read": FOLLOWS, "write": FOLLOWS}
-    free: dict[str, Number] = dict(block)
+    free: dict[str, Points] = dict(block)
     for one in traffic.pdos:
         said, count = int(plain(one.identifier)), _whole(one.pdos)
         first = free[one.kind] if said == FOLLOWS else said
@@ -149,17 +149,17 @@ _MOST_FRAMES: Final = int(MOST_PDOS) + 1
 """Frames of one PDO that have streams: with one more than a bus allows, its limit is broken already."""
 
 
-def _whole(number: Number) -> Number:
+def _whole(number: Points) -> Points:
     """A number that is whole, as an int where it is plain."""
     return int(number) if isinstance(number, int | float) else number
 
 
-def last_identifier(each: Iterable[Stream]) -> Number:
+def last_identifier(each: Iterable[Stream]) -> Points:
     """The largest identifier of some streams."""
     return reduce(larger, (choose(one.identifiers > 0, one.last, 0) for one in each))
 
 
-def identifiers_twice(each: Sequence[Stream]) -> Number:
+def identifiers_twice(each: Sequence[Stream]) -> Points:
     """How many identifiers stand twice, or more often [1]."""
     if all(isinstance(one.last, int) for one in each):
         return sum(shared for *_, shared in collisions(each))
@@ -181,8 +181,3 @@ def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, in
     for place, other in sorted(pairs):
         first = max(each[place].first, each[other].first)
         yield each[place], each[other], first, min(each[place].last, each[other].last) - first + 1
-
-
-def load_before(own: Stream, each: Sequence[Stream]) -> float:
-    """Load of the bus by one stream and all that go before it, 0..1 [1]."""
-    return sum(one.sender().load for one in each if one is own or one.goes_before(own))

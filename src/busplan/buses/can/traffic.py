@@ -1,6 +1,6 @@
 """What a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache, reduce
 from itertools import islice
 from typing import Any, Final, NamedTuple
@@ -69,15 +69,17 @@ class Traffic(NamedTuple):
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in one row, as `with_numbers` takes them."""
         pdos = (number for one in self.pdos for number in one[_PDO_WORDS:])
-        return (*self[:_OWN_NUMBERS], *pdos, *(number for one in self.messages for number in one[_MESSAGE_WORDS:]))
+        own: tuple[Any, ...] = self[:_OWN_NUMBERS]
+        return (*own, *pdos, *(number for one in self.messages for number in one[_MESSAGE_WORDS:]))
 
-    def with_numbers(self, *numbers: float) -> "Traffic":
+    def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
-        rest: Any = iter(numbers)
-        own = tuple(islice(rest, _OWN_NUMBERS))
+        rest: Iterator[Any] = iter(numbers)
+        own: Any = islice(rest, _OWN_NUMBERS)
         pdos = tuple(Pdos(one.kind, one.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for one in self.pdos)
         count = len(Message._fields) - _MESSAGE_WORDS
-        return Traffic(*own, pdos, tuple(Message(one.name, *islice(rest, count)) for one in self.messages))
+        messages = tuple(Message(one.name, *islice(rest, count)) for one in self.messages)
+        return Traffic(*own, pdos=pdos, messages=messages)
 
 
 _OWN_NUMBERS: Final = len(Traffic._fields) - 2
@@ -100,7 +102,7 @@ class Sent:
         self.traffic = traffic
         self._known: Callable[[int], Traffic]
 
-    def of(self, function: Callable[..., Number], *others: Number, words: str) -> Number:
+    def of(self, function: Callable[..., Any], *others: Number, words: str) -> Number:
         """What a function of the traffic gives.
 
         Parameters
@@ -117,7 +119,7 @@ class Sent:
             return function(self.traffic, *others)
         return self.of_points(function, *others, words=words)
 
-    def of_points(self, function: Callable[..., Number], *others: Number, words: str) -> Number:
+    def of_points(self, function: Callable[..., float], *others: Number, words: str) -> Number:
         """What a function of traffic of plain numbers gives, point by point; arguments as `of` has them."""
         return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *others, words=words)
 

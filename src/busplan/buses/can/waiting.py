@@ -12,6 +12,7 @@ from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
 from busplan.buses.can.equations import bit_us
 from busplan.buses.can.response import (
     BELOW,
+    Points,
     Response,
     Sender,
     TooManyStepsError,
@@ -21,7 +22,7 @@ from busplan.buses.can.response import (
 )
 from busplan.buses.can.streams import Stream, last_identifier, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
-from busplan.elementwise import Number, choose, is_everywhere, larger, plain, rounded_up, smaller, total
+from busplan.elementwise import choose, is_everywhere, larger, plain, rounded_up, smaller, total
 
 _CYCLIC: Final = (SYNC, *NAMES.values())
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
@@ -30,9 +31,9 @@ _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 class Waits(NamedTuple):
     """What a cycle waits for, from the queued SYNC to the end of the last command."""
 
-    lasts_us: Number
+    lasts_us: Points
     """All of it [us]."""
-    blocking_us: Number
+    blocking_us: Points
     """Frames of a lower priority than SYNC and all PDOs that go where these leave the bus idle [us]."""
     lower: tuple[Stream, ...]
     """Messages of a lower priority than SYNC and all PDOs, the longest first."""
@@ -44,18 +45,18 @@ class Waits(NamedTuple):
         return islice(chain.from_iterable(each), int(MOST_BLOCKS))
 
 
-def is_higher(message: Number, last: Number) -> Number:
+def is_higher(message: Points, last: Points) -> Points:
     """Whether an identifier goes before the last one of SYNC and all PDOs; of any sort."""
     return message <= last
 
 
-def last_cyclic(each: Iterable[Stream]) -> Number:
+def last_cyclic(each: Iterable[Stream]) -> Points:
     """The largest identifier of SYNC and all PDOs."""
     return last_identifier(one for one in each if not one.is_message)
 
 
 @remembered(maxsize=256)
-def waits(traffic: Traffic, others_us: Number, *, is_stuffed: bool) -> Waits:
+def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     """Find how long a cycle lasts with the frames of other messages.
 
     Parameters
@@ -87,9 +88,9 @@ def waits(traffic: Traffic, others_us: Number, *, is_stuffed: bool) -> Waits:
     by_length = sorted(messages, key=lambda one: -plain(one.data_bytes))
     lower = tuple(one for one in by_length if is_higher(one.first, last) is not True)
 
-    def blocking_us(span_us: Number) -> Number:
-        blocked: Number = 0.0
-        left: Number = int(MOST_BLOCKS)
+    def blocking_us(span_us: Points) -> Points:
+        blocked: Points = 0.0
+        left: Points = int(MOST_BLOCKS)
         for one in lower:
             count = choose(is_higher(one.first, last), 0, smaller(_frames_within(one, span_us), left))
             for number in range(int(MOST_BLOCKS)):
@@ -103,12 +104,12 @@ def waits(traffic: Traffic, others_us: Number, *, is_stuffed: bool) -> Waits:
     return Waits(lasts_us, blocking_us(lasts_us), lower)
 
 
-def _frames_within(one: Stream, span_us: Number) -> Number:
+def _frames_within(one: Stream, span_us: Points) -> Points:
     """Frames of a message of a lower priority that go within a span of time, of which three are enough [1]."""
     return rounded_up(smaller((span_us + one.deadline_us) / one.period_us, int(MOST_BLOCKS)))
 
 
-def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Number]:
+def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
     """How late the last feedback and all commands may be queued behind the start of their cycle, by name [us]."""
     us = {name: total(one.sender().frames_us for one in each if one.name == name) for name in _CYCLIC}
     others_us = total(us.values()) + traffic.read_us + traffic.host_us
@@ -131,7 +132,7 @@ class _Start:
         Time of a bit [us].
     """
 
-    def __init__(self, ranked: Sequence[Stream], late: Sequence[str], offset_us: Number, bit_us: Number) -> None:
+    def __init__(self, ranked: Sequence[Stream], late: Sequence[str], offset_us: Points, bit_us: Points) -> None:
         self.senders = [
             one.sender()._replace(jitter_us=-offset_us) if late and not one.is_message else one.sender()
             for one in ranked
@@ -145,7 +146,7 @@ class _Start:
         self.most_us = _sums(one.frames_us + one.load * (larger(one.jitter_us, 0.0) + bit_us) for one in self.senders)
 
 
-def _sums(numbers: Iterator[Number]) -> list[Number]:
+def _sums(numbers: Iterator[Points]) -> list[Points]:
     """Sums of the first of some numbers, from none to all."""
     return [0.0, *accumulate(numbers, add)]
 
@@ -174,15 +175,16 @@ class Messages:
         places = (((), 0.0), ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND]))
         self._starts = [_Start(self._ranked, late, larger(period_us - us, 0.0), self._bit_us) for late, us in places]
         self._loads = _sums(one.load for one in self._starts[0].senders)
-        frames_us = (one.frame_us for one in reversed(self._ranked))
-        self._longest_us = [*accumulate(frames_us, larger, initial=0.0)][::-1]
+        frames_us: Iterator[Points] = (one.frame_us for one in reversed(self._ranked))
+        nothing: Points = 0.0
+        self._longest_us: list[Points] = [*accumulate(frames_us, larger, initial=nothing)][::-1]
         """The longest frame from each rank on."""
 
     def by_priority(self) -> Iterator[Stream]:
         """The messages, that of the lowest priority first."""
         return (one for one in reversed(self._ranked) if one.is_message)
 
-    def load(self, own: Stream) -> Number:
+    def load(self, own: Stream) -> Points:
         """Load of the bus by a message and all that goes before it [1]."""
         return self._loads[self._behind(own)]
 
@@ -208,7 +210,7 @@ class Messages:
                 first_us=start.first_us[behind],
             )
 
-    def bound_share(self, own: Stream) -> Number:
+    def bound_share(self, own: Stream) -> Points:
         """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
         behind, sender = self._behind(own), own.sender()
         load, own_most_us = self._loads[behind], sender.frames_us + sender.load * (sender.jitter_us + self._bit_us)
@@ -218,7 +220,7 @@ class Messages:
         idle = choose(has_response, 1 - load + sender.load, 1.0)
         return choose(has_response, (own.jitter_us + own.frame_us + most_us / idle) / own.deadline_us, inf)
 
-    def least_share(self, own: Stream) -> Number:
+    def least_share(self, own: Stream) -> Points:
         """What the response over the deadline is at least, of a busy period that begins with SYNC [1]."""
         behind, sender = self._behind(own), own.sender()
         load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
@@ -228,7 +230,7 @@ class Messages:
         least_us = own.jitter_us + own.frame_us + waits_us / idle
         return choose(has_response, least_us / own.deadline_us * BELOW, inf)
 
-    def deadline_share(self, own: Stream) -> Number:
+    def deadline_share(self, own: Stream) -> Points:
         """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1].
 
         Raises
