@@ -75,11 +75,11 @@ class Traffic(NamedTuple):
     def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
         rest: Iterator[Any] = iter(numbers)
-        own: Any = islice(rest, _OWN_NUMBERS)
+        own = tuple(islice(rest, _OWN_NUMBERS))
         pdos = tuple(Pdos(one.kind, one.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for one in self.pdos)
         count = len(Message._fields) - _MESSAGE_WORDS
         messages = tuple(Message(one.name, *islice(rest, count)) for one in self.messages)
-        return Traffic(*own, pdos=pdos, messages=messages)
+        return Traffic._make((*own, pdos, messages))
 
 
 _OWN_NUMBERS: Final = len(Traffic._fields) - 2
@@ -116,7 +116,8 @@ class Sent:
             What a derivation says of it.
         """
         if self.is_ordered:
-            return function(self.traffic, *others)
+            found: Number = function(self.traffic, *others)
+            return found
         return self.of_points(function, *others, words=words)
 
     def of_points(self, function: Callable[..., float], *others: Number, words: str) -> Number:
