@@ -190,22 +190,33 @@ def run_inside(
 def run_line(line: str, *, cwd: Path) -> "subprocess.CompletedProcess[str]":
     """Run a line as it is typed into bash.
 
-    Of a line that is one command, bash says what its words are, and the program is called with them in this process.
+    Of a line that begins with one command of the program, bash says what its words are, and the program is called with
+    them in this process; bash runs what reads its output.
     """
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    is_one_command = line.startswith("busplan ") and not set(line) & set("|&;<>\n")
-    words = "busplan() { printf '%s\\0' \"$@\"; }\n" if is_one_command else ""
-    done = subprocess.run(
-        ["bash", "-c", words + line],
-        check=is_one_command,
-        capture_output=True,
-        cwd=cwd,
-        env=environment(PATH=path),
-        timeout=60,
-    )
-    if is_one_command:
-        return run_inside(*map(os.fsdecode, done.stdout.split(b"\0")[:-1]), cwd=cwd)
-    return subprocess.CompletedProcess(line, done.returncode, done.stdout.decode(), done.stderr.decode())
+
+    def bash(script: str, *, check: bool = False, stdin: str = "") -> "subprocess.CompletedProcess[bytes]":
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        return subprocess.run(
+            ["bash", "-c", script],
+            check=check,
+            capture_output=True,
+            cwd=cwd,
+            env=environment(PATH=path),
+            input=stdin.encode(),
+            timeout=60,
+        )
+
+    first, _, rest = line.partition(" | ")
+    said = ""
+    if first.startswith("busplan ") and not set(first) & set("|&;<>\n"):
+        words = bash(f"busplan() {{ printf '%s\\0' \"$@\"; }}\n{first}", check=True).stdout.split(b"\0")[:-1]
+        done = run_inside(*map(os.fsdecode, words), cwd=cwd)
+        if not rest:
+            return done
+        read, said = bash(rest, stdin=done.stdout), done.stderr
+    else:
+        read = bash(line)
+    return subprocess.CompletedProcess(line, read.returncode, read.stdout.decode(), said + read.stderr.decode())
 
 
 @pytest.fixture(scope="session")

@@ -1,23 +1,27 @@
-"""The few functions that are no operators, for every sort of number.
+"""Numbers of the equations: floats, arrays and traced numbers, and the few functions on them that are no operators.
 
-What a bus computes it writes with operators and with these. Then one function serves plain numbers, arrays,
-traced numbers, and polynomials of the number of nodes. numpy loads only where arrays are.
+What a bus computes it writes with operators and with these functions. Then one equation serves all three. A traced
+number records how it was computed, so that a line of a derivation shows what was executed. numpy loads only where
+arrays are.
 """
 
-from abc import ABC, abstractmethod
+import operator
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
 from math import ceil, floor, inf, isinf, sqrt
-from typing import TYPE_CHECKING, Any, Final, TypeAlias
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias
+
+from busplan.sourced import Input, Sourced, input_of, short
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Number: TypeAlias = "float | NDArray[Any] | SpecialNumber"
+    Number: TypeAlias = "float | NDArray[Any] | Traced"
 else:
     Number: TypeAlias = object  # only type checkers ask what it is, and numpy stays unloaded
-"""A plain number, an array, or a `SpecialNumber`. Truths are numbers, too."""
+"""A plain number, an array, or a `Traced` one. Booleans count as numbers."""
 
 FIT_ROUNDING: Final = 1e-12
 """Relative allowance for the rounding of floats where a number is held against a limit: what is exactly at the limit
@@ -25,117 +29,158 @@ keeps it. It is far below the tolerance of any clock and buys no time."""
 _PLAIN: Final = (int, float)
 
 
-class SpecialNumber(ABC):
-    """A number that is neither plain nor an array: it says itself what the functions of this module give."""
+class _Operation(NamedTuple):
+    sign: str
+    rank: int
+    """Operator precedence; that of a function is the highest."""
+    compute: Callable[..., float]
+    array: str = ""
+    """Name of the function of arrays, where it is no operator."""
 
-    __slots__ = ()
 
-    @abstractmethod
-    def __add__(self, other: Number) -> Number: ...
+def _power(base: float, exponent: float) -> float:
+    """A power; a root is rounded as that of a plain number."""
+    return sqrt(base) if exponent == 0.5 else operator.pow(base, exponent)  # noqa: PLR2004 - the exponent of a root
 
-    @abstractmethod
-    def __radd__(self, other: Number) -> Number: ...
 
-    @abstractmethod
-    def __sub__(self, other: Number) -> Number: ...
+COMPARISON: Final = 0
+FUNCTION: Final = 4
+OPERATIONS: Final[Mapping[str, _Operation]] = MappingProxyType(
+    {
+        "add": _Operation("+", 1, operator.add),
+        "sub": _Operation("-", 1, operator.sub),
+        "mul": _Operation("*", 2, operator.mul),
+        "truediv": _Operation("/", 2, operator.truediv),
+        "pow": _Operation("^", 3, _power),
+        "lt": _Operation("<", COMPARISON, operator.lt),
+        "le": _Operation("<=", COMPARISON, operator.le),
+        "gt": _Operation(">", COMPARISON, operator.gt),
+        "ge": _Operation(">=", COMPARISON, operator.ge),
+        "eq": _Operation("=", COMPARISON, operator.eq),
+        "larger": _Operation("max", FUNCTION, max, "maximum"),
+        "smaller": _Operation("min", FUNCTION, min, "minimum"),
+        "rounded_up": _Operation("ceil", FUNCTION, ceil, "ceil"),
+        "rounded_down": _Operation("floor", FUNCTION, floor, "floor"),
+    }
+)
+CHOSEN: Final = "chosen"
+"""An operation whose value is its first part; the other parts are the conditions."""
+_NEUTRAL: Final = MappingProxyType({"add": 0, "sub": 0, "mul": 1, "truediv": 1})
 
-    @abstractmethod
-    def __rsub__(self, other: Number) -> Number: ...
 
-    @abstractmethod
-    def __mul__(self, other: Number) -> Number: ...
+class GivenTable(tuple[float, ...]):  # noqa: SLOT001 - a tuple's subclass with slots holds no attribute
+    """Entries of a table in a profile, as one input of a derivation."""
 
-    @abstractmethod
-    def __rmul__(self, other: Number) -> Number: ...
+    given: Input
 
-    @abstractmethod
-    def __truediv__(self, other: Number) -> Number: ...
 
-    @abstractmethod
-    def __rtruediv__(self, other: Number) -> Number: ...
+_Operator: TypeAlias = "Callable[[Traced, Any], Traced]"
 
-    @abstractmethod
-    def __pow__(self, other: Number) -> Number: ...
 
-    # With an array on the other side it is the array that compares.
+def _operators(name: str) -> tuple[_Operator, _Operator]:
+    """An operator of traced numbers, and the one that a number on its left asks."""
+    return lambda own, other: _computed(name, own, other), lambda own, other: _computed(name, other, own)
 
-    @abstractmethod
-    def __lt__(self, other: "float | SpecialNumber") -> Number: ...
 
-    @abstractmethod
-    def __le__(self, other: "float | SpecialNumber") -> Number: ...
+class Traced:
+    """A number, or a word that follows from numbers, with its expression.
 
-    @abstractmethod
-    def __gt__(self, other: "float | SpecialNumber") -> Number: ...
+    Parameters
+    ----------
+    value
+        The number itself.
+    operation
+        Name of the operation on `parts`, if one of `OPERATIONS` computed it.
+    parts
+        Operands, or other numbers that it depends on.
+    formula, numbers
+        The computation in symbols and in numbers, if no operation computed it.
+    given
+        The input, if it is one.
+    """
 
-    @abstractmethod
-    def __ge__(self, other: "float | SpecialNumber") -> Number: ...
+    __slots__ = ("formula", "given", "key", "numbers", "operation", "parts", "symbol", "value")
 
-    # What a sort may have.
+    def __init__(
+        self,
+        value: Any,
+        *,
+        operation: str = "",
+        parts: tuple[Number, ...] = (),
+        formula: str = "",
+        numbers: str = "",
+        given: Input | None = None,
+    ) -> None:
+        self.value = value
+        self.operation = operation
+        self.parts = parts
+        self.formula = formula
+        self.numbers = numbers
+        self.given = given
+        self.key = ""
+        self.symbol = given.symbol if given else ""
 
-    def __floordiv__(self, _other: Number) -> Number:
-        raise TypeError(f"{type(self).__name__} has no //")
+    def named(self, key: str, symbol: str) -> "Traced":
+        """Name a number, unless it has a name: it becomes a line of its own."""
+        if not self.symbol:
+            self.key, self.symbol = key, symbol
+        return self
 
-    def __neg__(self) -> Number:
-        raise TypeError(f"{type(self).__name__} has no negative")
+    __add__, __radd__ = _operators("add")
+    __sub__, __rsub__ = _operators("sub")
+    __mul__, __rmul__ = _operators("mul")
+    __truediv__, __rtruediv__ = _operators("truediv")
+    __pow__ = _operators("pow")[0]
+    __lt__ = _operators("lt")[0]
+    __le__ = _operators("le")[0]
+    __gt__ = _operators("gt")[0]
+    __ge__ = _operators("ge")[0]
+
+    # == gives a traced truth value, so that the hash is the identity.
+    __hash__ = object.__hash__
+
+    def __eq__(self, other: object) -> Any:
+        return _computed("eq", self, other)
+
+    def __bool__(self) -> bool:
+        return bool(self.value)
 
     def __float__(self) -> float:
-        raise TypeError(f"{type(self).__name__} is no plain number")
+        return plain(self)  # which refuses it: a plain number has lost its expression
 
     def __int__(self) -> int:
-        raise TypeError(f"{type(self).__name__} is no plain number")
+        return int(plain(self))
 
-    @abstractmethod
-    def larger_of(self, one: Number, other: Number) -> Number:
-        """The larger of two numbers; this one is among them."""
 
-    @abstractmethod
-    def smaller_of(self, one: Number, other: Number) -> Number:
-        """The smaller of two numbers; this one is among them."""
+def value_of(operand: Number) -> float:
+    """Plain number of any operand; a word, which `==` compares, too, stays one."""
+    value: Any = operand.value if isinstance(operand, Traced) else operand
+    return float(value) if isinstance(value, Sourced) else value
 
-    @abstractmethod
-    def chosen(self, condition: Number, yes: Number, no: Number) -> Number:
-        """`yes` where the condition holds, else `no`; this one is among the three."""
 
-    @abstractmethod
-    def rounded_up(self) -> Number:
-        """The next whole number."""
+def _computed(name: str, *operands: Any) -> Traced:
+    """Compute an operation; adding a plain 0 or multiplying by a plain 1 is not recorded."""
+    if name in _NEUTRAL:
+        left, right = operands
+        if isinstance(left, Traced) and _is_switch(right, _NEUTRAL[name]):
+            return left
+        if isinstance(right, Traced) and name in ("add", "mul") and _is_switch(left, _NEUTRAL[name]):
+            return right
+    return Traced(OPERATIONS[name].compute(*map(value_of, operands)), operation=name, parts=operands)
 
-    @abstractmethod
-    def rounded_down(self) -> Number:
-        """The whole number before it, or itself."""
 
-    @abstractmethod
-    def entry(self, table: Sequence[float], *, words: str, sources: tuple[Number, ...]) -> Number:
-        """The entry of a table at this place."""
+def _is_switch(operand: Number, value: int) -> bool:
+    return not isinstance(operand, (Traced, Sourced)) and operand == value
 
-    @abstractmethod
-    def between(self, places: Sequence[float], values: Sequence[float], *, words: str) -> Number:
-        """The value at this place, linear between points."""
 
-    @abstractmethod
-    def pointwise(self, function: Callable[..., float], numbers: tuple[Number, ...], *, words: str) -> Number:
-        """What a function of plain numbers gives for some numbers; this one is among them."""
+def _applied(name: str, *numbers: Number) -> Number:
+    """An operation on numbers that are not all plain."""
+    if any(isinstance(one, Traced) for one in numbers):
+        return _computed(name, *numbers)
+    import numpy as np
 
-    @abstractmethod
-    def is_one(self) -> Number:
-        """Whether it is 1."""
-
-    def named(self, _key: str, _symbol: str) -> Number:
-        """Give the number a name."""
-        return self
-
-    def same_as(self, other: "SpecialNumber") -> bool:
-        """Whether both have one value."""
-        return self is other
-
-    def constant(self, number: Number) -> Number:
-        """Give a constant that computes with this number as a traced one, too."""
-        return number
-
-    def worded(self, _words: str) -> Number:
-        """Say where the number comes from."""
-        return self
+    result: Number = getattr(np, OPERATIONS[name].array)(*numbers)
+    return result
 
 
 def plain(number: Number) -> float:
@@ -190,14 +235,7 @@ def larger(one: Number, other: Number) -> Number:
     """
     if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
         return max(one, other)
-    if isinstance(one, SpecialNumber):
-        return one.larger_of(one, other)
-    if isinstance(other, SpecialNumber):
-        return other.larger_of(one, other)
-    import numpy as np
-
-    found: Number = np.maximum(one, other)
-    return found
+    return _applied("larger", one, other)
 
 
 def smaller(one: Number, other: Number) -> Number:
@@ -210,25 +248,7 @@ def smaller(one: Number, other: Number) -> Number:
     """
     if isinstance(one, _PLAIN) and isinstance(other, _PLAIN):
         return min(one, other)
-    if isinstance(one, SpecialNumber):
-        return one.smaller_of(one, other)
-    if isinstance(other, SpecialNumber):
-        return other.smaller_of(one, other)
-    import numpy as np
-
-    found: Number = np.minimum(one, other)
-    return found
-
-
-def is_one(number: Number) -> Number:
-    """Whether a number is 1: a truth, or an array of them.
-
-    Examples
-    --------
-    >>> is_one(1), is_one(2)
-    (True, False)
-    """
-    return number.is_one() if isinstance(number, SpecialNumber) else number == 1
+    return _applied("smaller", one, other)
 
 
 def is_off(number: Number) -> bool:
@@ -252,12 +272,9 @@ def choose(condition: Number, yes: Number, no: Number) -> Number:
     """
     if isinstance(condition, bool):
         return yes if condition else no
-    if isinstance(condition, SpecialNumber):
-        return condition.chosen(condition, yes, no)
-    if isinstance(yes, SpecialNumber):
-        return yes.chosen(condition, yes, no)
-    if isinstance(no, SpecialNumber):
-        return no.chosen(condition, yes, no)
+    if isinstance(condition, Traced) or isinstance(yes, Traced) or isinstance(no, Traced):
+        won = yes if value_of(condition) else no
+        return Traced(value_of(won), operation=CHOSEN, parts=(won, condition))
     import numpy as np
 
     return np.where(condition, yes, no)
@@ -284,7 +301,7 @@ def square_root(number: Number) -> Number:
     """
     if isinstance(number, _PLAIN):
         return sqrt(number)
-    if isinstance(number, SpecialNumber):
+    if isinstance(number, Traced):
         return number**0.5
     import numpy as np
 
@@ -299,13 +316,7 @@ def rounded_up(number: Number) -> Number:
     >>> rounded_up(3.25), rounded_up(3)
     (4, 3)
     """
-    if isinstance(number, _PLAIN):
-        return ceil(number)
-    if isinstance(number, SpecialNumber):
-        return number.rounded_up()
-    import numpy as np
-
-    return np.ceil(number)
+    return ceil(number) if isinstance(number, _PLAIN) else _applied("rounded_up", number)
 
 
 def rounded_down(number: Number) -> Number:
@@ -316,13 +327,7 @@ def rounded_down(number: Number) -> Number:
     >>> rounded_down(3.25), rounded_down(3)
     (3, 3)
     """
-    if isinstance(number, _PLAIN):
-        return floor(number)
-    if isinstance(number, SpecialNumber):
-        return number.rounded_down()
-    import numpy as np
-
-    return np.floor(number)
+    return floor(number) if isinstance(number, _PLAIN) else _applied("rounded_down", number)
 
 
 def from_table(table: Sequence[float], place: Number, *, words: str, sources: tuple[Number, ...] = ()) -> Number:
@@ -346,8 +351,10 @@ def from_table(table: Sequence[float], place: Number, *, words: str, sources: tu
     """
     if isinstance(place, _PLAIN):
         return table[min(int(place), len(table) - 1)]
-    if isinstance(place, SpecialNumber):
-        return place.entry(table, words=words, sources=sources)
+    if isinstance(place, Traced):
+        index = min(int(place.value), len(table) - 1)
+        at = f"entry {index + 1} of {len(table)}"
+        return Traced(table[index], formula=words, numbers=at, parts=(place, *sources))
     import numpy as np
 
     return np.asarray(table)[np.minimum(np.asarray(place, dtype=np.int64), len(table) - 1)]
@@ -370,7 +377,7 @@ def next_entry(table: Sequence[float], least: Number, *, words: str) -> Number:
     >>> next_entry((5, 7, 8), 5.5, words="a table"), next_entry((5, 7, 8), 9, words="a table")
     (7, inf)
     """
-    if isinstance(least, (*_PLAIN, SpecialNumber)):
+    if isinstance(least, (*_PLAIN, Traced)):
         return pointwise(lambda one: next(iter(table[bisect_left(table, one) :]), inf), least, words=words)
     import numpy as np
 
@@ -394,17 +401,26 @@ def interpolated(places: Sequence[float], values: Sequence[float], place: Number
     >>> interpolated((4, 16), (36.0, 39.0), 8, words="table")
     37.0
     """
-    if isinstance(place, _PLAIN):
-        return _between(places, values, place)
-    if isinstance(place, SpecialNumber):
-        return place.between(places, values, words=words)
-    import numpy as np
+    if not isinstance(place, (*_PLAIN, Traced)):
+        import numpy as np
 
-    index = np.searchsorted(places, place)
-    left = np.maximum(index - 1, 0)
-    xs, ys = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
-    x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
-    return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
+        index = np.searchsorted(places, place)
+        left = np.maximum(index - 1, 0)
+        xs, ys = np.asarray(places, dtype=float), np.asarray(values, dtype=float)
+        x0, y0, x1, y1 = xs[left], ys[left], xs[index], ys[index]
+        return np.where(x1 == place, y1, y0 + (y1 - y0) * (place - x0) / np.where(x1 > x0, x1 - x0, 1))
+    at = bisect_left(places, value_of(place))
+    is_point, found = places[at] == value_of(place), values[at]
+    between: Number = found
+    if not is_point:
+        between = values[at - 1] + (found - values[at - 1]) * (place - places[at - 1]) / (places[at] - places[at - 1])
+    if not isinstance(place, Traced):
+        return between
+    sources = (Traced(values, given=values.given),) if isinstance(values, GivenTable) else ()
+    if is_point:
+        words, numbers = f"{words} at {place.symbol}", f"{words} at {short(place.value)}"
+        return Traced(found, formula=words, numbers=numbers, parts=(place, *sources))
+    return Traced(value_of(between), operation=CHOSEN, parts=(between, *sources))
 
 
 def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> Number:
@@ -424,9 +440,9 @@ def pointwise(function: Callable[..., float], *numbers: Number, words: str) -> N
     >>> pointwise(lambda one, other: one // other, 7, 2, words="the quotient")
     3
     """
-    special = next((one for one in numbers if isinstance(one, SpecialNumber)), None)
-    if special is not None:
-        return special.pointwise(function, numbers, words=words)
+    if any(isinstance(one, Traced) for one in numbers):
+        value = function(*map(value_of, numbers))
+        return Traced(value, formula=words, numbers=short(value), parts=numbers)
     if all(isinstance(one, _PLAIN) for one in numbers):
         return function(*numbers)
     import numpy as np
@@ -447,45 +463,23 @@ def _points(number: "float | NDArray[Any]", shape: tuple[int, ...]) -> Iterator[
     return (one.item() for one in np.broadcast_to(number, shape).flat)
 
 
-def _between(places: Sequence[float], values: Sequence[float], place: float) -> float:
-    index = bisect_left(places, place)
-    if places[index] == place:
-        return values[index]
-    x0, y0, x1, y1 = places[index - 1], values[index - 1], places[index], values[index]
-    return y0 + (y1 - y0) * (place - x0) / (x1 - x0)
-
-
 def named(number: Number, key: str, symbol: str) -> Number:
     """Give a step of a computation its name, for a derivation; any other number stays as it is."""
-    return number.named(key, symbol) if isinstance(number, SpecialNumber) else number
+    return number.named(key, symbol) if isinstance(number, Traced) else number
 
 
 def worded(number: Number, words: str) -> Number:
     """Say in words where a number comes from, for a derivation; any other number stays as it is."""
-    return number.worded(words) if isinstance(number, SpecialNumber) else number
-
-
-def are_same(one: object, other: object) -> bool:
-    """Whether two values of a profile are equal; arrays only where they are one.
-
-    Examples
-    --------
-    >>> are_same(2, 2.0), are_same("split", "unified")
-    (True, False)
-    """
-    if one is other:
-        return True
-    if isinstance(one, SpecialNumber) and isinstance(other, SpecialNumber):
-        return one.same_as(other)
-    return isinstance(one, _COMPARED) and isinstance(other, _COMPARED) and one == other
-
-
-_COMPARED: Final = (*_PLAIN, str, tuple)
+    if not isinstance(number, Traced):
+        return number
+    return Traced(number.value, formula=words, numbers=short(number.value), parts=(number,))
 
 
 def alike(constant: Number, number: Number) -> Number:
     """A constant that is computed with other constants before it meets a number: of that number's sort."""
-    return number.constant(constant) if isinstance(number, SpecialNumber) else constant
+    if isinstance(number, Traced) and isinstance(constant, Sourced):
+        return Traced(float(constant), given=input_of(constant))
+    return constant
 
 
 def total(parts: Iterable[Number]) -> Number:

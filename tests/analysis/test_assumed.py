@@ -14,7 +14,7 @@ _SAID = "The execution time behind these figures is assumed."
 
 
 def heavy(profile: Profile) -> dict[tuple[str, ...], str]:
-    found = figures(profile, model=bus_of(profile).deciding_model, with_counts=False)
+    found = figures(profile, model=bus_of(profile).deciding_model)
     return {one.keys: one.carries for one in heavy_assumptions(found, profile)}
 
 
@@ -57,7 +57,7 @@ def test_execution_times_of_some_groups_have_their_part_of_the_common_doubt() ->
     none: dict[str, object] = {
         f"group.{one}.execution.{key}": 0 for one in ("tool", "io") for key in ("base_us", "per_byte_us")
     }
-    both, all_of_it = (figures(one, model="standard", with_counts=False) for one in (override(profile, none), profile))
+    both, all_of_it = (figures(one, model="standard") for one in (override(profile, none), profile))
     left_us, whole_us = (next(d.us for d in one.doubts if d.key == "group.execution") for one in (both, all_of_it))
     variance = sum(one.us**2 for one in all_of_it.doubts)
     assert f" {whole_us * (whole_us - left_us) / variance:.0%} of U squared" in carries

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import closing
 from itertools import count
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from threading import Condition, Thread
 from typing import Any
 
@@ -144,31 +144,20 @@ def test_what_the_executor_cancels_ends_the_run() -> None:
         list(run_in_order(Cancelling(), abs, [1]))
 
 
-# --- worker processes of our own --------------------------------------------------------------------------
+# --- worker processes --------------------------------------------------------------------------
 
 
-def test_workers_are_an_executor() -> None:
+def test_a_worker_that_is_lost_is_said_and_none_is_left() -> None:
+    before = active_children()
     with workers(2) as crew:
         assert list(run_in_order(crew, abs, range(-50, 0), most=9)) == list(range(50, 0, -1))
-        with pytest.raises(ZeroDivisionError):
-            crew.submit(inverse, 0).result(timeout=20)
-        with pytest.raises((AttributeError, TypeError), match=r"[Pp]ickle"):
-            crew.submit(lambda: None).result(timeout=20)
-        assert crew.submit(int, "11", base=2).result(timeout=20) == 3
-        lost = crew.submit(os._exit, 3)
-        with pytest.raises(WorkerLostError, match="a worker was killed"):
-            lost.result(timeout=20)
-        with pytest.raises(WorkerLostError):
-            crew.submit(abs, 1).result(timeout=20)
-    with pytest.raises(RuntimeError, match="shut down"):
-        crew.submit(abs, 1)
-
-
-def test_workers_finish_their_calls_when_they_are_shut_down() -> None:
-    with workers(1) as crew:
-        futures = [crew.submit(abs, -number) for number in range(5)]
-        crew.shutdown()
-        assert [future.result(timeout=0) for future in futures] == list(range(5))
+        assert len(active_children()) == len(before) + 2
+    assert active_children() == before
+    with pytest.raises(ZeroDivisionError), workers(1) as crew:
+        list(run_in_order(crew, inverse, [1, 0]))
+    with pytest.raises(WorkerLostError, match="a worker was killed"), workers(2) as crew:
+        list(run_in_order(crew, os._exit, range(100)))
+    assert active_children() == before
 
 
 # --- a sweep ----------------------------------------------------------------------------------------------

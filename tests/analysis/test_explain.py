@@ -17,7 +17,7 @@ from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures
 from busplan.analysis.derivation.circle import circle_figures
 from busplan.analysis.derivation.explain import assumptions, explain
 from busplan.analysis.derivation.latency import latency_figures
-from busplan.analysis.derivation.trace import Traced, inputs
+from busplan.analysis.derivation.trace import inputs
 from busplan.analysis.latency import latency
 from busplan.analysis.register import figure_named, figures_of
 from busplan.answers.capacity import capacity_document, capacity_records
@@ -25,6 +25,7 @@ from busplan.answers.latency import latency_records
 from busplan.buses import kind_named
 from busplan.buses.ieee1394.constants import CONSTANTS
 from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
+from busplan.elementwise import Traced
 from busplan.errors import BusplanError
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.shipped import load, shipped_names

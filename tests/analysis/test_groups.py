@@ -15,7 +15,6 @@ from busplan.analysis.capacity.cycle import cycle_of, fits_in
 from busplan.analysis.capacity.figures import COUNTS, figures
 from busplan.analysis.circle.delays import loop_delays_us
 from busplan.analysis.derivation.capacity import capacity_figures
-from busplan.analysis.derivation.trace import value_of
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.machine import nodes_for_axes, rooms
 from busplan.analysis.planning.plan import plan
@@ -24,7 +23,7 @@ from busplan.analysis.sweep.blocks import figure_names, sweep
 from busplan.analysis.sweep.grid import checked_grid
 from busplan.buses.ieee1394.constants import PHY_DELAY_HALF_WIDTH_US
 from busplan.buses.ieee1394.section import Ieee1394Profile
-from busplan.elementwise import plain
+from busplan.elementwise import plain, value_of
 from busplan.errors import BusplanError
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load

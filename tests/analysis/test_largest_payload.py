@@ -90,7 +90,7 @@ def test_a_payload_is_the_largest_that_is_in_time(own: int) -> None:
 
     def is_good(size: int) -> bool:
         sized = override(profile, {"payload.read_bytes": size, "payload.write_bytes": size})
-        return figures(sized, model="standard", with_counts=False).verdict == FITS
+        return figures(sized, model="standard").verdict == FITS
 
     good = [size for size in range(4, own + 1, 4) if is_good(size)]
     assert network_of(best.profile).largest_payload_bytes == max(good)

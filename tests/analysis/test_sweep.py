@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from busplan.analysis.capacity.cycle import cycle_of
 from busplan.analysis.capacity.figures import figures
 from busplan.analysis.network import bus_of, model_names
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import figure_names, sweep
-from busplan.analysis.sweep.circle_run import CircleTests, require_circles
+from busplan.analysis.sweep.circle_run import require_circles
 from busplan.analysis.sweep.execution import Here
 from busplan.analysis.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid, grid_models
 from busplan.errors import BusplanError
@@ -231,10 +232,10 @@ def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
     )
     # 25,133,560 steps of each axis at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
     two = checked_grid(big, {"cycle.period_us": Listed((2000, 100))}, with_circle=True)
-    require_circles(CircleTests(big, two), Here())
+    require_circles(Sweep(big, two, (), ()), Here())
     assert caplog.messages == []
     three = checked_grid(big, {"delivery.seed": Listed((1, 2, 3))}, with_circle=True)
-    require_circles(CircleTests(big, three), Here())
+    require_circles(Sweep(big, three, (), ()), Here())
     (said,) = caplog.messages
     assert said.startswith("circle test: 150,801,360 steps, about ")
     # The memory of one: they run one behind the other.

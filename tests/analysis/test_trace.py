@@ -11,12 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from busplan.analysis.derivation.formulas import formula_of, formula_text
-from busplan.analysis.derivation.origin import Input
-from busplan.analysis.derivation.trace import Traced, inputs, lines
+from busplan.analysis.derivation.trace import inputs, lines
 from busplan.buses import time_slice
 from busplan.buses.ieee1394 import equations
-from busplan.elementwise import choose, plain, total
-from busplan.sourced import EQUATIONS
+from busplan.elementwise import Traced, choose, plain, total
+from busplan.sourced import EQUATIONS, Input
 
 # As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
 # are equations of their own. The sum in (2) is one quantity here: a bus of another kind has other terms.

@@ -41,7 +41,7 @@ def test_documents_hold_the_results_own_numbers(name: str) -> None:
     document = json.loads(to_json(capacity_document(result, verdicts(result))))
     assert document["results"] == [
         json.loads(
-            json.dumps(one.by_key() | ({"groups": [group._asdict() for group in one.groups]} if one.groups else {}))
+            json.dumps(one.by_key() | ({"groups": [group.record() for group in one.groups]} if one.groups else {}))
         )
         for one in result.results
     ]

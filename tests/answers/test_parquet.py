@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 import busplan
+from busplan.analysis.sweep.asked import Sweep, column_figures
 from busplan.analysis.sweep.blocks import figure_names, sweep
-from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, all_columns
-from busplan.analysis.sweep.columns import column_figures
+from busplan.analysis.sweep.circles import CIRCLE_COLUMNS
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid, grid_models
-from busplan.answers.sweep.rows import SweepTable
 from busplan.answers.sweep.writers import rows_writer
 from busplan.buses.figure import unit_of
 from busplan.profile.shipped import load
@@ -36,21 +35,20 @@ AXES: dict[str, Values] = {
 
 def table_and_blocks(
     axes: dict[str, Values] = AXES, *, chunk_points: int = 10, shipped: str = "paper-4ms"
-) -> "tuple[SweepTable, list[SweepBlock]]":
+) -> "tuple[Sweep, list[SweepBlock]]":
     profile = load(shipped).profile
     grid = checked_grid(profile, axes, with_circle=False)
     models = grid_models(profile, grid, None, name="models")
     parts = list(sweep(profile, grid, timing_models=models, chunk_points=chunk_points))
-    return SweepTable(profile, grid, models, all_columns(profile, grid, circle=())), parts
+    return Sweep(profile, grid, models, (*axes, *figure_names(profile))), parts
 
 
-def written(table: SweepTable, parts: "list[SweepBlock]", *, complete: bool = True) -> bytes:
+def written(table: Sweep, parts: "list[SweepBlock]", *, complete: bool = True) -> bytes:
     found: list[bytes] = []
     writer = rows_writer("parquet", table, found.append)
-    writer.begin()
     for part in parts:
-        writer.join(writer.encode(part))
-    writer.end(complete=complete)
+        writer.add(part)
+    writer.finish(complete=complete)
     return b"".join(found)
 
 
@@ -158,7 +156,7 @@ def test_counts_of_groups_and_figures_of_circles_are_typed() -> None:
     assert {found.schema.field(name).type for name in counts} == {pa.int64()}
     assert found["max_nodes"].null_count == found.num_rows
     answer = busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True)
-    circles = SweepTable(answer.profile, answer.grid, answer.timing_models, answer.columns)
+    circles = answer.sweep
     row = pq.read_table(BytesIO(written(circles, list(answer.blocks)))).to_pylist()[0]
     assert {name: row[name] for name in CIRCLE_COLUMNS} == {
         name: answer.to_dict()["rows"][0][name] for name in CIRCLE_COLUMNS
@@ -166,13 +164,14 @@ def test_counts_of_groups_and_figures_of_circles_are_typed() -> None:
     assert row["passed"] is None
 
 
-def test_an_error_of_the_work_writes_nothing_more() -> None:
+def test_an_error_of_the_work_writes_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
     table, parts = table_and_blocks()
     found: list[bytes] = []
     writer = rows_writer("parquet", table, found.append)
-    writer.begin()
-    writer.join(writer.encode(parts[0]))
+    monkeypatch.setattr("busplan.answers.sweep.parquet.GROUP_ROWS", 10)
+    writer.add(parts[0])
     before = len(found)
+    assert before
     # As when a later point cannot be computed: pyarrow ends its file when nobody holds it.
     del writer
     gc.collect()
@@ -187,6 +186,6 @@ def test_an_error_of_the_destination_is_the_callers() -> None:
 
     writer = rows_writer("parquet", table, full)
     with pytest.raises(busplan.BusplanError, match="No space left"):
-        writer.begin()
+        writer.finish(complete=True)
     del writer, parts
     gc.collect()

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from busplan.analysis.capacity.figures import capacity
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid
 from busplan.answers.capacity import capacity_records
-from busplan.answers.sweep.rows import SweepTable
 from busplan.answers.sweep.top import Tally, TopRows, sweep_report
 from busplan.answers.sweep.writers import rows_writer
 from busplan.buses.ieee1394.timing import TimingModelName
@@ -44,12 +44,11 @@ def written(form: RowsForm, parts: list[SweepBlock], columns: Sequence[str], *, 
     """What a sweep writes of some of its blocks."""
     profile = load("paper-4ms").profile
     found: list[bytes] = []
-    table = SweepTable(profile, checked_grid(profile, AXES, with_circle=False), BOTH, tuple(columns))
+    table = Sweep(profile, checked_grid(profile, AXES, with_circle=False), BOTH, tuple(columns))
     writer = rows_writer(form, table, found.append)
-    writer.begin()
     for part in parts:
-        writer.join(writer.encode(part))
-    writer.end(complete=complete)
+        writer.add(part)
+    writer.finish(complete=complete)
     return b"".join(found).decode()
 
 
@@ -145,7 +144,7 @@ def named(name: str) -> Profile:
 
 def test_the_summary_counts_points_under_each_model() -> None:
     grid = checked_grid(named("p"), AXES, with_circle=False)
-    tally = Tally(named("p"), grid, BOTH)
+    tally = Tally(Sweep(named("p"), grid, BOTH, ()))
     for block in blocks(4):
         tally.add(block)
     pairs = [capacity(profile, timing_models=BOTH).results for _, profile in points()]
@@ -160,7 +159,7 @@ def test_the_summary_counts_points_under_each_model() -> None:
     refused = sum(bool(standard.circle_refused_by) for _, standard in pairs)
     assert lines[1] == f"The circle cannot be run at {refused} points: servo.step_us."
     assert (len(lines) == 3) == (unsafe > 0)
-    partial = Tally(named("p"), grid, BOTH)
+    partial = Tally(Sweep(named("p"), grid, BOTH, ()))
     partial.add(blocks(5)[0])
     stopped = next(partial.sentences())
     assert "3 points of 18 (interrupted)" in sentence_text(stopped)
@@ -171,7 +170,7 @@ def test_the_summary_counts_points_under_each_model() -> None:
 def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, {"bus.gap_count": Steps(0, 1, 1, 64)}, with_circle=False)
-    tally = Tally(profile, grid, BOTH)
+    tally = Tally(Sweep(profile, grid, BOTH, ()))
     for block in sweep(profile, grid, timing_models=BOTH):
         tally.add(block)
     # Two hops need 7: 0 to 6 are unsafe.
@@ -182,7 +181,7 @@ def test_a_varied_gap_count_below_the_safe_one_is_counted() -> None:
 @pytest.mark.parametrize("follows", [False, True])
 def test_a_payload_that_the_axes_do_not_change_is_said_to_be_so(follows: bool) -> None:
     own = override(named("p"), {"payload.read_bytes_per_axis": 8} if follows else {})
-    tally = Tally(own, checked_grid(own, {"node.axes": Steps(1, 1, 1, 3)}, with_circle=False), BOTH)
+    tally = Tally(Sweep(own, checked_grid(own, {"node.axes": Steps(1, 1, 1, 3)}, with_circle=False), BOTH, ()))
     said = [sentence_text(one) for one in tally.sentences()]
     words = (
         "The payload does not depend on the axes of a node: payload.read_bytes_per_axis and "
@@ -198,7 +197,7 @@ def reported(*, sort_by: str | None = None, top: int = 7) -> Report:
     """The answer with a circle's figure that does not exist."""
     profile = load("paper-4ms").profile
     grid = checked_grid(profile, AXES, with_circle=False)
-    tally = Tally(named("<b>p|q"), grid, BOTH)
+    tally = Tally(Sweep(named("<b>p|q"), grid, BOTH, ()))
     rows = TopRows(COLUMNS, sort_by=sort_by, ascending=True, top=top)
     parts = []
     for block in blocks():

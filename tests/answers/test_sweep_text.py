@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import pickle
 from itertools import product
 
 import numpy as np
@@ -12,9 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from busplan.analysis.network import model_names
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import Cell, Column, SweepBlock, figure_names, sweep
 from busplan.analysis.sweep.grid import Listed, Steps, Values, checked_grid, grid_models
-from busplan.answers.sweep.rows import SweepTable
+from busplan.answers.sweep.rows import sweep_facts
 from busplan.answers.sweep.writers import rows_writer
 from busplan.forms.csv_rows import csv_cell
 from busplan.printable import json_text
@@ -33,13 +33,13 @@ SWEEPS: dict[str, tuple[str, dict[str, Values]]] = {
 }
 
 
-def blocks(name: str, chunk_points: int) -> tuple[SweepTable, list[SweepBlock]]:
+def blocks(name: str, chunk_points: int) -> tuple[Sweep, list[SweepBlock]]:
     shipped, axes = SWEEPS[name]
     profile = load(shipped).profile
     grid = checked_grid(profile, axes, with_circle=False)
     models = grid_models(profile, grid, None, name="models")
     parts = [holed(one) for one in sweep(profile, grid, timing_models=models, chunk_points=chunk_points)]
-    return SweepTable(profile, grid, models, (*axes, *figure_names(profile), "holes", "passed")), parts
+    return Sweep(profile, grid, models, (*axes, *figure_names(profile), "holes", "passed")), parts
 
 
 def holed(block: SweepBlock) -> SweepBlock:
@@ -50,7 +50,7 @@ def holed(block: SweepBlock) -> SweepBlock:
     return block._replace(models=tuple({**one, **more} for one in block.models))
 
 
-def csv_by_cell(table: SweepTable, rows: list[dict[str, Cell]]) -> str:
+def csv_by_cell(table: Sweep, rows: list[dict[str, Cell]]) -> str:
     def text(value: object) -> object:
         missing = isinstance(value, float) and np.isnan(value)
         return "" if missing else repr(value) if isinstance(value, float) else csv_cell(value)
@@ -61,24 +61,23 @@ def csv_by_cell(table: SweepTable, rows: list[dict[str, Cell]]) -> str:
     return buffer.getvalue()
 
 
-def jsonl_by_cell(table: SweepTable, rows: list[dict[str, Cell]]) -> str:
+def jsonl_by_cell(table: Sweep, rows: list[dict[str, Cell]]) -> str:
     def lines() -> list[str]:
         plain = (
             {name: None if isinstance(value, float) and np.isnan(value) else value for name, value in row.items()}
             for row in rows
         )
-        return [json_text(table.facts), *map(json_text, plain)]
+        return [json_text(sweep_facts(table)), *map(json_text, plain)]
 
     return "".join(f"{line}\n" for line in lines())
 
 
-def written(form: str, table: SweepTable, parts: list[SweepBlock]) -> str:
+def written(form: str, table: Sweep, parts: list[SweepBlock]) -> str:
     found: list[bytes] = []
     writer = rows_writer("csv" if form == "csv" else "jsonl", table, found.append)
-    writer.begin()
     for part in parts:
-        writer.join(writer.encode(part))
-    writer.end(complete=True)
+        writer.add(part)
+    writer.finish(complete=True)
     return b"".join(found).decode()
 
 
@@ -100,25 +99,6 @@ def test_any_columns_in_any_order(data: st.DataObject) -> None:
     rows = [part.row(index, columns) for part in parts for index in range(part.chunk.points * len(part.models))]
     assert written("csv", table, parts) == csv_by_cell(table, rows)
     assert written("jsonl", table, parts) == jsonl_by_cell(table, rows)
-
-
-@pytest.mark.parametrize("form", ["csv", "json", "jsonl", "parquet"])
-def test_blocks_may_be_encoded_elsewhere_and_in_any_order(form: str) -> None:
-    if form == "parquet":
-        pytest.importorskip("pyarrow")
-    table, parts = blocks("one key", 15)
-    table = table._replace(columns=tuple(name for name in table.columns if name not in {"holes", "passed"}))
-    found: list[list[bytes]] = [[], []]
-    for place, elsewhere in enumerate((False, True)):
-        writer = rows_writer(form, table, found[place].append)  # type: ignore[arg-type]
-        writer.begin()
-        # What another process gets and gives back is pickled.
-        encode = pickle.loads(pickle.dumps(writer.encode)) if elsewhere else writer.encode
-        encoded = {index: encode(parts[index]) for index in (reversed if elsewhere else iter)(range(len(parts)))}
-        for index in range(len(parts)):
-            writer.join(encoded[index])
-        writer.end(complete=True)
-    assert b"".join(found[0]) == b"".join(found[1])
 
 
 def test_floats_read_back_to_the_same_float() -> None:

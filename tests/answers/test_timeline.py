@@ -260,8 +260,8 @@ def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
     assert "```text\nThe period of 4000.000 us" in text
     assert "| arbitration | " in text
     page = html.page(report)
-    assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="busplan-timeline"') == 1
-    assert page.count(".busplan-timeline .track{") == 2
+    assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="chart timeline"') == 1
+    assert page.count(".chart.timeline .track{") == 1
     assert '<data value="8" data-at="/totals/1/events">8</data>' in page
     assert HOSTILE not in page
 

@@ -32,7 +32,7 @@ from unittest import mock
 import tomli_w
 
 import busplan
-from busplan.analysis.circle.setup import path_steps
+from busplan.analysis.circle.move import path_steps
 from busplan.buses import kind_names
 from busplan.cli import run
 from busplan.cli.lazy import LazyCommands

@@ -188,35 +188,6 @@ def test_nobody_s_execution_time_is_in_the_cycle(kind: str) -> None:
     assert "The execution time behind these figures is assumed." in str(busplan.latency(profile))
 
 
-FORMS = {
-    "capacity --sensitivity": ("table", "json"),
-    "latency": ("table", "csv"),
-    "plan": ("table", "json"),
-    "timeline": ("table", "markdown", "svg"),
-    "map": ("markdown", "svg"),
-    "report": ("html", "markdown"),
-    "check": ("text", "sarif"),
-    "explain": ("table", "json"),
-    "diff can-servo-8 --no-circle": ("table", "json"),
-}
-
-
-# Each question of both, in each of its forms of one.
-@pytest.mark.parametrize(
-    ("kind", "line", "form"),
-    [
-        (("sercos3", "sercos2")[(row + column) % 2], line, form)
-        for row, (line, forms) in enumerate(FORMS.items())
-        for column, form in enumerate(forms)
-    ],
-)
-def test_every_question_is_answered(run: Run, tmp_path: Path, kind: str, line: str, form: str) -> None:
-    command, *options = line.split()
-    done = run(command, f"{kind}-servo-8", *options, "--format", form, cwd=tmp_path)
-    assert done.returncode == 0, done
-    assert "gap count" not in done.stdout or command in ("check", "diff")
-
-
 @KINDS
 def test_groups_of_unlike_nodes_are_answered(kind: str, run: Run, tmp_path: Path) -> None:
     assert run("init", "press", "--bus", kind, "--axes", "10", cwd=tmp_path).returncode == 0

@@ -95,15 +95,14 @@ def test_apply_writes_the_table_and_its_provenance_in_place_and_twice_is_once(bu
     old, new = before.splitlines(), after.splitlines()
     at = next(index for index, line in enumerate(new) if line.startswith(note))
     start = old.index("[node.execution]") + 1
-    # The note takes the place of the two lines that say where the old values are from.
-    assert new[:at] + new[at + 1 : start - 1] == [*old[: start - 3], old[start - 1]]
-    assert "Derived from Table I" in run.stderr
-    assert new[start - 1 :][:2] == [
+    # The note stands above the comments of the section.
+    assert new[:at] + new[at + 1 : start + 1] == old[:start]
+    assert new[start + 1 :][:2] == [
         'grade = "measured"',
         'kind = "table"             # or "linear": base_us, per_byte_us',
     ]
     # Half of 0.5, 0.5 and 1 us off the median: 1.4826 * 0.5 us, whatever the outlier.
-    assert [new[start + 1], *new[start + 3 :]] == [
+    assert [new[start + 3], *new[start + 5 :]] == [
         "payload_bytes = [4, 64, 256]",
         *("uncertainty_us = 0.741", 'residual = "standard"', "measured_gap_count = 63", "worst_extra_us = 239.501"),
     ]
@@ -180,17 +179,15 @@ def test_a_new_fit_leaves_nothing_of_the_one_before(busplan: Run, bench: Path) -
     assert (execution["grade"], execution["residual"], execution["measured_gap_count"]) == ("derived", "none", 63)
 
 
-def test_a_comment_of_a_key_that_goes_is_kept_but_for_its_origin(busplan: Run, bench: Path) -> None:
+def test_comments_are_kept_but_for_grades_of_the_old_values(busplan: Run, bench: Path) -> None:
     text = bench.read_text().replace("payload_bytes = [4, 16", "payload_bytes = [  # from the bench\n4, # least\n16")
-    assert "# from the bench" in text
-    bench.write_text(text.replace("426.7]", "426.7]  # by Li"))
+    bench.write_text(text.replace("426.7]", "426.7]  # derived: by Li"))
     run = busplan("calibrate", "bench.toml", "m.csv", "--form", "linear", "--apply", cwd=bench.parent)
     assert run.returncode == 0
-    assert "; the new comment on their origin replaces 4 lines: # Derived from Table I, row by row: " in run.stderr
-    assert run.stderr.endswith(" # from the bench # by Li\n")
+    assert run.stderr.endswith("; your comments are kept: see whether they hold of the new values\n")
     lines = bench.read_text().splitlines()
-    assert "# least" in lines
-    assert not {"# from the bench", "# by Li"} & set(lines)
+    assert {"# least", "# from the bench", "# was derived: by Li"} <= set(lines)
+    assert any(line.startswith("# Derived from Table I") for line in lines)
 
 
 def test_an_outlier_is_no_entry_and_every_form_of_answer_says_so(busplan: Run, bench: Path) -> None:

@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable
 from html.parser import HTMLParser
 from io import StringIO
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,12 +128,21 @@ def test_each_form_is_what_it_promises(run: Run, question: tuple[str, ...]) -> N
     assert not text.endswith("\n\n")
 
 
-@pytest.mark.parametrize("question", {one[0]: one for one in reversed(QUESTIONS)}.values(), ids=" ".join)
-def test_a_file_holds_what_standard_output_has(run: Run, question: tuple[str, ...], tmp_path: Path) -> None:
-    for ending, form in ENDINGS.items():
-        done = run(*question, "-o", f"answer{ending}", cwd=tmp_path)
-        assert (done.returncode, done.stdout, done.stderr) == (0, "", f"wrote answer{ending}\n")
-        assert (tmp_path / f"answer{ending}").read_text(encoding="utf-8") == written(run, question, form)
+FILED = {one[0]: one for one in reversed(QUESTIONS)}
+"""A question of each command."""
+
+
+@pytest.mark.parametrize(
+    ("question", "ending"),
+    # All commands write by one function: each is asked for one ending, and a quick one for all.
+    [*zip(FILED.values(), cycle(ENDINGS), strict=False), *((FILED["evidence"], ending) for ending in ENDINGS)],
+)
+def test_a_file_holds_what_standard_output_has(
+    run: Run, question: tuple[str, ...], ending: str, tmp_path: Path
+) -> None:
+    done = run(*question, "-o", f"answer{ending}", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", f"wrote answer{ending}\n")
+    assert (tmp_path / f"answer{ending}").read_text(encoding="utf-8") == written(run, question, ENDINGS[ending])
     assert run(*question).stdout == written(run, question, "table")
 
 

@@ -51,15 +51,13 @@ def examples(name: str) -> list[str]:
     return [text.removeprefix("Example: ") for text in marked]
 
 
-def parameters() -> Iterator[Any]:
-    """Every argument and option of every command, with its help as typer writes it."""
-    for name in ("", *COMMANDS):
-        here = context(name)
-        for param in here.command.get_params(here):
-            yield pytest.param(param, param.get_help_record(here)[1], id=f"{name} {max(param.opts, key=len)}".strip())
+def parameters(name: str) -> Iterator[tuple[Any, str]]:
+    """Every argument and option of a command, with its help as typer writes it."""
+    here = context(name)
+    for param in here.command.get_params(here):
+        yield param, param.get_help_record(here)[1]
 
 
-EVERY_PARAMETER = pytest.mark.parametrize(("param", "said"), list(parameters()))
 EVERY_COMMAND = pytest.mark.parametrize("name", ["", *COMMANDS])
 
 
@@ -107,12 +105,13 @@ def test_its_example_runs_as_it_stands(shell: Run, name: str, example: str, tmp_
 
 
 @EVERY_COMMAND
-@pytest.mark.parametrize("columns", [60, 80, 100, 200])
-def test_no_line_is_wider_than_the_terminal(name: str, columns: int) -> None:
-    lines = shown(name, columns=columns)
-    assert max(map(len, lines)) <= min(columns, 100)
-    # Not a column of words one below the other either: meanings keep room.
-    assert len(lines) < 2 * len(shown(name, columns=80))
+def test_no_line_is_wider_than_the_terminal(name: str) -> None:
+    usual = len(shown(name, columns=80))
+    for columns in (60, 80, 100, 200):
+        lines = shown(name, columns=columns)
+        assert max(map(len, lines)) <= min(columns, 100)
+        # Not a column of words one below the other either: meanings keep room.
+        assert len(lines) < 2 * usual
 
 
 def test_the_list_of_commands_has_their_sentences_whole() -> None:
@@ -142,50 +141,36 @@ def test_it_speaks_of_no_types_of_python(name: str) -> None:
             assert param.metavar == param.metavar.upper()
 
 
-@EVERY_PARAMETER
-def test_every_parameter_has_help_in_a_sentence(param: Any, said: str) -> None:
-    assert param.help
-    assert re.fullmatch(r"[A-Za-z][^\n]*\.(  \[[^\n]+\])*", said), said
-
-
-@EVERY_PARAMETER
-def test_a_number_has_its_unit_or_is_a_count(param: Any, said: str) -> None:
-    kind, meant = param.type_descriptor.annotation, f"{param.metavar} {said}"
-    if kind is float or (kind is int and param.metavar != "N") or "TIME" in meant:
-        assert UNIT.search(said), said
-    if "BYTES" in meant:
-        assert "bytes" in said
-
-
-@EVERY_PARAMETER
-def test_every_option_names_its_default_or_what_it_falls_back_on(param: Any, said: str) -> None:
-    is_switch = param.param_type_name == "option" and param.is_flag and not param.secondary_opts
-    assert is_switch or re.search(r"[\[ ]default: [^\]]|[\[ ]required\]", said), said
-
-
-@EVERY_PARAMETER
-def test_what_stands_for_a_value_says_what_may_stand_there(param: Any, said: str) -> None:
-    del said
-    if param.param_type_name == "option" and not param.is_flag:
-        assert param.metavar or param.type_descriptor.is_choice
-
-
-@pytest.mark.parametrize("shell", ["fish", "zsh"])
 @EVERY_COMMAND
-def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str, shell: str) -> None:
-    typed = f"busplan {name} --".replace("  ", " ")
-    asked = {
-        "_BUSPLAN_COMPLETE": f"complete_{shell}",
-        "_TYPER_COMPLETE_ARGS": typed,
-        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
-    }
-    offers = run(inside={"variables": asked}).stdout.splitlines()
+def test_every_parameter_says_what_it_is_its_unit_its_default_and_what_may_stand_there(name: str) -> None:
+    for param, said in parameters(name):
+        assert re.fullmatch(r"[A-Za-z][^\n]*\.(  \[[^\n]+\])*", said), said
+        kind, meant = param.type_descriptor.annotation, f"{param.metavar} {said}"
+        if kind is float or (kind is int and param.metavar != "N") or "TIME" in meant:
+            assert UNIT.search(said), said
+        assert "BYTES" not in meant or "bytes" in said, said
+        is_option = param.param_type_name == "option"
+        is_switch = is_option and param.is_flag and not param.secondary_opts
+        assert is_switch or re.search(r"[\[ ]default: [^\]]|[\[ ]required\]", said), said
+        if is_option and not param.is_flag:
+            assert param.metavar or param.type_descriptor.is_choice, said
+
+
+@EVERY_COMMAND
+def test_the_shell_offers_each_option_with_help_on_one_line(run: Run, name: str) -> None:
     here = context(name)
     params = [param for param in here.command.get_params(here) if param.param_type_name == "option"]
     flags = [one for param in params for one in param.opts + param.secondary_opts if one.startswith("--")]
-    assert len(offers) == len(flags)
-    if shell == "fish":
-        assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)
+    for shell in ("fish", "zsh"):
+        asked = {
+            "_BUSPLAN_COMPLETE": f"complete_{shell}",
+            "_TYPER_COMPLETE_ARGS": f"busplan {name} --".replace("  ", " "),
+            "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        }
+        offers = run(inside={"variables": asked}).stdout.splitlines()
+        assert len(offers) == len(flags)
+        if shell == "fish":
+            assert sorted(offer.partition("\t")[0] for offer in offers) == sorted(flags)
 
 
 def test_the_most_circles_of_a_plan_are_those_of_its_search() -> None:

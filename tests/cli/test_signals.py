@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from busplan.cli.workers import workers
-
 PROFILE = Path(__file__).parents[2] / "profiles" / "paper-1ms.toml"
 CIRCLES = ("sweep", "p.toml", "--circle", "--jobs", "2", "--vary")
 SWEEP = (*CIRCLES, "circle.radius_mm=10,320", "--vary", "servo.position_gain_per_s=100:119")
@@ -100,7 +98,7 @@ def rows(path: Path) -> int:
 @pytest.mark.parametrize(
     ("name", "code", "whole_group"),
     # A terminal signals the whole group: the workers are to leave each signal to the parent.
-    [("SIGTERM", 143, False), ("SIGTERM", 143, True), ("SIGHUP", 129, True), ("SIGINT", 130, True)],
+    [("SIGTERM", 143, False), ("SIGHUP", 129, True), ("SIGINT", 130, True)],
 )
 def test_a_sweep_that_is_ended_keeps_its_rows(folder: Path, name: str, code: int, whole_group: bool) -> None:
     with running(*SWEEP, "-o", "c.csv", folder=folder) as process:
@@ -200,11 +198,3 @@ def test_a_worker_ends_in_the_middle_of_its_work(tmp_path: Path) -> None:
         process.kill()
         process.wait()
     assert until(lambda: not any(map(alive, started)), seconds=5)
-
-
-def test_workers_answer_in_order_and_pass_on_what_went_wrong() -> None:
-    with workers(2) as crew:
-        assert list(crew.map(abs, [-3, -1, -2])) == [3, 1, 2]
-        assert list(crew.map(abs, [])) == []
-        with pytest.raises(FileNotFoundError, match="nowhere"):
-            list(crew.map(os.stat, ["nowhere", "."]))

@@ -93,7 +93,7 @@ def test_ctrl_c_leaves_a_parquet_file_that_says_it_is_a_part(tmp_path: Path) -> 
     pytest.importorskip("pyarrow")
     (tmp_path / "rows.parquet").write_text("old", encoding="utf-8")
     code, errors = interrupted(
-        "sweep", "paper-4ms", "--vary", "cycle.period_us=100:900000000", "-o", "rows.parquet", folder=tmp_path
+        "sweep", "paper-4ms", "--vary", "cycle.nonperiodic_us=1:900000000", "-o", "rows.parquet", folder=tmp_path
     )
     assert code == 130
     assert "kept in rows.partial.parquet" in errors

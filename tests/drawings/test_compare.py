@@ -1,5 +1,6 @@
 """The picture of `busplan compare` in every form."""
 
+from functools import cache
 from xml.etree.ElementTree import Element, fromstring
 
 import pytest
@@ -12,8 +13,18 @@ from busplan.profile.shipped import load
 from busplan.profile.toml import override
 
 SVG = "{http://www.w3.org/2000/svg}"
-FOUND = {name: compare(load(name).profile) for name in ("can-servo-8", "dvrk", "gantry-24", "paper-1ms")}
-EACH = pytest.mark.parametrize("found", FOUND.values(), ids=FOUND)
+EACH = pytest.mark.parametrize("found", ["can-servo-8", "dvrk", "gantry-24", "paper-1ms"], indirect=True)
+
+
+@cache
+def compared(name: str) -> KindComparison:
+    return compare(load(name).profile)
+
+
+@pytest.fixture
+def found(request: pytest.FixtureRequest) -> KindComparison:
+    """The comparison of a shipped profile, which its tests share."""
+    return compared(request.param)
 
 
 def dots(found: KindComparison) -> list[Element]:
@@ -59,7 +70,7 @@ def test_characters_fit_and_every_letter_is_in_the_legend(found: KindComparison,
 
 
 def test_points_in_one_place_are_a_star() -> None:
-    found = FOUND["paper-1ms"]
+    found = compared("paper-1ms")
     own = found.compared[0]
     twice = found._replace(kinds=(own, own._replace(is_own=False)))
     drawn = "\n".join(line.text for line in compare_lines(twice, width=80))

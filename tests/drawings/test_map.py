@@ -1,6 +1,7 @@
 """The picture of a map: its marks are the states of its cells, in characters and as SVG."""
 
 import re
+from functools import cache
 from xml.etree import ElementTree as ET
 
 import pytest
@@ -17,18 +18,27 @@ from busplan.profile.toml import override
 
 SVG = "{http://www.w3.org/2000/svg}"
 PAPER = load("paper-4ms").profile
-SHOWN = trade_off(PAPER)
-GAPS = trade_off(PAPER, x=Direction("bus.gap_count", tuple(range(7, 71))), y=Direction("bus.nodes", tuple(range(5))))
-WORDS = trade_off(
-    PAPER, x=Direction("bus.gap_count", (5, 7, 63, "optimal")), y=Direction("bus.speed", ("S100", "S400"))
-)
-HOLES = trade_off(PAPER, x=Direction(AXES, tuple(range(1, 17))), y=Direction("node.axes", (1, 2, 3, 4)))
-CROWDED = trade_off(
-    override(PAPER, {"bus.nodes": 70}), x=Direction("bus.nodes", (2, 20, 70)), y=Direction(PERIOD, (4000,))
-)
-EVERY = pytest.mark.parametrize(
-    "found", [SHOWN, GAPS, WORDS, HOLES, CROWDED], ids=["shown", "gaps", "words", "holes", "crowded"]
-)
+DIRECTIONS = {
+    "gaps": (Direction("bus.gap_count", tuple(range(7, 71))), Direction("bus.nodes", tuple(range(5)))),
+    "words": (Direction("bus.gap_count", (5, 7, 63, "optimal")), Direction("bus.speed", ("S100", "S400"))),
+    "holes": (Direction(AXES, tuple(range(1, 17))), Direction("node.axes", (1, 2, 3, 4))),
+    "crowded": (Direction("bus.nodes", (2, 20, 70)), Direction(PERIOD, (4000,))),
+}
+EVERY = pytest.mark.parametrize("found", ["shown", *DIRECTIONS], indirect=True)
+
+
+@cache
+def mapped(name: str) -> TradeOff:
+    if name not in DIRECTIONS:
+        return trade_off(PAPER)
+    x, y = DIRECTIONS[name]
+    return trade_off(override(PAPER, {"bus.nodes": 70}) if name == "crowded" else PAPER, x=x, y=y)
+
+
+@pytest.fixture
+def found(request: pytest.FixtureRequest) -> TradeOff:
+    """A map, which its tests share."""
+    return mapped(request.param)
 
 
 def grid_of(found: TradeOff, *, width: int = 80) -> list[str]:
@@ -50,11 +60,11 @@ def test_each_character_is_the_state_of_its_cell(found: TradeOff) -> None:
 
 
 @EVERY
-@pytest.mark.parametrize("width", [80, 100, 200])
-def test_it_fits_its_width_in_ascii(found: TradeOff, width: int) -> None:
-    lines = map_lines(found, width=width)
-    assert max(len(line.text) for line in lines) <= width
-    assert all(line.text.isascii() for line in lines)
+def test_it_fits_its_width_in_ascii(found: TradeOff) -> None:
+    for width in (80, 100, 200):
+        lines = map_lines(found, width=width)
+        assert max(len(line.text) for line in lines) <= width
+        assert all(line.text.isascii() for line in lines)
 
 
 def test_the_longest_labels_and_the_most_cells_fit_80_columns() -> None:
@@ -81,7 +91,7 @@ def test_states_differ_in_more_than_colour() -> None:
 
 
 def test_limits_that_no_time_helps_have_letters_of_their_own() -> None:
-    looks = looks_of(CROWDED)
+    looks = looks_of(mapped("crowded"))
     assert {look.mark: limits for (_, limits), look in looks.items()} == {
         "#": (),
         "h": ("hops",),
@@ -90,32 +100,32 @@ def test_limits_that_no_time_helps_have_letters_of_their_own() -> None:
 
 
 def test_this_design_is_marked_by_its_row_its_column_and_brackets() -> None:
-    lines = [line.text for line in map_lines(SHOWN, width=80)]
+    lines = [line.text for line in map_lines(mapped("shown"), width=80)]
     (own,) = [line for line in lines if line.startswith("> ")]
     assert own.startswith(">   4 ms | # [#] #")
     (pointer,) = [line for line in lines if line.strip() == "^"]
     assert own[pointer.index("^")] == "#"
     assert lines[lines.index(pointer) + 1][pointer.index("^")] == "8"
-    narrow = [line.text for line in map_lines(GAPS, width=80)]
+    narrow = [line.text for line in map_lines(mapped("gaps"), width=80)]
     (pointer,) = [line for line in narrow if line.strip() == "^"]
-    assert GAPS.own_place == (2, 56)
+    assert mapped("gaps").own_place == (2, 56)
     assert pointer.index("^") == next(line for line in narrow if line.startswith("> ")).index("|") + 1 + 56
 
 
 def test_values_stand_below_their_columns_and_touch_no_other() -> None:
-    lines = [line.text for line in map_lines(WORDS, width=80)]
+    lines = [line.text for line in map_lines(mapped("words"), width=80)]
     (row,) = [line for line in lines if line.startswith("> ")]
     below = lines[lines.index(row) + 3]
     assert below.split() == ["5", "7", "63", "optimal"]
     assert below.index("optimal") < row.rindex("#") < below.index("optimal") + len("optimal")
     assert row.index("[#]") <= below.index("63") <= row.index("[#]") + 1
-    root = ET.fromstring(map_svg(WORDS, title="t", inline=True))
+    root = ET.fromstring(map_svg(mapped("words"), title="t", inline=True))
     texts = [text.text for text in root.iter(f"{SVG}text") if text.get("class") in ("small", "small here")]
     assert {"63", "optimal"} <= set(texts)
 
 
 def test_a_terminal_gets_the_colour_of_each_state() -> None:
-    (row,) = [line for line in map_lines(SHOWN, width=80) if line.text.startswith(">")]
+    (row,) = [line for line in map_lines(mapped("shown"), width=80) if line.text.startswith(">")]
     assert {(row.text[mark.start : mark.end].strip()[0], mark.tone) for mark in row.marks} == {
         ("#", "passes"),
         ("?", "warns"),
@@ -139,7 +149,7 @@ def test_the_svg_has_a_cell_for_each_setting_in_its_colour(found: TradeOff, inli
 
 
 def test_the_svg_frames_this_design() -> None:
-    root = ET.fromstring(map_svg(SHOWN, title="t", inline=True))
+    root = ET.fromstring(map_svg(mapped("shown"), title="t", inline=True))
     (frame,) = [rect for rect in root.iter(f"{SVG}rect") if rect.get("class") == "own"]
     place = {key: frame.get(key) for key in ("x", "y", "width", "height")}
     (cell,) = [
@@ -151,10 +161,10 @@ def test_the_svg_frames_this_design() -> None:
 
 
 def test_the_marks_of_the_svg_stand_on_their_cells() -> None:
-    root = ET.fromstring(map_svg(HOLES, title="t", inline=True))
+    root = ET.fromstring(map_svg(mapped("holes"), title="t", inline=True))
     texts = [text for text in root.iter(f"{SVG}text") if text.get("class") == "mark"]
     marks = "".join(text.text or "" for text in texts)
-    assert len(marks) == len(HOLES.cells)
+    assert len(marks) == len(mapped("holes").cells)
     assert [len((text.get("x") or "").split()) for text in texts] == [len(text.text or "") for text in texts]
 
 

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element, fromstring
 import numpy as np
 import pytest
 
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.axis_values import listed, stepped
 from busplan.analysis.sweep.blocks import sweep
 from busplan.analysis.sweep.grid import Values, checked_grid
@@ -32,7 +33,7 @@ def values(given: Sequence[Any] | range) -> Values:
 
 def added(figure: str, profile: Any = PAPER, **vary: Any) -> FigureData:
     grid = checked_grid(profile, {key.replace("__", "."): values(one) for key, one in vary.items()}, with_circle=False)
-    data = FigureData(profile, grid, figure=figure, timing_models=MODELS)
+    data = FigureData(Sweep(profile, grid, MODELS, ()), figure=figure)
     for block in sweep(profile, grid, timing_models=MODELS, chunk_points=7):
         data.add(block)
     return data
@@ -144,7 +145,7 @@ def test_whole_numbers_have_whole_ticks(nodes: Any, plots: Plots) -> None:
 
 
 def test_many_points_are_a_curve_without_marks(plots: Plots) -> None:
-    one = plotted("margin_us", cycle__period_us=range(250, 1000))
+    one = plotted("margin_us", cycle__nonperiodic_us=range(750))
     (plot,) = plots(drawn(one))
     assert len(plot.values("curve first")) == 750
     assert marks(plot, "rect", "mark first") == []

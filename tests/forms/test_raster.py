@@ -89,11 +89,13 @@ def test_each_cell_of_a_map_has_its_colour_in_its_place_and_its_mark_on_it() -> 
         assert middle.min() < 60
 
 
-def test_a_curve_has_its_light_colour_though_it_is_a_variable_of_the_style_sheet() -> None:
+def test_a_curve_has_its_light_colour_and_a_file_no_variable() -> None:
     answer = busplan.capacity("paper-4ms", sensitivity=True)
     svg = answer._repr_svg_() or ""
-    (colour,) = set(re.findall(r"--model-first: (#[0-9a-f]+);", svg.partition("@media")[0]))
-    wanted = [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
+    assert "var(" not in svg
+    light, dark = re.findall(r"\.chart \.takes \{ fill: (#[0-9a-f]+);", svg)
+    assert svg.index(light) < svg.index("@media") < svg.index(dark)
+    wanted = [int(light[at : at + 2], 16) for at in (1, 3, 5)]
     assert (pixels(svg) == wanted).all(axis=2).sum() > 1000
 
 

@@ -223,7 +223,7 @@ def check_lines(new: str, chunks: list[Chunk], changed: set[str]) -> None:
     for key, chunk in chunks:
         kept = [chunk]
         if any(change == key or change.startswith(f"{key}.") for change in changed):
-            kept = re.findall(r"# .*\S", chunk)
+            kept = [re.sub("^# (?=assumed|derived)", "# was ", one) for one in re.findall(r"# .*\S", chunk)]
         for one in kept:
             assert one in new[at:], f"{one!r} is not where it was"
             between += new[at : new.index(one, at)]
@@ -388,7 +388,7 @@ def test_a_note_stands_above_and_takes_the_place_of_the_last_one() -> None:
     once = edited(PLAIN, {}, notes=notes)
     assert once == PLAIN.replace("# the bus", "# plan: own\n# the bus").replace(
         "  [node.e", "  # plan: T_exec\n  [node.e"
-    ).replace("     # by hand", "")
+    )
     again = edited(once, {}, notes={"bus": "plan: again\nand\x1b"})
     assert again == once.replace("plan: own", "plan: again\\nand\\x1b")
     with pytest.raises(BusplanError, match=r"there is no line \[payload\], .*\n# a\n\[payload\]$"):
@@ -425,41 +425,34 @@ def test_a_new_profile_can_be_edited() -> None:
     assert [line.partition(" #")[0].rstrip() for line in changed] == ["gap_count = 10", "nodes = 3", "axes = 2"]
 
 
-ORIGINS = """
-[node]
-axes = 1
-# max_hops = 3, from the drawing
+GRADED = """
+[node]                     # assumed: no drive is chosen
+axes = 1                   # given
 
 # Measured on the bench, 2019;
-# nothing of it is published.
+# busplan ours: of old
 # busplan: ignore[BP401] measured again in May
-# The section's heading
-# and its rest.
-[node.execution]
-grade = "measured"         # by Li
-# the same bench
-# as that of May, taken from bench.csv
-kind = "table"             # or "linear": from base_us
-payload_bytes = [4, 64]    # least and largest
-# derived: Table I
-time_us = [30, 40]         # busplan: ignore[BP401] from the bench
-worst_extra_us = 3.1       # measured, section IV
+[node.execution]           # assumed, as all of it
+grade = "derived"
+kind = "linear"            # or "table": assumed
+base_us = 20               #measured: by Li
+per_byte_us = 0.1          # published
+worst_extra_us = 3.1       # assumed: assumed
+uncertainty_us = 1
 """
 
 
-def test_a_note_replaces_what_says_where_the_old_values_are_from_and_nothing_else() -> None:
-    text = PLAIN[: PLAIN.index("[node")].rstrip(" ") + ORIGINS
-    once = edited(text, {"node.execution.time_us": [30, 41]}, notes={"node.execution": "busplan plan: new"})
-    gone = {"# Measured on the bench, 2019;", "# nothing of it is published.", "# derived: Table I"}
-    expected = [line for line in text.replace("[30, 40]", "[30, 41]").splitlines() if line not in gone]
-    expected = [line.removesuffix("         # by Li") for line in expected]
-    expected.insert(expected.index("# busplan: ignore[BP401] measured again in May"), "# busplan plan: new")
-    assert once.splitlines() == expected
-    assert edited(once, {}, notes={"node.execution": "busplan plan: new"}) == once
-    heading = text.replace("# Measured on the bench, 2019;\n# nothing of it is published.\n", "# Section\n")
-    noted = edited(heading, {}, notes={"node.execution": "busplan plan: new"})
-    assert "# busplan plan: new\n# Section\n" in noted
-    assert edited(noted, {}, notes={"node.execution": "busplan plan: new"}) == noted
+def test_a_comment_that_grades_the_old_value_says_so_and_every_other_stays() -> None:
+    text = PLAIN[: PLAIN.index("[node")].rstrip(" ") + GRADED
+    alone = edited(text, {"node.execution.base_us": 30, "node.execution.per_byte_us": 0.1})
+    assert alone == text.replace("20               #measured", "30               # was measured")
+    note = {"node.execution": "busplan ours: new"}
+    changes = {"node.execution.base_us": 30, "node.execution.per_byte_us": 0.1, "node.execution.worst_extra_us": None}
+    noted = edited(text, changes, notes=note)
+    expected = text.replace("20               #measured", "30               # was measured").replace("of old", "new")
+    expected = expected.replace("# assumed, as", "# was assumed, as").replace("# published", "# was published")
+    assert noted == expected.replace("worst_extra_us = 3.1       # assumed", "# was assumed")
+    assert edited(noted, changes, notes=note) == noted
 
 
 def test_keys_of_groups_are_edited_where_they_stand() -> None:
@@ -473,7 +466,7 @@ def test_keys_of_groups_are_edited_where_they_stand() -> None:
     notes = {"group.tool.execution": "busplan calibrate: here"}
     new = edited_file(text.encode(), changes, name="x", notes=notes).decode()
     before, after = text.splitlines(), new.splitlines()
-    assert [line for line in before if line not in after and "assumed" not in line] == ["nodes = 4"]
+    assert [line for line in before if line not in after and "# assumed" not in line] == ["nodes = 4"]
     assert new.count("# busplan calibrate: here\n[group.execution]") == 1
     assert new.index("calibrate: here") > new.index('name = "tool"')
     profile = validate(Document("x", new))

@@ -12,7 +12,7 @@ import tomli_w
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from busplan.profile.positions import KeyPath, Place, scan
+from busplan.profile.positions import KeyPath, Place, comments, places
 from busplan.profile.toml import decode
 
 # --- what holds of every document -------------------------------------------------------------------------
@@ -51,11 +51,11 @@ def check_key(text: str, place: Place, key: str) -> None:
 def check(text: str) -> None:
     """Check all places of a document against what the standard library reads from it."""
     values = dict(paths_of(tomllib.loads(text)))
-    places, comments = scan(text)
-    assert all(text[at] == "#" for at in comments)
-    assert set(places) == set(values)
+    found = places(text)
+    assert all(text[at] == "#" for at in comments(text))
+    assert set(found) == set(values)
     for path, value in values.items():
-        place = places[path]
+        place = found[path]
         span = text[place.value_start : place.value_end]
         if isinstance(value, dict | list) and not span.startswith(("[", "{")):
             # A table of headers or dotted keys has no text of its own.
@@ -75,7 +75,7 @@ def spans(text: str) -> dict[str, tuple[str, str]]:
     """Every place as text: dotted path to key as written and value as written."""
     return {
         ".".join(map(str, path)): (text[place.key_start : place.key_end], text[place.value_start : place.value_end])
-        for path, place in scan(text)[0].items()
+        for path, place in places(text).items()
     }
 
 
@@ -157,7 +157,7 @@ def test_places_are_those_of_the_standard_library(text: str) -> None:
 def test_line_ends_of_windows_give_the_same_document(text: str) -> None:
     document = decode(text.replace("\n", "\r\n").encode(), name="f")
     assert document.text == text
-    assert (document.places, document.comments) == scan(text)
+    assert (document.places, document.comments) == (places(text), comments(text))
 
 
 @pytest.mark.parametrize(
@@ -203,18 +203,18 @@ def test_spans_are_as_written(text: str, expected: dict[str, tuple[str, str]]) -
 
 def test_a_tables_own_header_is_its_place_even_after_a_sub_tables() -> None:
     text = "[a.b]\n[a]\nx = 1"
-    assert scan(text)[0]["a",] == Place(7, 8, 7, 8)
+    assert places(text)["a",] == Place(7, 8, 7, 8)
 
 
 def test_every_table_of_an_array_stands_at_its_own_header() -> None:
     text = "[[a]]\n[[a]]\n[[a]]"
-    places, _ = scan(text)
-    assert [places["a", index].key_start for index in range(3)] == [2, 8, 14]
-    assert places["a",].key_start == 2
+    found = places(text)
+    assert [found["a", index].key_start for index in range(3)] == [2, 8, 14]
+    assert found["a",].key_start == 2
 
 
 @pytest.mark.parametrize(
-    ("text", "comments"),
+    ("text", "expected"),
     [
         ("# one\n  # two", ["# one", "# two"]),
         ("a = 1 # one\n[b] # two\nc = 2# three", ["# one", "# two", "# three"]),
@@ -225,27 +225,27 @@ def test_every_table_of_an_array_stands_at_its_own_header() -> None:
         ('a = \'# no\'\nb = "# no"\n\'# no\' = """\n# no""" # yes', ["# yes"]),
     ],
 )
-def test_comments_stand_where_their_hash_does(text: str, comments: list[str]) -> None:
-    assert [text[at:].partition("\n")[0] for at in scan(text)[1]] == comments
+def test_comments_stand_where_their_hash_does(text: str, expected: list[str]) -> None:
+    assert [text[at:].partition("\n")[0] for at in comments(text)] == expected
 
 
 def test_a_key_and_an_index_of_the_same_digits_are_two_things() -> None:
-    assert set(scan("a = [7]\nb.0 = 7")[0]) == {("a",), ("a", 0), ("b",), ("b", "0")}
+    assert set(places("a = [7]\nb.0 = 7")) == {("a",), ("a", 0), ("b",), ("b", "0")}
 
 
 def test_deep_nesting_costs_no_recursion() -> None:
     depth = 2_000  # tomllib refuses that, and the scanner must not be what fails
-    assert len(scan("a = " + "[" * depth + "]" * depth)[0]) == depth
+    assert len(places("a = " + "[" * depth + "]" * depth)) == depth
 
 
 def test_a_long_array_is_read_to_its_end() -> None:
     text = f"a = [{'1, ' * 50_000}]"
-    assert scan(text)[0]["a", 49_999] == Place(150_002, 150_003, 150_002, 150_003)
+    assert places(text)["a", 49_999] == Place(150_002, 150_003, 150_002, 150_003)
 
 
 def test_text_that_is_no_toml_ends_in_an_error_and_not_in_a_loop() -> None:
     with pytest.raises(ValueError, match="no key at offset 2"):
-        scan("a.= 1")
+        places("a.= 1")
 
 
 # --- random documents, dumped -----------------------------------------------------------------------------
@@ -439,14 +439,13 @@ def test_places_of_awkward_layouts_are_those_of_the_standard_library(text: str) 
 @given(text=awkward_documents())
 def test_line_ends_of_windows_move_no_place(text: str) -> None:
     document = decode(text.replace("\n", "\r\n").encode(), name="f")
-    assert (document.places, document.comments) == scan(text)
+    assert (document.places, document.comments) == (places(text), comments(text))
 
 
 @settings(max_examples=30, deadline=None)
 @given(text=awkward_documents(), front=st.sampled_from(('# x = """\n', "\n", " \n\t")))
 def test_lines_in_front_move_every_place_by_their_length(text: str, front: str) -> None:
-    places, comments = scan(text)
-    moved_places, moved_comments = scan(front + text)
-    assert {path: Place(*(at - len(front) for at in place)) for path, place in moved_places.items()} == places
-    assert [at - len(front) for at in moved_comments if at >= len(front)] == comments
+    moved, moved_comments = places(front + text), comments(front + text)
+    assert {path: Place(*(at - len(front) for at in place)) for path, place in moved.items()} == places(text)
+    assert [at - len(front) for at in moved_comments if at >= len(front)] == comments(text)
     assert [at for at in moved_comments if at < len(front)] == [at for at in (0,) if front[at] == "#"]

@@ -9,19 +9,15 @@ import random
 import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import process_time
-from unittest.mock import patch
 
-import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
 from busplan.answers.gate import gate_format
 from busplan.errors import PlacedError
-from busplan.profile import positions
 from busplan.profile.shipped import shipped_folder
 from busplan.profile.toml import decode
 from busplan.rules.baseline import Record
@@ -201,37 +197,6 @@ def test_a_mutated_profile_is_judged(content: bytes) -> None:
 )
 def test_anything_at_all_is_judged(content: bytes) -> None:
     hold(content)
-
-
-@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
-@given(st.integers(0, 2**63).map(mutated))
-def test_lines_read_at_one_go_stand_where_the_scanner_finds_them(content: bytes) -> None:
-    try:
-        document = decode(content, name="a.toml")
-        document.data()
-    except PlacedError:
-        return
-    with patch.object(positions, "_PLAIN_LINE", re.compile(r"(?!)")):
-        slowly = positions.scan(document.text)
-    assert positions.scan(document.text) == slowly
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "a = [1979-05-27 07:32:00, 1979-05-27]\nb = 1979-05-27 07:32:00 # c\n",
-        "a = 1\n[b.c] # d\n e = [1, 2,\n3] # f\n[[g]]\nh = 1\n[g.i]\nj = 2\n[[g]]\n[g.i]\nj=[1,]\n",
-        'a.b = 1\na.c = [ 1 , 2 ,]\n\'d\' = \'\'\ne = "" # "\nf = """g\n[h]\n"""\n',
-        "[a.b]\nc = '''d'''\n[a]\ne = '#' # f\n[ g ]\n[h . i]\n",
-        "\t[a]\t\n\t\tb\t=\t1\t#\tc\n\n   # d\n   ",
-        "a = [[1, 2], [3]]\nb = []\nc = [\n]\nd = [ # e\n1]\nf = {g = [1]}\nh = [{i = 1}]\n",
-    ],
-)
-def test_every_form_of_line_stands_where_the_scanner_finds_it(text: str) -> None:
-    assert tomllib.loads(text)
-    with patch.object(positions, "_PLAIN_LINE", re.compile(r"(?!)")):
-        slowly = positions.scan(text)
-    assert positions.scan(text) == slowly
 
 
 def test_hundreds_of_nasty_files_in_one_call(tmp_path: Path) -> None:

@@ -15,20 +15,15 @@ def test_every_field_but_the_delay_that_is_computed_declares_its_range(of: type)
     assert [one.name for one in parameters(of)] == [one.name for one in fields(of) if one.name != "delay_us"]
 
 
-@pytest.mark.parametrize(
-    ("of", "name", "bad"),
-    [
-        (of, one.name, bad)
-        for of in (Axis, Delivery, Mechanics)
-        for one in parameters(of)
-        if one.known.least is not None and one.known.most is not None
-        for bad in (one.known.least - 1, one.known.most * 2, math.nan)
-    ],
-)
-def test_a_value_out_of_its_range_is_refused_by_name(of: type, name: str, bad: float) -> None:
-    with pytest.raises(ParameterError) as caught:
-        of(**{name: bad})
-    assert [(one.name, one.value) for one in caught.value.refused] == [(name, bad)]
+@pytest.mark.parametrize("of", [Axis, Delivery, Mechanics])
+def test_a_value_out_of_its_range_is_refused_by_name(of: type) -> None:
+    for name, _, _, known in parameters(of):
+        if known.least is None or known.most is None:
+            continue
+        for bad in (known.least - 1, known.most * 2, math.nan):
+            with pytest.raises(ParameterError) as caught:
+                of(**{name: bad})
+            assert [(one.name, one.value) for one in caught.value.refused] == [(name, bad)]
 
 
 def test_everything_that_is_wrong_is_said_together() -> None:

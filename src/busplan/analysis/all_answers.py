@@ -11,7 +11,6 @@ from busplan.analysis.circle.contour_profile import ContourProfile, drawn_profil
 from busplan.analysis.circle.refusal import circle_refusals
 from busplan.analysis.circle.roundness import CircleFigures, CircleTest, circle_test
 from busplan.analysis.derivation.explain import assumptions
-from busplan.analysis.derivation.origin import Input
 from busplan.analysis.latency import LatencyResult, latency
 from busplan.analysis.map.trade_off import TradeOff, trade_off
 from busplan.analysis.network import bus_of, model_names
@@ -20,6 +19,7 @@ from busplan.errors import BusplanError
 from busplan.progress import Progress, part_of
 from busplan.sections.base import MAX_TIME_US, MIN_STEP_US
 from busplan.sections.profile import Profile
+from busplan.sourced import Input
 
 _PERIOD_FACTORS: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 

@@ -54,7 +54,7 @@ def _section(table: Mapping[str, Any], data: str, bus: Bus) -> EvidenceSection:
 
 def _row(row: Mapping[str, Any], table: Mapping[str, Any], base: Profile, bus: Bus) -> Comparison:
     """Compute what a row compares: the sum of some figures of a profile, or of constants of the kind."""
-    found = figures(override(base, row.get("set", {})), model=bus.deciding_model, with_counts=False)
+    found = figures(override(base, row.get("set", {})), model=bus.deciding_model)
     parts = [bus.constants[key] if key in bus.constants else getattr(found, key) for key in table["figures"]]
     doubts = [float(one.us) for one in found.doubts if one.key == table.get("doubt")]
     return Comparison(

@@ -6,7 +6,7 @@ from typing import Final
 from busplan.buses import kind_named
 from busplan.buses.bus import Bus
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, are_same, total
+from busplan.elementwise import Number, Traced, total
 from busplan.errors import BusplanError
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.base import Section
@@ -77,7 +77,10 @@ def _is_alike(one: object, other: object) -> bool:
     if isinstance(one, Section) and type(one) is type(other):
         keys = (key for key in type(one).model_fields if key not in _OF_ONE_GROUP)
         return all(_is_alike(getattr(one, key), getattr(other, key)) for key in keys)
-    return are_same(one, other)
+    return one is other or (isinstance(one, _COMPARED) and isinstance(other, _COMPARED) and bool(one == other))
+
+
+_COMPARED: Final = (int, float, str, tuple, Traced)
 
 
 def with_payloads(group: Group, *, read_bytes: Number, write_bytes: Number) -> Group:
@@ -145,3 +148,8 @@ def known_model(profile: Profile, model: str, *, name: str) -> str:
             f"{name} {model}: not applicable, the {model} model has no {', '.join(keys)}; use {bus.deciding_model}"
         )
     return model
+
+
+def without_execution(network: Network) -> Network:
+    """The same network, whose nodes execute in no time."""
+    return network._replace(groups=tuple(with_execution(one, read_us=0.0, write_us=0.0) for one in network.groups))

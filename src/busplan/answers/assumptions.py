@@ -6,7 +6,6 @@ from typing import Final
 
 from busplan.analysis.derivation.explain import explained_figures
 from busplan.analysis.derivation.formulas import formula_of
-from busplan.analysis.derivation.origin import DIGITS, Input
 from busplan.analysis.network import bus_of
 from busplan.answers.documents import document
 from busplan.buses.bus import Bus
@@ -23,7 +22,7 @@ from busplan.forms.blocks import (
     TableRow,
 )
 from busplan.sections.profile import Profile
-from busplan.sourced import EQUATIONS
+from busplan.sourced import DIGITS, EQUATIONS, Input
 
 _MEANING: Final = TableColumn("meaning", kind="words", rank=4, leaves="below", wraps=True)
 INPUT_COLUMNS: Final = (

@@ -210,7 +210,7 @@ def _results(result: Capacity) -> Iterator[Record]:
     """As the rows, with a list of groups where the profile has some."""
     for figures in result.results:
         record: Record = figures.by_key()
-        yield {**record, "groups": [one._asdict() for one in figures.groups]} if figures.groups else record
+        yield {**record, "groups": [one.record() for one in figures.groups]} if figures.groups else record
 
 
 def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:

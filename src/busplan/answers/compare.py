@@ -12,7 +12,9 @@ from busplan.answers.compare_notes import notes
 from busplan.answers.verdict import execution_sentence, refused_circle
 from busplan.buses import kind_named
 from busplan.buses.figure import SAFE_AXES, VERDICT
-from busplan.drawings.compare.drawing import KindsDrawing
+from busplan.drawings.compare.characters import compare_lines
+from busplan.drawings.compare.svg import STYLE, compare_svg
+from busplan.drawings.own_picture import OwnPicture
 from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Block,
@@ -205,7 +207,8 @@ def _circle(one: MachineOnKind, *, at: str) -> tuple[Cell, ...]:
 def compare_chart(found: KindComparison) -> Chart:
     """The most axes over the period, a line for each kind of bus."""
     caption = "Most axes that are shown to fit over the period, both logarithmic"
-    return Chart(KindsDrawing(found, title=sentence_text(headline(found))), Sentence((caption,)))
+    svg = partial(compare_svg, found, title=sentence_text(headline(found)), inline=True)
+    return Chart(OwnPicture(svg, partial(compare_lines, found), stylesheet=STYLE), Sentence((caption,)))
 
 
 def require_drawn(found: KindComparison) -> None:

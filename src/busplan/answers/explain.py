@@ -9,7 +9,6 @@ from busplan.analysis.capacity.sensitivity import sensitivities
 from busplan.analysis.capacity.verdict import verdicts
 from busplan.analysis.derivation.capacity import OF_DOCUMENT, OF_SENSITIVITY
 from busplan.analysis.derivation.explain import Derivation, Explanation, Step
-from busplan.analysis.derivation.origin import DIGITS, short
 from busplan.answers.assumptions import INPUT_COLUMNS, input_cells
 from busplan.answers.capacity import capacity_document
 from busplan.answers.documents import document, with_profile
@@ -34,6 +33,7 @@ from busplan.forms.blocks import (
 )
 from busplan.forms.numbers import figure_text, period_value
 from busplan.printable import json_text
+from busplan.sourced import DIGITS, short
 
 _NONE: Final = Words("none")
 _NAMING: Final = ("name", "source", "input", "change")

@@ -9,8 +9,10 @@ from busplan.analysis.network import bus_of
 from busplan.answers.documents import document, with_profile
 from busplan.answers.sweep.top import payload_sentences
 from busplan.answers.verdict import refused_circle
-from busplan.drawings.map.drawing import MapDrawing
+from busplan.drawings.map.characters import map_lines
 from busplan.drawings.map.labels import LOOKS, limit_words, looks_of, map_title, setting_words, state_words
+from busplan.drawings.map.svg import STYLE, map_svg
+from busplan.drawings.own_picture import OwnPicture
 from busplan.forms.blocks import (
     Block,
     Chart,
@@ -83,11 +85,11 @@ def _remarks(found: TradeOff) -> Iterator[Sentence]:
 
 def map_chart(found: TradeOff) -> Chart:
     """The picture, with how much fits and what lies along which direction."""
-    title = sentence_text(headline(found))
+    svg = partial(map_svg, found, title=sentence_text(headline(found)), inline=True)
     fitting = sum(cell.state == "fits" for cell in found.cells)
     marked = "" if found.own is None else ", this design marked"
     caption = sentence(f"{{}} of {{}} settings fit, {map_title(found)}{marked}", *_counts(fitting, len(found.cells)))
-    return Chart(MapDrawing(found, title=title), caption)
+    return Chart(OwnPicture(svg, partial(map_lines, found), stylesheet=STYLE), caption)
 
 
 def _counts(*numbers: int) -> tuple[ShownValue, ...]:

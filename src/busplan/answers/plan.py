@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from busplan.analysis.capacity.verdict import after_reset
+from busplan.analysis.capacity.figures import after_reset
 from busplan.analysis.network import bus_of, network_of
 from busplan.analysis.planning.constraints import CIRCLE
 from busplan.analysis.planning.freedoms import PERIOD, freedoms

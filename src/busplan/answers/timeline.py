@@ -12,11 +12,12 @@ from busplan.answers.documents import document
 from busplan.answers.verdict import refused_circle, story, warnings
 from busplan.buses.figure import MARGIN, REQUIRED, VERDICT
 from busplan.buses.parts import IDLE
-from busplan.drawings.timeline.drawing import TimelineDrawing
+from busplan.drawings.own_picture import OwnPicture
+from busplan.drawings.timeline.characters import timeline_lines
 from busplan.drawings.timeline.kinds import kind_of
 from busplan.drawings.timeline.lanes import charged, drawn_window, overruns
 from busplan.drawings.timeline.period import model_bars
-from busplan.drawings.timeline.svg import is_coarse
+from busplan.drawings.timeline.svg import STYLE, is_coarse, timeline_svg
 from busplan.forms.blocks import (
     Block,
     Chart,
@@ -90,7 +91,9 @@ def timeline_chart(plan: Schedule) -> Chart:
     window = drawn_window(plan)
     caption = joined(_most(window), charged(window), by="; ")
     legend = Sentence(("A bar is a whole transaction.",)) if is_coarse(window) else None
-    return Chart(TimelineDrawing(plan, title=sentence_text(headline(plan))), _placed(caption, plan), legend)
+    svg = partial(timeline_svg, plan, title=sentence_text(headline(plan)), inline=True)
+    picture = OwnPicture(svg, partial(timeline_lines, plan), stylesheet=STYLE)
+    return Chart(picture, _placed(caption, plan), legend)
 
 
 def _most(window: Schedule) -> Sentence:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from busplan.analysis.derivation import explain as analysis
 from busplan.analysis.derivation.explain import Derivation, Explanation
 from busplan.analysis.derivation.latency import latency_names
-from busplan.analysis.derivation.origin import Input
 from busplan.answers.assumptions import assumptions_report
 from busplan.answers.explain import explain_report
 from busplan.api.answer import Answer
@@ -16,6 +15,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.numbers import plural
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
+from busplan.sourced import Input
 
 
 @dataclass(frozen=True, slots=True, repr=False)

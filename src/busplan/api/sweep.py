@@ -10,21 +10,18 @@ from typing import Final
 import numpy as np
 
 from busplan.analysis.sweep import blocks as analysis
+from busplan.analysis.sweep.asked import Names, Sweep, checked_sweep
 from busplan.analysis.sweep.axis_values import listed, parse_values, stepped
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.circle_run import CircleTests, circle_blocks, require_circles
-from busplan.analysis.sweep.circles import all_columns, require_few
-from busplan.analysis.sweep.columns import circle_columns
+from busplan.analysis.sweep.circle_run import circle_blocks, require_circles
 from busplan.analysis.sweep.execution import Here
-from busplan.analysis.sweep.grid import Array, Grid, Values, checked_grid, grid_models
-from busplan.analysis.sweep.seeds import without_seed
-from busplan.answers.sweep.rows import SweepTable
+from busplan.analysis.sweep.grid import Array, Grid, Values
 from busplan.answers.sweep.top import Tally, TopRows, default_columns, sweep_report
 from busplan.answers.sweep.writers import rows_writer
 from busplan.api.answer import Answer
 from busplan.api.inputs import Models, ProfileLike, checked_models, items, load_profile
 from busplan.api.renamed import renamed
-from busplan.drawings.sweep_plot import FigureData, default_figure, require_drawable
+from busplan.drawings.sweep_plot import FigureData, require_drawable
 from busplan.errors import BusplanError
 from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Report
@@ -34,6 +31,7 @@ from busplan.sections.profile import Profile
 
 MOST_POINTS: Final = 2_000_000
 """Most points, about half a gigabyte of memory. The command line has no such limit."""
+_NAMES: Final = Names("vary", "timing_model", "circle=True", "summary=True", "force=True")
 _SHOWN: Final = 20
 """Rows of the report."""
 
@@ -47,30 +45,41 @@ class SweepAnswer(Answer):
 
     Parameters
     ----------
-    profile
-        The network.
-    grid
-        The varied keys and their values.
-    timing_models
-        The timing models, in the order of the rows of a point.
-    columns
-        Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests.
+    sweep
+        What was asked.
     blocks
         The figures, block by block.
     """
 
-    profile: Profile
-    grid: Grid
-    timing_models: tuple[str, ...]
-    columns: tuple[str, ...]
+    sweep: Sweep
     blocks: tuple[SweepBlock, ...]
-    seeds: int | None = None
-    """Circle tests that a row of a summary is over."""
+
+    @property
+    def profile(self) -> Profile:
+        """The network."""
+        return self.sweep.profile
+
+    @property
+    def grid(self) -> Grid:
+        """The varied keys and their values."""
+        return self.sweep.grid
+
+    @property
+    def timing_models(self) -> tuple[str, ...]:
+        """The timing models, in the order of the rows of a point."""
+        return self.sweep.timing_models
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
+        return self.sweep.columns
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.columns:
             raise KeyError(f"no column {name!r}; there are {', '.join(self.columns)}")
-        return np.concatenate([_rows(block, name) for block in self.blocks])
+        return np.concatenate(
+            [block.interleaved([_spelled(column) for column in block.columns(name)]) for block in self.blocks]
+        )
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
@@ -93,9 +102,7 @@ class SweepAnswer(Answer):
     def _svg(self) -> str:
         """The picture of `busplan sweep --plot`."""
         require_drawable(self.grid, option="the picture of a sweep")
-        drawn = FigureData(
-            self.profile, self.grid, figure=default_figure(self.profile), timing_models=self.timing_models
-        )
+        drawn = FigureData(self.sweep)
         for block in self.blocks:
             drawn.add(block)
         return drawn.svg(self.profile.name)
@@ -103,28 +110,20 @@ class SweepAnswer(Answer):
     def _rows_in(self, form: RowsForm) -> bytes:
         """Every row in a form."""
         written: list[bytes] = []
-        table = SweepTable(self.profile, self.grid, self.timing_models, self.columns, seeds=self.seeds)
-        writer = rows_writer(form, table, written.append)
-        writer.begin()
+        writer = rows_writer(form, self.sweep, written.append)
         for block in self.blocks:
-            writer.join(writer.encode(block))
-        writer.end(complete=True)
+            writer.add(block)
+        writer.finish(complete=True)
         return b"".join(written)
 
     def _report(self) -> Report:
-        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.profile, self.columns)))
+        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.sweep)))
         top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
-        tally = Tally(self.profile, self.grid, self.timing_models, seeds=self.seeds)
+        tally = Tally(self.sweep)
         for block in self.blocks:
             top.add(block)
             tally.add(block)
         return sweep_report(top, tally, document=lambda: json.loads(self.to_json()))
-
-
-def _rows(block: SweepBlock, name: str) -> Array:
-    """One column of a block as a flat array."""
-    parts = [np.broadcast_to(_spelled(column), block.chunk.shape).ravel() for column in block.columns(name)]
-    return np.stack(parts, axis=1).ravel()
 
 
 def _spelled(column: Column) -> Array:
@@ -201,38 +200,28 @@ def sweep(
         wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
         raise BusplanError(f"executor{wrong}")
     network = load_profile(profile)
-    asked = None if timing_model is None else checked_models(timing_model, network)
+    models = None if timing_model is None else checked_models(timing_model, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
         raise BusplanError(
             f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
         )
-    grid = checked_grid(
-        network,
-        {key: axis_values(network, key, given, name="vary") for key, given in vary.items()},
-        with_circle=circle,
-        option="vary",
-        circle_option="circle=True",
+    if summary and not circle:
+        raise BusplanError("summary=True: goes with circle=True")
+    axes = {key: axis_values(network, key, given, name="vary") for key, given in vary.items()}
+    asked = checked_sweep(
+        network, axes, timing_models=models, circle=circle, summary=summary, force=force, names=_NAMES
     )
-    seeds = None
-    if summary:
-        if not circle:
-            raise BusplanError("summary=True: goes with circle=True")
-        grid, seeds = without_seed(grid, option="summary=True")
-    if grid.points > MOST_POINTS:
+    if asked.grid.points > MOST_POINTS:
         raise BusplanError(
-            f"vary: {grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, or "
-            "write them with busplan sweep -o FILE.csv"
+            f"vary: {asked.grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, "
+            "or write them with busplan sweep -o FILE.csv"
         )
-    models = grid_models(network, grid, asked, name="timing_model")
-    blocks = analysis.sweep(network, grid, timing_models=models)
-    count = 1 if seeds is None else seeds.size
     if circle:
-        if not force:
-            require_few(grid, seeds=count, option="circle", consent="force=True")
-        tests, where = CircleTests(network, grid, seeds), executor or Here()
-        blocks = circle_blocks(tests, where, timing_models=models, cost=require_circles(tests, where))
-    columns = all_columns(network, grid, circle=circle_columns(circle=circle, summary=summary))
-    return SweepAnswer(network, grid, models, columns, tuple(blocks), None if seeds is None else count)
+        where = executor or Here()
+        blocks = circle_blocks(asked, where, cost=require_circles(asked, where))
+    else:
+        blocks = analysis.sweep(network, asked.grid, timing_models=asked.timing_models)
+    return SweepAnswer(asked, tuple(blocks))
 
 
 def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:

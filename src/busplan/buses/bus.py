@@ -1,8 +1,8 @@
 """What an analysis may ask of a kind of bus.
 
 An analysis asks a bus, never its keys. `terms`, `figures` and limits are written with operators and the functions of
-`busplan.elementwise`, so that they serve plain numbers, arrays, traced numbers and polynomials of the number of nodes
-alike. They branch on words, never on numbers.
+`busplan.elementwise`, so that they serve floats, arrays and traced numbers alike. They branch on words, never on
+numbers.
 """
 
 from abc import ABC, abstractmethod

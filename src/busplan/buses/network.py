@@ -55,7 +55,7 @@ class Group(NamedTuple):
 
 
 class Network(NamedTuple):
-    """A profile as its cycle sees it. The numbers may be of any sort: plain, arrays, traced, polynomials."""
+    """A profile as its cycle sees it. The numbers may be of any sort: floats, arrays, traced numbers."""
 
     profile: Any
     """The profile, of its kind's own model. Its values may be numbers of any sort."""

@@ -72,6 +72,8 @@ class Limit(NamedTuple):
     kept_from_us: Callable[[Network], float] | None = None
     """The period from which on plain numbers are shown to keep it, where a longer one is a cure [us]; without it none
     is."""
+    is_slow: bool = False
+    """Whether its value takes long to find: of a number of nodes it is asked last."""
     share: Callable[[Network], Number] | None = None
     """The share of the period that is its most, of a time that rests on no period: see `share_limit`."""
 
@@ -101,11 +103,7 @@ class Limit(NamedTuple):
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
         if self.breaks is not None:
             return self.breaks(network)
-        return self.least_value(network) > self.bound(network)
-
-    def bound(self, network: Network) -> Number:
-        """The largest value that keeps it: `most`, but for the rounding of floats."""
-        return self.most(network) * (1 + FIT_ROUNDING)
+        return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:
         """The shortest period that keeps a limit that has a share [us]; 0 for any other."""

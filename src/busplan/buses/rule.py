@@ -22,7 +22,8 @@ class RuleProblem(NamedTuple):
     """One thing that a rule found: the dotted key that causes it, what is wrong, and how it is mended."""
 
     key: str
-    message: str
+    message: str | Callable[[], str]
+    """What is wrong; or what says it, where that takes long: a comment may suppress the problem."""
     help: str = ""
     cure: tuple[str, ...] = ()
 
@@ -65,10 +66,6 @@ class RuleFigures(Protocol):
     @property
     def margin_us(self) -> float:
         """What is left of the slice [us]."""
-
-    @property
-    def max_nodes(self) -> int | None:
-        """Most nodes that fit [1]; None of groups, each of which has its own."""
 
     @property
     def safe_nodes(self) -> int | None:

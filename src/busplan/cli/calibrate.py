@@ -82,8 +82,8 @@ def calibrate_command(
         bool,
         typer.Option(
             "--apply",
-            help="Write [node.execution], or that of the group, into PROFILE, a file, with a comment where it is from, "
-            "which replaces comments on the origin of the old values; the rest stays.",
+            help="Write [node.execution], or that of the group, into PROFILE, a file, with a comment where it is from; "
+            "your own comments stay.",
         ),
     ] = False,
     all_: AllOption = False,
@@ -112,8 +112,6 @@ def calibrate_command(
     with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
         from busplan.analysis.calibration.calibrate import calibrate
         from busplan.answers import calibration as said
-        from busplan.forms.numbers import plural
-        from busplan.profile.edit import origin_comments
         from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
         from busplan.profile.shipped import load, locate_measurements
         from busplan.profile.toml import read_bytes
@@ -141,11 +139,8 @@ def calibrate_command(
                     require_separate(one, key, typed="--apply")
             asked = {one.key: one.value for one in changes.by_set}
             apply_changes(loaded.document, {**asked, **found}, notes={said.section(result): note})
-            gone = origin_comments(loaded.document, said.section(result))
-            kept = "every comment of yours is kept"
-            if gone:
-                kept = f"the new comment on their origin replaces {plural(len(gone), 'line')}: {' '.join(gone)}"
-            say(f"wrote {', '.join((f'[{said.section(result)}]', *asked))} of {profile}; {kept}")
+            wrote = ", ".join((f"[{said.section(result)}]", *asked))
+            say(f"wrote {wrote} of {profile}; your comments are kept: see whether they hold of the new values")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
 

@@ -101,7 +101,7 @@ def map_command(
 def _found(plan: "Profile", x: str | None, y: str | None, *, jobs: int | None, with_circle: bool) -> "TradeOff":
     from busplan.analysis.map.trade_off import trade_off
     from busplan.cli.progress import progress_bar
-    from busplan.cli.sweep_run import available_processors, executor
+    from busplan.cli.workers import available_processors, executor
 
     across = _direction(x, plan, option="--x", with_circle=with_circle)
     up = _direction(y, plan, option="--y", with_circle=with_circle)

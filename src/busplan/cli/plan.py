@@ -215,6 +215,7 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     """Write the recommended values into the profile's file."""
     from busplan.answers.plan import settings
     from busplan.profile.keys import flat
+    from busplan.profile.write import whole
 
     if result.recommended is None:
         return
@@ -222,10 +223,7 @@ def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     if not changes:
         say(f"{loaded.document.name}: nothing to change, left as it is")
         return
-    # Write whole floats without a fraction.
-    values: dict[str, Any] = {
-        key: int(value) if isinstance(value, float) and value.is_integer() else value for key, value in changes.items()
-    }
+    values = {key: whole(value) for key, value in changes.items()}
     apply_changes(loaded.document, values)
     written: dict[str, Any] = dict(flat(values))
     say(f"changed {loaded.document.name}: {settings(loaded.profile, written)}")

@@ -19,7 +19,7 @@ from busplan.cli.options import (
 )
 from busplan.cli.output import refuse_terminal
 from busplan.cli.pictures import plot_form
-from busplan.cli.sweep_job import TOP_FORMS, SweepForm, SweepJob
+from busplan.cli.sweep_run import TOP_FORMS, SweepForm, SweepJob, run_sweep
 from busplan.cli.vary import VALUES_HELP, parse_axes
 from busplan.errors import BusplanError
 from busplan.extras import require_extra, require_pyarrow
@@ -28,8 +28,7 @@ from busplan.forms import ENDINGS, ROWS_ENDINGS
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.grid import Grid
-    from busplan.sections.profile import Profile
+    from busplan.analysis.sweep.asked import Sweep
 
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
@@ -175,31 +174,31 @@ def sweep_command(
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
     plot_form_ = None if plot is None else plot_form(plot)
-    from busplan.analysis.sweep.columns import circle_columns
-    from busplan.analysis.sweep.grid import checked_grid, grid_models
-    from busplan.analysis.sweep.seeds import without_seed
-    from busplan.cli.sweep_run import available_processors, run_sweep
+    from busplan.analysis.sweep.asked import Names, checked_sweep
+    from busplan.cli.workers import available_processors
 
     loaded = load_changed(profile, changes)
     axes = parse_axes(vary or [], profile=loaded)
     for one in changes.each:
         for key in axes:
             require_separate(one, key, typed=f"--vary {key}")
-    grid = checked_grid(loaded, axes, with_circle=circle)
-    grid, seeds = without_seed(grid, option="--summary") if summary else (grid, None)
-    of_circle = circle_columns(circle=circle, summary=summary)
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    _require_number(loaded, grid, {"--sort": sort_by or None, "--figure": figure}, circle=of_circle)
+    asked = checked_sweep(
+        loaded,
+        axes,
+        timing_models=None if timing == ALL_MODELS else [timing],
+        circle=circle,
+        summary=summary,
+        force=force,
+        names=Names(),
+    )
+    _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
+    chosen = _columns(asked, columns, short=form in TOP_FORMS, sort_by=sort_by)
     run_sweep(
         SweepJob(
-            profile=loaded,
-            changes=changes,
-            grid=grid,
-            seeds=seeds,
-            timing_models=grid_models(loaded, grid, None if timing == ALL_MODELS else [timing], name="--timing"),
-            columns=_columns(loaded, columns, grid, circle=of_circle, short=form in TOP_FORMS, sort_by=sort_by),
+            asked._replace(columns=chosen, changes=changes),
             form=form,
             output=output,
             top=top or _DEFAULT_TOP,
@@ -210,7 +209,6 @@ def sweep_command(
             plot_form=plot_form_,
             figure=figure,
             jobs=(jobs or available_processors()) if circle else None,
-            force=force,
             cluster=cluster,
             resume=resume,
         )
@@ -259,35 +257,28 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
             raise BusplanError(f"{option}: goes with {needed}")
 
 
-def _require_number(profile: "Profile", grid: "Grid", asked: dict[str, str | None], *, circle: tuple[str, ...]) -> None:
+def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
     """Refuse a column that does not exist or is not numeric."""
     from busplan.analysis.sweep.blocks import word_figures
-    from busplan.analysis.sweep.circles import all_columns
 
-    words = {*word_figures(profile), *(key for key, axis in grid.axes.items() if axis.has_words)}
-    numbers = [name for name in all_columns(profile, grid, circle=circle) if name not in words]
+    words = {*word_figures(sweep.profile), *(key for key, axis in sweep.grid.axes.items() if axis.has_words)}
+    numbers = [name for name in sweep.columns if name not in words]
     for option, name in asked.items():
         if name is not None and name not in numbers:
             raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
 
 
-def _columns(
-    profile: "Profile", asked: str | None, grid: "Grid", *, circle: tuple[str, ...], short: bool, sort_by: str
-) -> tuple[str, ...]:
+def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) -> tuple[str, ...]:
     """Columns to write: the varied keys and timing_model, then those asked for, or all, or the main ones."""
-    from busplan.analysis.sweep.circles import all_columns
-
-    known = all_columns(profile, grid, circle=circle)
-    front = (*grid.axes, "timing_model")
     if asked is not None:
         chosen = tuple(name.strip() for name in asked.split(","))
         for name in chosen:
-            if name not in known:
-                raise BusplanError(f"--columns {name}: no such column; there are {', '.join(known)}")
+            if name not in sweep.columns:
+                raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
     elif short:
         from busplan.answers.sweep.top import default_columns
 
-        chosen = default_columns(profile, circle)
+        chosen = default_columns(sweep)
     else:
-        chosen = known
-    return tuple(dict.fromkeys((*front, *chosen, *([sort_by] if sort_by else []))))
+        chosen = sweep.columns
+    return tuple(dict.fromkeys((*sweep.grid.axes, "timing_model", *chosen, *([sort_by] if sort_by else []))))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from busplan.analysis.sweep.grid import Array, Values
-    from busplan.cli.sweep_job import SweepJob
+    from busplan.cli.sweep_run import SweepJob
 
 _MANIFEST: Final = "sweep.json"
 _OFTEN_S: Final = 1.0
@@ -209,11 +209,11 @@ def _facts(job: "SweepJob") -> dict[str, Any]:
     """What must be the same, under its name for people."""
     return {
         "version of busplan": __version__,
-        "profile": sha256(profile_text(job.profile).encode()).hexdigest(),
-        "grid": {key: _axis(axis) for key, axis in job.grid.axes.items()},
-        "range of seeds": None if job.seeds is None else _axis(job.seeds),
-        "choice of timing models": list(job.timing_models),
-        "set of columns": list(job.columns),
+        "profile": sha256(profile_text(job.sweep.profile).encode()).hexdigest(),
+        "grid": {key: _axis(axis) for key, axis in job.sweep.grid.axes.items()},
+        "range of seeds": None if job.sweep.seeds is None else _axis(job.sweep.seeds),
+        "choice of timing models": list(job.sweep.timing_models),
+        "set of columns": list(job.sweep.columns),
         "form": job.form,
     }
 

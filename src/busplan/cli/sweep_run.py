@@ -1,38 +1,63 @@
 """Run a sweep: compute, write and count block by block."""
 
-import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, Final, Literal, NamedTuple, NoReturn, get_args
 
+from busplan.cli.answering import give, report_with
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
-from busplan.cli.output import CANNOT, say
+from busplan.cli.output import CANNOT, emit_document, say
 from busplan.cli.progress import progress_bar
-from busplan.cli.sweep_job import TOP_FORMS
-from busplan.cli.sweep_sinks import sink_for
-from busplan.errors import WorkerLostError
+from busplan.errors import BusplanError, WorkerLostError
 from busplan.files import document_bytes, new_file, partial_path
+from busplan.forms import Form, Picture, RowsForm, render
 from busplan.progress import Progress
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from busplan.analysis.sweep.asked import Sweep
     from busplan.analysis.sweep.blocks import SweepBlock
-    from busplan.cli.sweep_job import SweepJob
+    from busplan.answers.sweep.top import Tally
+    from busplan.answers.sweep.writers import RowsWriter
     from busplan.cli.sweep_parts import Parts
     from busplan.drawings.sweep_plot import FigureData
+
+SweepForm = Literal[Form, RowsForm]
+TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
+"""Forms with the top rows, for people."""
+
+
+class SweepJob(NamedTuple):
+    """A sweep, and where its answer goes."""
+
+    sweep: "Sweep"
+    """With the columns to write."""
+    form: SweepForm
+    output: Path | None
+    top: int
+    is_whole: bool
+    """If True, a narrow terminal leaves out no column of the top rows."""
+    sort_by: str | None
+    ascending: bool
+    plot: Path | None
+    plot_form: Picture | None
+    figure: str | None
+    """Column of the picture; None for the default one."""
+    jobs: int | None
+    """Processes for circle tests, where there is no cluster; None without circle tests."""
+    cluster: str | None
+    """Address of a Dask scheduler whose workers run the circle tests."""
+    resume: bool
+    """If True, go on with the parts of a sweep that did not end."""
 
 
 class _StoppedBetweenError(Exception):
     """A signal came: what is in the middle of a block is left out."""
 
 
-def available_processors() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def run_sweep(job: "SweepJob") -> None:
+def run_sweep(job: SweepJob) -> None:
     """Compute, write and draw a sweep.
 
     Raises
@@ -46,11 +71,7 @@ def run_sweep(job: "SweepJob") -> None:
     from busplan.answers.sweep.top import Tally
     from busplan.forms.columns import sentence_text
 
-    drawing = _drawing(job)
-    if job.jobs is not None and not job.force:
-        _require_few(job)
-    tally = Tally(job.profile, job.grid, job.timing_models, seeds=job.tests)
-    expected = tally.expected
+    sweep, drawing, tally = job.sweep, _drawing(job), Tally(job.sweep)
     with ExitStack() as stack:
         # Left last: parts go when their file is complete.
         parts = _parts(job, stack)
@@ -62,25 +83,25 @@ def run_sweep(job: "SweepJob") -> None:
                 if job.output
                 else None
             )
-            sink = sink_for(job, file, tally)
+            sink = _sink(job, file, tally)
             takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
             lost = _work(job, takers, parts, points=sink.points, stopped=lambda: noted() is not None)
-        complete = tally.points == expected
+        complete = tally.points == sweep.grid.points
         sink.finish(complete=complete)
         if job.form not in TOP_FORMS or file is not None:
-            say(*map(sentence_text, (*changes_sentences(job.changes), *tally.sentences())))
+            say(*map(sentence_text, (*changes_sentences(sweep.changes), *tally.sentences())))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
-            say(f"{lost or 'interrupted'} after {tally.points:,} of {expected:,} points{kept}")
-            if parts is not None and parts.tests:
-                all_tests = expected * (job.tests or 1)
-                say(f"{parts.tests:,} of {all_tests:,} circle tests are in {parts.folder}: go on with --resume")
             signal = noted()
+            cause = "interrupted" if lost is None or signal is not None else str(lost)
+            say(f"{cause} after {tally.points:,} of {sweep.grid.points:,} points{kept}")
+            if parts is not None and parts.tests:
+                say(f"{parts.tests:,} of {sweep.tests:,} circle tests are in {parts.folder}: go on with --resume")
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
         if drawing is not None and plot_file is not None and job.plot_form is not None:
             from busplan.forms.raster import picture
 
-            svg = drawing.svg(", ".join(filter(None, (job.profile.name, job.changes.words))))
+            svg = drawing.svg(", ".join(filter(None, (sweep.profile.name, sweep.changes.words))))
             plot_file.write(document_bytes(picture(svg, job.plot_form)))
     for path in (job.output, job.plot):
         if path is not None:
@@ -88,7 +109,7 @@ def run_sweep(job: "SweepJob") -> None:
 
 
 def _work(
-    job: "SweepJob",
+    job: SweepJob,
     takers: "Sequence[Callable[[SweepBlock], None]]",
     parts: "Parts | None",
     *,
@@ -97,7 +118,7 @@ def _work(
 ) -> WorkerLostError | None:
     """Pass each block to all takers, until the end or a stop; return the error of a lost worker."""
 
-    def watch(*_: object) -> None:
+    def watch() -> None:
         if stopped():
             raise _StoppedBetweenError
 
@@ -114,23 +135,16 @@ def _work(
     return None
 
 
-def _drawing(job: "SweepJob") -> "FigureData | None":
+def _drawing(job: SweepJob) -> "FigureData | None":
     if job.plot is None:
         return None
-    from busplan.drawings.sweep_plot import FigureData, default_figure, require_drawable
+    from busplan.drawings.sweep_plot import FigureData, require_drawable
 
-    require_drawable(job.grid, option="--plot")
-    figure = job.figure or default_figure(job.profile)
-    return FigureData(job.profile, job.grid, figure=figure, timing_models=job.timing_models)
-
-
-def _require_few(job: "SweepJob") -> None:
-    from busplan.analysis.sweep.circles import require_few
-
-    require_few(job.grid, seeds=job.tests or 1, option="--circle", consent="--force")
+    require_drawable(job.sweep.grid, option="--plot")
+    return FigureData(job.sweep, figure=job.figure)
 
 
-def _parts(job: "SweepJob", stack: ExitStack) -> "Parts | None":
+def _parts(job: SweepJob, stack: ExitStack) -> "Parts | None":
     if job.jobs is None or job.output is None:
         return None
     from busplan.cli.sweep_parts import kept_parts
@@ -140,73 +154,93 @@ def _parts(job: "SweepJob", stack: ExitStack) -> "Parts | None":
 
 @contextmanager
 def _blocks(
-    job: "SweepJob", parts: "Parts | None", points: int, report: Progress, watch: Callable[[], None]
+    job: SweepJob, parts: "Parts | None", points: int, report: Progress, watch: Callable[[], None]
 ) -> "Iterator[Iterable[SweepBlock]]":
     """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
     from busplan.analysis.sweep.blocks import sweep
 
+    asked = job.sweep
     if job.jobs is None:
-        yield _reported(sweep(job.profile, job.grid, timing_models=job.timing_models, chunk_points=points), job, report)
+        blocks = sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=points)
+        yield _reported(blocks, asked.grid.points, report)
         return
-    from busplan.analysis.sweep.circle_run import NOTHING_KEPT, CircleTests, circle_blocks, require_circles
+    from busplan.analysis.sweep.circle_run import circle_blocks, require_circles
 
-    tests = CircleTests(job.profile, job.grid, job.seeds)
     with ExitStack() as stack:
         if parts is not None:
             stack.callback(parts.flush)
-        where, watch = stack.enter_context(_where(job, tests.number, watch))
+        where, watch = stack.enter_context(_where(job, watch))
         with progress_bar("check of the points") as checked:
-            cost = require_circles(tests, where, progress=lambda done: checked(done, tests.grid.points), watch=watch)
+            cost = require_circles(asked, where, progress=lambda done: checked(done, asked.grid.points), watch=watch)
         yield circle_blocks(
-            tests,
+            asked,
             where,
-            timing_models=job.timing_models,
             cost=cost,
-            kept=parts or NOTHING_KEPT,
-            progress=lambda done: report(done, tests.number),
+            kept=parts,
+            progress=lambda done: report(done, asked.tests),
             watch=watch,
         )
 
 
 @contextmanager
-def _where(job: "SweepJob", tests: int, watch: Callable[[], None]) -> "Iterator[tuple[Executor, Callable[[], None]]]":
+def _where(job: SweepJob, watch: Callable[[], None]) -> "Iterator[tuple[Executor, Callable[[], None]]]":
     """Executor of circle tests, and what must be watched while it works."""
-    if job.cluster is None:
-        with executor(min(job.jobs or 1, tests)) as here:
-            yield here, watch
+    if job.cluster is not None:
+        from busplan.cli.cluster import cluster
+
+        with cluster(job.cluster) as (there, look):
+
+            def watch_both() -> None:
+                watch()
+                look()
+
+            yield there, watch_both
         return
-    from busplan.cli.cluster import cluster
+    from busplan.cli.workers import executor
 
-    with cluster(job.cluster) as (there, look):
-
-        def watch_both() -> None:
-            watch()
-            look()
-
-        yield there, watch_both
+    with executor(min(job.jobs or 1, job.sweep.tests)) as here:
+        yield here, watch
 
 
-def _reported(blocks: "Iterable[SweepBlock]", job: "SweepJob", report: Progress) -> "Iterator[SweepBlock]":
+def _reported(blocks: "Iterable[SweepBlock]", points: int, report: Progress) -> "Iterator[SweepBlock]":
     for block in blocks:
         yield block
-        report(block.chunk.start + block.chunk.points, job.grid.points)
+        report(block.chunk.start + block.chunk.points, points)
 
 
-@contextmanager
-def executor(jobs: int) -> "Iterator[Executor]":
-    """Give an executor that works here, or in other processes.
+def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> "RowsWriter":
+    """Destination for the blocks: the top rows, or every row."""
+    match job.form:
+        case "csv" | "json" | "jsonl" | "parquet":
+            from busplan.answers.sweep.writers import rows_writer
 
-    Parameters
-    ----------
-    jobs
-        Number of processes [1].
-    """
-    if jobs == 1:
-        from busplan.analysis.sweep.execution import Here
+            return rows_writer(job.form, job.sweep, emit_document if file is None else file.write)
+        case _:
+            return _TopSink(job, job.form, file, tally)
 
-        yield Here()
-        return
-    from busplan.cli.workers import workers
 
-    with workers(jobs) as crew:
-        yield crew
+class _TopSink:
+    """Keeps the top rows for an answer at the end."""
+
+    def __init__(self, job: SweepJob, form: Form, file: BinaryIO | None, tally: "Tally") -> None:
+        from busplan.analysis.sweep.blocks import CHUNK_POINTS
+        from busplan.answers.sweep.top import TopRows
+
+        self.points = CHUNK_POINTS
+        self._job, self._form, self._file, self._tally = job, form, file, tally
+        self._rows = TopRows(job.sweep.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
+        self.add = self._rows.add
+
+    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - `tally` has the number of points
+        """Write the answer."""
+        from busplan.answers.sweep.top import sweep_report
+
+        report = report_with(self._job.sweep.changes, sweep_report(self._rows, self._tally, document=_not_kept))
+        if self._file is None:
+            give(report._replace(is_whole=self._job.is_whole), self._form)
+        else:
+            self._file.write(document_bytes(render(report, self._form)))
+
+
+def _not_kept() -> NoReturn:
+    raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")

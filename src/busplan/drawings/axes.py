@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
-from math import ceil, floor, log10
+from math import ceil, log10
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
@@ -10,8 +10,8 @@ from busplan.analysis.capacity.node_steps import NodeSteps, telling_periods
 from busplan.analysis.network import network_of
 from busplan.forms.blocks import Drawing
 from busplan.forms.numbers import period, plural
-from busplan.forms.scale import round_steps
-from busplan.forms.svg import drawing, markup, text_at
+from busplan.forms.scale import round_numbers, round_steps
+from busplan.forms.svg import anchor, drawing, markup, text_at
 from busplan.sections.profile import Profile
 
 _TOP: Final = 50
@@ -90,12 +90,11 @@ def _grid(root: Element, plane: _Plane) -> None:
         y = str(round(plane.y(axes)))
         SubElement(root, "line", {"x1": "0", "x2": "100%", "y1": y, "y2": y, "class": "rule"})
     bottom = _TOP + _HEIGHT
-    for period_us in _round_periods(plane):
+    for period_us in round_numbers(plane.from_us, plane.to_us, most=_MOST_LABELS):
         at = plane.x(period_us)
         x = f"{at:.5g}%"
         SubElement(root, "line", {"x1": x, "x2": x, "y1": str(bottom), "y2": str(bottom + 5), "class": "rule"})
-        anchor = "start" if at < 5 else "end" if at > 95 else "middle"  # noqa: PLR2004 - percent: the edges
-        text_at(root, period(period_us), x=x, y=bottom + 19, css="small", anchor=anchor)
+        text_at(root, period(period_us), x=x, y=bottom + 19, css="small", anchor=anchor(at))
     text_at(root, "communication period, logarithmic", x="100%", y=bottom + 38, css="small", anchor="end")
 
 
@@ -113,17 +112,6 @@ def _legend(root: Element, steps: Sequence[NodeSteps]) -> None:
         SubElement(place, "line", {"x1": "2", "x2": "42", "y1": "9", "y2": "9", "class": f"curve {css}"})
         draw_mark(place, css, x="22", y=9)
         text_at(place, one.timing_model, x="50", y=14)
-
-
-def _round_periods(plane: _Plane) -> list[float]:
-    """Round periods inside the drawing, at most `_MOST_LABELS`."""
-    powers = range(floor(log10(plane.from_us)), ceil(log10(plane.to_us)) + 1)
-    for factors in ((1, 2, 5), (1, 3), (1,)):
-        found = [float(f"{factor}e{power}") for power in powers for factor in factors]
-        inside = [one for one in found if plane.from_us <= one <= plane.to_us]
-        if len(inside) <= _MOST_LABELS:
-            return inside
-    return inside[:: ceil(len(inside) / _MOST_LABELS)]
 
 
 def _path(one: NodeSteps, plane: _Plane) -> str:
@@ -147,8 +135,7 @@ def _own(root: Element, plane: _Plane, own_us: float, own_axes: int) -> None:
     x, y = f"{at:.5g}%", round(plane.y(own_axes))
     line = {"x1": x, "x2": x, "y1": str(_TOP - 4), "y2": str(_TOP + _HEIGHT), "class": "own"}
     SubElement(root, "line", line)
-    anchor = "start" if at < 30 else "end" if at > 70 else "middle"  # noqa: PLR2004 - percent
-    text_at(root, f"this profile, {period(own_us)}", x=x, y=38, css="head", anchor=anchor)
+    text_at(root, f"this profile, {period(own_us)}", x=x, y=38, css="head", anchor=anchor(at, edge=30))
     SubElement(root, "circle", {"cx": x, "cy": str(y), "r": "5", "class": "point"})
     side, shift = ("end", "-9") if at > 70 else ("start", "9")  # noqa: PLR2004 - percent
     box = SubElement(root, "svg", {"x": x, "overflow": "visible"})

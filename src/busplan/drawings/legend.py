@@ -1,15 +1,18 @@
 """The legend of a drawing in characters."""
 
 from collections.abc import Iterator, Sequence
+from textwrap import wrap
 from typing import Final
 
 from busplan.forms.lines import Line
 
 _HEAD: Final = "Legend: "
+_UNBROKEN: Final = "\xa0"
+"""A space at which no line ends."""
 
 
 def legend_lines(words: Sequence[str], *, width: int) -> Iterator[Line]:
-    """Write the entries of a legend, wrapped to a width.
+    """Write the entries of a legend, wrapped to a width between two entries.
 
     Parameters
     ----------
@@ -18,11 +21,9 @@ def legend_lines(words: Sequence[str], *, width: int) -> Iterator[Line]:
     width
         Most columns of a line.
     """
-    line = _HEAD
-    for number, word in enumerate(words):
-        piece = word if number == len(words) - 1 else f"{word}, "
-        if len(line) + len(piece.rstrip()) > width and line.strip():
-            yield Line(line.rstrip(), "drawn")
-            line = " " * len(_HEAD)
-        line += piece
-    yield Line(line.rstrip(), "drawn")
+    entries = ", ".join(word.replace(" ", _UNBROKEN) for word in words)
+    indent = " " * len(_HEAD)
+    for line in wrap(
+        entries, width, initial_indent=_HEAD, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    ):
+        yield Line(line.replace(_UNBROKEN, " "), "drawn")

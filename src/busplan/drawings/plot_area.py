@@ -3,10 +3,9 @@
 from typing import Final, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from busplan.drawings.map.labels import placed_labels
 from busplan.forms.raster import WIDTH
-from busplan.forms.scale import Tick, ticks
-from busplan.forms.svg import LINE, PHONE, inside, text_at
+from busplan.forms.scale import Tick, placed_labels, ticks
+from busplan.forms.svg import LINE, PHONE, anchor, inside, text_at
 
 MARGIN_PERCENT: Final = 2.5
 """Empty part at each side of a picture."""
@@ -163,6 +162,6 @@ def draw_across(area: Element, across: Ruler, *, y: int, room: float) -> None:
         share = across.share(mark.at)
         x = f"{100 * share:.5g}%"
         SubElement(area, "line", {"x1": x, "x2": x, "y1": str(y), "y2": str(y + 5), "class": "rule"})
-        anchor = "middle" if across.names or 0.04 <= share <= 0.96 else "start" if share < 0.5 else "end"  # noqa: PLR2004 - the edges
-        text_at(area, mark.label, x=x, y=y + 19, css="small", anchor=anchor)
+        side = "middle" if across.names else anchor(100 * share, edge=4)
+        text_at(area, mark.label, x=x, y=y + 19, css="small", anchor=side)
     text_at(area, across.label, x="100%", y=y + 36, css="small", anchor="end")

@@ -1,11 +1,11 @@
 """A figure of a sweep as a picture: curves over one key, heat maps over two."""
 
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from busplan.analysis.network import bus_of
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import SweepBlock
 from busplan.analysis.sweep.grid import Grid
 from busplan.drawings.sweep_panels import sweep_svg
@@ -20,7 +20,7 @@ MAX_DRAWN: Final = 250_000
 _MAX_KEYS: Final = 2
 
 
-def default_figure(profile: Profile) -> str:
+def _default_figure(profile: Profile) -> str:
     """Column that is drawn if none is asked for; of groups, the most axes are no single number."""
     return "margin_corrected_us" if profile.group else "safe_axes"
 
@@ -54,20 +54,17 @@ class FigureData:
 
     Parameters
     ----------
-    profile
-        The network: this design, which the picture marks.
-    grid
-        The grid.
+    sweep
+        The sweep; its profile is this design, which the picture marks.
     figure
-        Name of the column.
-    timing_models
-        The timing models.
+        Name of the column; by default the safe axes, or of groups the margin.
     """
 
-    def __init__(self, profile: Profile, grid: Grid, *, figure: str, timing_models: Sequence[str]) -> None:
-        self._profile, self._grid, self._name, self._models = profile, grid, figure, timing_models
-        self._values = np.full((grid.points, len(timing_models)), np.nan)
-        self._unsafe = np.zeros((grid.points, len(timing_models)), dtype=bool)
+    def __init__(self, sweep: Sweep, *, figure: str | None = None) -> None:
+        self._profile, self._grid, self._models = sweep.profile, sweep.grid, sweep.timing_models
+        self._name = figure or _default_figure(sweep.profile)
+        points = self._grid.points, len(self._models)
+        self._values, self._unsafe = np.full(points, np.nan), np.zeros(points, dtype=bool)
 
     def add(self, block: SweepBlock) -> None:
         """Add a block."""

@@ -5,7 +5,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from busplan.analysis.network import bus_of
-from busplan.analysis.sweep.columns import column_figures
+from busplan.analysis.sweep.asked import column_figures
 from busplan.analysis.sweep.grid import Array, Values
 from busplan.buses.figure import NODES, PERIOD, Figure, unit_of
 from busplan.forms.blocks import figure_value

@@ -163,7 +163,7 @@ class Facts(NamedTuple):
 class Drawing(ABC):
     """A picture that can be drawn in several ways; a way that it does not support gives None."""
 
-    stylesheet: ClassVar[str] = ""
+    stylesheet: str = ""
     """CSS of its SVG, included once in a page."""
     shape: ClassVar[Literal["wide", "round"]] = "wide"
     is_text_in_markdown: ClassVar[bool] = False

@@ -14,7 +14,6 @@ _ZOOM: Final = 2.0
 _MOST_HEIGHT: Final = 16_000
 """Most pixels down: of a higher drawing, a px is less than `_ZOOM` pixels."""
 _FONT: Final = '* {font-family:"DejaVu Sans Subset" !important}'
-_VARIABLE: Final = re.compile(r"(--[\w-]+):\s*([^;]+);")
 
 
 def png(svg: str) -> bytes:
@@ -33,7 +32,7 @@ def png(svg: str) -> bytes:
     zoom = min(_ZOOM, _MOST_HEIGHT / int(height[1])) if height else _ZOOM
     with as_file(files("busplan.forms") / "fonts") as fonts:
         return resvg_py.svg_to_bytes(
-            svg_string=_literal(svg).replace('width="100%"', f'width="{WIDTH}"', 1),
+            svg_string=svg.replace('width="100%"', f'width="{WIDTH}"', 1),
             background="#ffffff",
             zoom=zoom,
             font_files=[str(fonts / "regular.ttf"), str(fonts / "bold.ttf")],
@@ -44,12 +43,3 @@ def png(svg: str) -> bytes:
 def picture(svg: str, form: "Picture") -> str | bytes:
     """Give a drawing as the content of a file."""
     return svg if form == "svg" else png(svg)
-
-
-def _literal(svg: str) -> str:
-    """Replace CSS variables in the style sheet by their light values, the first ones: resvg does not know variables."""
-    before, start, rest = svg.partition("<style>")
-    sheet, end, behind = rest.partition("</style>")
-    values = dict(reversed(_VARIABLE.findall(sheet)))
-    sheet = re.sub(r"var\((--[\w-]+)\)", lambda match: values[match[1]], sheet)
-    return f"{before}{start}{sheet}{end}{behind}"

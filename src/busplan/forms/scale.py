@@ -1,5 +1,6 @@
 """Round tick marks for any scale."""
 
+from collections.abc import Sequence
 from math import ceil, floor, log10
 from typing import NamedTuple
 
@@ -51,6 +52,30 @@ def ring_step(largest: float) -> float:
     return max(step.size for step in round_steps(largest / 2) if step.size <= largest / 2)
 
 
+def round_numbers(low: float, high: float, *, most: int) -> list[float]:
+    """Labels of a logarithmic scale: 1, 2 and 5 times powers of ten, fewer where these are too many.
+
+    Parameters
+    ----------
+    low, high
+        Ends of the scale, above 0.
+    most
+        Largest number of labels, 1 or more.
+
+    Examples
+    --------
+    >>> round_numbers(0.9, 40.0, most=6), round_numbers(0.9, 400.0, most=6)
+    ([1.0, 2.0, 5.0, 10.0, 20.0], [1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+    """
+    powers = range(floor(log10(low)), ceil(log10(high)) + 1)
+    for factors in ((1, 2, 5), (1, 3), (1,)):
+        found = [float(f"{factor}e{power}") for power in powers for factor in factors]
+        inside = [one for one in found if low <= one <= high]
+        if len(inside) <= most:
+            return inside
+    return inside[:: ceil(len(inside) / most)]
+
+
 def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     """Tick marks inside a window, spaced 1, 2 or 5 times a power of ten.
 
@@ -74,3 +99,37 @@ def ticks(low: float, high: float, *, most: int) -> tuple[Tick, ...]:
     first, last = ceil(low / step.size - 1e-9), floor(high / step.size + 1e-9)
     decimals = max(0, -step.power)
     return tuple(Tick(number * step.size, f"{number * step.size:.{decimals}f}") for number in range(first, last + 1))
+
+
+def placed_labels(texts: Sequence[str], *, own: int | None, pitch: float, letter: float) -> dict[int, float]:
+    """Place labels in the middle of their columns, this design's first, as far as none touches another.
+
+    Parameters
+    ----------
+    texts
+        A label for each column.
+    own
+        Column of this design.
+    pitch
+        Width of a column, in the unit of the result.
+    letter
+        Width of a letter.
+
+    Returns
+    -------
+    dict
+        Where each label begins, by column.
+
+    Examples
+    --------
+    >>> placed_labels(["8", "12", "100", "16"], own=3, pitch=3, letter=1)
+    {0: 1.0, 1: 3.5, 3: 9.5}
+    """
+    placed: dict[int, float] = {}
+    for column in sorted(range(len(texts)), key=lambda one: one != own):
+        start = max(0.0, (column + 0.5) * pitch - letter * len(texts[column]) / 2)
+        end = start + letter * (len(texts[column]) + 1)
+        others = ((begin, begin + letter * (len(texts[one]) + 1)) for one, begin in placed.items())
+        if all(start >= behind or end <= begin for begin, behind in others):
+            placed[column] = start
+    return dict(sorted(placed.items()))

@@ -56,6 +56,17 @@ def text_at(parent: Element, text: str, *, x: str, y: int, css: str = "", anchor
     SubElement(parent, "text", {"x": x, "y": str(y), "class": css, "text-anchor": anchor}).text = text
 
 
+def anchor(percent: float, *, edge: int = 5) -> str:
+    """How a text stands at its place: within `edge` percent of a side it keeps inside the drawing.
+
+    Examples
+    --------
+    >>> anchor(3.0), anchor(50.0), anchor(96.0)
+    ('start', 'middle', 'end')
+    """
+    return "start" if percent < edge else "end" if percent > 100 - edge else "middle"
+
+
 def paragraph(parent: Element, text: str, *, y: int, css: str) -> int:
     """Draw wrapped text, and return the y below it."""
     # Letters of other scripts may be twice as wide.
@@ -102,6 +113,5 @@ class Scale:
             at = self.percent(tick.at)
             x = f"{at:.5g}%"
             SubElement(parent, "line", {"x1": x, "x2": x, "y1": str(top), "y2": str(bottom + 4), "class": "rule"})
-            anchor = "start" if at < 4 else "end" if at > 96 else "middle"  # noqa: PLR2004 - percent: the edges
-            text_at(parent, tick.label, x=x, y=bottom + 17, css="small", anchor=anchor)
+            text_at(parent, tick.label, x=x, y=bottom + 17, css="small", anchor=anchor(at, edge=4))
         return bottom + LINE

@@ -87,27 +87,25 @@ class Document:
         """Lines of the text."""
         return Lines(self.text)
 
-    @property
+    @cached_property
     def places(self) -> "dict[KeyPath, Place]":
         """Place of every key; only for text that tomllib accepts."""
-        return self._scanned[0]
+        from busplan.profile.positions import places  # loaded only if places are needed
 
-    @property
-    def comments(self) -> list[int]:
-        """Offset of the hash of every comment; only for text that tomllib accepts."""
-        return self._scanned[1]
+        return places(self.text)
 
     @cached_property
-    def _scanned(self) -> "tuple[dict[KeyPath, Place], list[int]]":
-        from busplan.profile.positions import scan  # loaded only if places are needed
+    def comments(self) -> list[int]:
+        """Offset of the hash of every comment; only for text that tomllib accepts."""
+        from busplan.profile.positions import comments  # as above
 
-        return scan(self.text)
+        return comments(self.text)
 
-    def nearest(self, path: "KeyPath") -> int:
-        """Offset of a key; if it is missing, of the nearest table around it, or 0."""
+    def nearest(self, path: "KeyPath") -> "KeyPath":
+        """Path of a key; if it is missing, of the nearest table around it, () at the top."""
         while path and path not in self.places:
             path = path[:-1]
-        return self.places[path].key_start if path else 0
+        return path
 
     def spot(self, path: "KeyPath", *, marks_key: bool = False) -> Spot:
         """Place of a key with its value marked; if the key is missing, of the nearest table around it.
@@ -119,9 +117,7 @@ class Document:
         marks_key
             If True, mark the key instead of its value.
         """
-        found = path
-        while found and found not in self.places:
-            found = found[:-1]
+        found = self.nearest(path)
         if not found:
             return Spot(1, 1, 1, 2)
         place = self.places[found]

@@ -1,14 +1,14 @@
 r"""Change values in the text of a profile and keep everything else: bytes, comments and layout.
 
 A value is replaced, or a line is added to or removed from a section. A layout that needs more is refused, with the
-lines to change by hand. As a check, the new text is parsed and compared with the wanted data.
+lines to change by hand. As a check, the new text is parsed and compared with the wanted data. A comment that grades a
+value, as `# measured: by whom`, was said of the old one: it becomes `# was measured: by whom`.
 """
 
 import re
 import tomllib
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
-from itertools import groupby
 from typing import Any, Final
 
 import tomli_w
@@ -16,6 +16,7 @@ import tomli_w
 from busplan.errors import BusplanError, PlacedError
 from busplan.printable import printable
 from busplan.profile.document import Document
+from busplan.profile.graded import GRADING, comments_beside
 from busplan.profile.keys import flat, holder, path_of
 from busplan.profile.positions import KeyPath, Place
 from busplan.profile.toml import decode, validate
@@ -23,22 +24,6 @@ from busplan.profile.write import value_text
 
 _HEADER_END: Final = re.compile(r"[ \t]*\]")
 _BEFORE_COMMENT: Final = re.compile(r"  +(?=#)")
-
-_ORIGIN: Final = re.compile(
-    r"\b(derived|measur\w*|calibrat\w*|fit|fitted|from|by|table [IVX\d]\w*|paper\w*|bench|assum\w*|estimat\w*|"
-    r"guess\w*|source|data ?sheet|according|published|taken|oscilloscope|\S+\.csv|20\d\d)\b",
-    re.IGNORECASE,
-)
-"""Words of a comment that says where a value is from."""
-_OWN_NOTE: Final = re.compile(r"#\s*busplan \w+: ")
-"""A note of an earlier edit; it belongs to no paragraph of the user."""
-_ENDS_PARAGRAPH: Final = re.compile(r"#(:|\W*$|\s*busplan( \w+)?: |\s*[\w.]+ = )")
-"""A comment that is no prose: a directive, a rule, a suppression, a note, a key that is commented out."""
-_NUMBERS: Final = {
-    *("grade", "base_us", "per_byte_us", "payload_bytes", "time_us"),
-    *("uncertainty_us", "residual", "measured_gap_count"),
-}
-"""Keys whose values a fit gives."""
 
 
 class _LayoutError(Exception):
@@ -62,8 +47,7 @@ def edited_file(
         Name of the file in messages.
     notes
         One-line comment by section, for the line above it: {"node.execution": "busplan calibrate: ..."}. It says where
-        the section's values are from, and replaces every comment that said so of the old ones (see `origin_comments`),
-        and a comment there with the same beginning, up to the colon.
+        the section's values are from, and replaces a comment there with the same beginning, up to the colon.
 
     Returns
     -------
@@ -99,6 +83,9 @@ def edited_file(
     after = _texts(data)
     # Set keys before removing keys: new lines must not follow the comment of a removed line.
     changed = {key: after.get(key) for key in {**after, **before} if after.get(key) != before.get(key)}
+    # A note speaks of its whole section, of values that stay equal, too.
+    noted = {path_of(data, key) for key in (*notes, *changes) if key in notes or key.rpartition(".")[0] in notes}
+    document = _with_old_grades(document, noted | {path_of(data, key) for key in changed})
     try:
         result = _encoded(_edited(document, changed, notes, wanted=after), like=content)
     except _LayoutError as error:
@@ -164,8 +151,6 @@ def _edited(
 ) -> str:
     """Make the changes one after the other."""
     data = document.data()
-    for section in notes:
-        document = Document(document.name, _without_origins(document, section))
     for key, text in changed.items():
         path = path_of(data, key)
         if text is None:
@@ -215,63 +200,12 @@ def _without(document: Document, path: KeyPath) -> str:
     return text[:start] + "".join(f"{_indent(text, start)}{one}\n" for one in comments) + text[end:]
 
 
-def origin_comments(document: Document, section: str) -> list[str]:
-    """Comments that say where the values of a section are from, as they stand in the file.
-
-    They are paragraphs above the section's header, and comments above and beside its numbers, that name an origin: a
-    measurement, a fit, a table, a paper, a date. Suppressions, keys that are commented out, and comments on other keys
-    are none.
-    """
-    return [document.text[start:end].strip() for start, end in _origins(document, path_of(document.data(), section))]
-
-
-def _without_origins(document: Document, section: str) -> str:
-    text = document.text
-    for start, end in reversed(_origins(document, path_of(document.data(), section))):
-        line = _line_start(text, start)
-        if text[line:start].strip():
-            text = text[:line] + text[line:start].rstrip() + text[end:]
-        else:
-            text = text[:line] + text[_line_end(text, end) :]
-    return text
-
-
-def _origins(document: Document, table: KeyPath) -> list[tuple[int, int]]:
-    """Start and end of each comment on the origin of a section's values, in the order of the file."""
-    text = document.text
-    whole = {_line_start(text, at): at for at in document.comments if not text[_line_start(text, at) : at].strip()}
-    anchors = [_header(document, table).key_start]
-    anchors += [
-        place.key_start
-        for key, place in document.places.items()
-        if key[:-1] == table and key[-1] in _NUMBERS and place.value_start > place.key_end
-    ]
-    found: set[int] = set()
-    for anchor in anchors:
-        line = _line_start(text, anchor)
-        if anchor != anchors[0]:
-            beside = (at for at in document.comments if line <= at < _line_end(text, anchor))
-            found.update(at for at in beside if _names_origin([text[at : _end(text, at)]]))
-        above: list[int] = []
-        while line and (line := _line_start(text, line - 1)) in whole:
-            above.append(whole[line])
-        for ends, group in groupby(above, lambda at: bool(_ENDS_PARAGRAPH.match(text, at, _end(text, at)))):
-            paragraph = list(group)
-            if ends:
-                found.update(at for at in paragraph if _OWN_NOTE.match(text, at))
-            elif _names_origin([text[at : _end(text, at)] for at in paragraph]):
-                found.update(paragraph)
-    return [(at, _end(text, at)) for at in sorted(found)]
-
-
-def _names_origin(comments: list[str]) -> bool:
-    return any(_ORIGIN.search(one) and not _ENDS_PARAGRAPH.match(one) for one in comments)
-
-
-def _end(text: str, offset: int) -> int:
-    """End of a line, without its line end."""
-    end = text.find("\n", offset)
-    return len(text) if end < 0 else end
+def _with_old_grades(document: Document, paths: set[KeyPath]) -> Document:
+    """The document with "was" in the comments that grade some keys."""
+    text, beside = document.text, comments_beside(document)
+    for at in sorted({beside[path] for path in paths & set(beside)}, reverse=True):
+        text = text[:at] + GRADING.sub(r"# was \1", text[at:], count=1) if GRADING.match(text, at) else text
+    return Document(document.name, text)
 
 
 def _noted(document: Document, table: KeyPath, note: str) -> str:

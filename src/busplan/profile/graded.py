@@ -2,14 +2,18 @@
 
 import re
 from collections.abc import Iterator
-from typing import Final, cast, get_args
+from typing import TYPE_CHECKING, Final, cast, get_args
 
 from busplan.profile.document import Document
 from busplan.profile.keys import named_path
 from busplan.sections.profile import Profile
 from busplan.sourced import Grade
 
-_GRADE: Final = re.compile(rf"#\s*({'|'.join(get_args(Grade))})\b")
+if TYPE_CHECKING:
+    from busplan.profile.positions import KeyPath
+
+GRADING: Final = re.compile(rf"#\s*({'|'.join(get_args(Grade))})\b")
+"""A comment that grades the key beside it."""
 _SOURCE: Final = "_source"
 """Where a profile keeps its document and the keys that are no longer as there: no field, so no part of its value."""
 
@@ -57,10 +61,17 @@ def comment_grade(profile: Profile, key: str) -> Grade | None:
 
 def _grades(document: Document) -> Iterator[tuple[str, Grade]]:
     """Dotted keys with the grades of their comments; those of a group have its name."""
-    data, at = document.data(), document.lines.line_and_column
-    words = {at(offset)[0]: document.text[offset:].partition("\n")[0] for offset in document.comments}
-    said = {path: words.get(at(place.key_start)[0], "") for path, place in document.places.items()}
-    for path, comment in said.items():
-        match = _GRADE.match(comment or said.get(path[:-1], ""))
+    data, comments = document.data(), comments_beside(document)
+    for path in document.places:
+        offset = comments.get(path, comments.get(path[:-1]))
+        match = None if offset is None else GRADING.match(document.text, offset)
         if match is not None:
             yield ".".join(map(str, named_path(data, path))), cast("Grade", match[1])
+
+
+def comments_beside(document: Document) -> "dict[KeyPath, int]":
+    """Offset of the comment on the line of each key that has one there; that of a table is beside its header."""
+    line_of = document.lines.line_and_column
+    of_line = {line_of(offset)[0]: offset for offset in document.comments}
+    lines = {path: line_of(place.key_start)[0] for path, place in document.places.items()}
+    return {path: of_line[line] for path, line in lines.items() if line in of_line}

@@ -1,10 +1,10 @@
 """A profile as dotted keys with their values."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, Literal, NamedTuple
 
 from busplan.errors import BusplanError
-from busplan.sections.base import Section
+from busplan.sections.base import Section, value_at
 from busplan.sections.profile import Profile
 
 
@@ -17,12 +17,9 @@ def default_of(profile: Profile, key: str) -> object:
     >>> default_of(load("paper-4ms").profile, "bus.gap_count"), default_of(load("paper-4ms").profile, "bus.nodes")
     (63, None)
     """
-    *sections, last = key.split(".")
-    inner: object = profile
-    for part in sections:
-        of_name = [one for one in inner if getattr(one, NAME) == part] if isinstance(inner, tuple) else []
-        inner = of_name[0] if of_name else getattr(inner, part)
-    field = type(inner).model_fields[last] if isinstance(inner, Section) else None
+    section, _, last = key.rpartition(".")
+    table = value_at(profile, section) if section else profile
+    field = type(table).model_fields[last] if isinstance(table, Section) else None
     if field is None or field.is_required():
         return None
     default = field.get_default(call_default_factory=True)
@@ -102,32 +99,26 @@ def path_of(data: Mapping[str, object], key: str) -> tuple[str | int, ...]:
     >>> path_of({"group": [{"name": "drives", "nodes": 2}]}, "group.drives.nodes")
     ('group', 0, 'nodes')
     """
-    path: list[str | int] = []
-    inner: object = data
-    for part in key.split("."):
-        tables = named_tables(inner)
-        if tables is not None and part in tables:
-            path.append(list(tables).index(part))
-            inner = tables[part]
-        else:
-            path.append(part)
-            inner = inner.get(part) if isinstance(inner, Mapping) else None
-    return tuple(path)
+    return tuple(step for step, _ in _steps(data, key.split(".")))
 
 
 def named_path(data: object, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """The path with the name of a table among several of one key instead of its place, where it has one."""
-    found: list[str | int] = []
+    return tuple(name for _, name in _steps(data, path))
+
+
+def _steps(data: object, path: Iterable[str | int]) -> Iterator[tuple[str | int, str | int]]:
+    """Each part of a path; a table among several of one key as its place and as its name, whichever the path has."""
     for part in path:
-        tables = named_tables(data)
-        if isinstance(part, int) and tables is not None and part < len(tables):
-            name = list(tables)[part]
-            found.append(name)
+        tables = named_tables(data) or {}
+        names = list(tables)
+        if part in tables or (isinstance(part, int) and part < len(names)):
+            name = names[part] if isinstance(part, int) else part
+            yield names.index(name), name
             data = tables[name]
         else:
-            found.append(part)
+            yield part, part
             data = data.get(part) if isinstance(data, Mapping) else None
-    return tuple(found)
 
 
 def holder(data: dict[str, Any], key: str, *, name: str | None = None) -> tuple[dict[str, Any], str]:

@@ -1,4 +1,4 @@
-"""Find the place of every key and value of a TOML text.
+"""Find the place of every key, value and comment of a TOML text.
 
 The standard library's parser gives values without places; this scanner gives places without values. It reads only text
 that `tomllib` has accepted, so it needs no error handling. It has its own stack instead of recursion.
@@ -26,30 +26,17 @@ class Place(NamedTuple):
     value_end: int
 
 
-_SPACE: Final = re.compile(r"[ \t]*")
-_SPACE_AND_LINES: Final = re.compile(r"(?:[ \t\r\n]+|#[^\n]*)*")
-_COMMENT: Final = re.compile(r"#[^\n]*")
-_KEY_PART: Final = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'""")
-# A multi-line string may end in one or two quotes before the closing three. A date may contain a space.
-_SCALAR: Final = re.compile(
+_GAP: Final = re.compile(r"[ \t\n,]*(?:#[^\n]*[ \t\n,]*)*")
+"""Between two statements, or two values of an array or inline table."""
+_KEY: Final = re.compile(r"""[ \t]*([A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')[ \t]*([.=\]]?)[ \t]*""")
+"""One part of a key, and the sign behind it."""
+# A multi-line string may end in one or two quotes before the closing three.
+_STRING: Final = (
     r'''"""(?:[^"\\]|\\.|"{1,2}(?!"))*"{3,5}|\'\'\'(?:[^']|'{1,2}(?!'))*'{3,5}|"(?:[^"\\]|\\.)*"|'[^']*\''''
-    r"""|[^,\]}#\s](?:[^,\]}#\r\n]*[^,\]}#\s])?""",
-    re.DOTALL,
 )
-_PLAIN_LINE: Final = re.compile(
-    r"""[ \t]*+(?:
-        (?P<key>[A-Za-z0-9_-]++) [ \t]*+ = [ \t]*+
-        (?P<value> [^\s"'\[{\#]++ | "[^"\\\n]*+"(?!") | '[^'\n]*+'(?!') | (?P<array>\[[^\[\]{}"'\#:\n]*+\]) )
-        [ \t]*+
-        | \[ (?P<header>[A-Za-z0-9_-]++(?:\.[A-Za-z0-9_-]++)*+) \] [ \t]*+
-    )?+(?P<comment>\#[^\n]*+)?+(?:\n|\Z)""",
-    re.VERBOSE,
-)
-"""Most lines of a profile: a bare key with a scalar or a list of numbers, a header, a comment, or an empty line.
-
-One match reads such a line, several times faster than the scanner.
-"""
-_ELEMENT: Final = re.compile(r"[^\s,\[\]]+")
+# A date may contain a space.
+_SCALAR: Final = re.compile(_STRING + r"|[^,\]}#\s](?:[^,\]}#\n]*[^,\]}#\s])?", re.DOTALL)
+_STRING_OR_COMMENT: Final = re.compile(_STRING + r"|(#)[^\n]*", re.DOTALL)
 
 
 @dataclass(slots=True)
@@ -58,8 +45,9 @@ class _Container:
 
     path: KeyPath
     start: int
-    index: int = 0
-    is_array: bool = True
+    is_array: bool
+    length: int = 0
+    """Elements of an array that were read."""
 
 
 class _Scanner:
@@ -67,145 +55,67 @@ class _Scanner:
         self.text = text
         self.at = 0
         self.places: dict[KeyPath, Place] = {}
-        self.comments: list[int] = []
-        self.last_element: dict[KeyPath, int] = {}
+        self.newest: dict[KeyPath, int] = {}
         """Index of the newest table of each array of tables."""
 
-    def skip(self, pattern: re.Pattern[str]) -> None:
-        match = pattern.match(self.text, self.at)
-        if match:
-            self.at = match.end()
-
-    def skip_lines(self) -> None:
-        """Skip space, line ends and comments, and record the comments."""
-        start = self.at
-        self.skip(_SPACE_AND_LINES)
-        if self.text.find("#", start, self.at) >= 0:
-            self.comments.extend(match.start() for match in _COMMENT.finditer(self.text, start, self.at))
-
     def document(self) -> dict[KeyPath, Place]:
+        text = self.text
         table: KeyPath = ()
-        while self.at < len(self.text):
-            match = _PLAIN_LINE.match(self.text, self.at)
-            if match is not None:
-                table = self.plain_line(match, table)
-                continue
-            self.skip_lines()
-            if self.at == len(self.text):
-                break
-            if self.text[self.at] == "[":
+        inside: list[_Container] = []
+        while (gap := _GAP.match(text, self.at)) and (start := gap.end()) < len(text):
+            self.at = start
+            container = inside[-1] if inside else None
+            if container is None and text[start] == "[":
                 table = self.header()
+                continue
+            if container is not None and text[start] in "]}":
+                self.at += 1
+                self.value(inside.pop().path, container.start)
+                continue
+            if container is not None and container.is_array:
+                path = (*container.path, container.length)
+                container.length += 1
             else:
-                self.key_and_value(table)
+                path, _ = self.key(table if container is None else container.path)
+            start = self.at
+            if text[start] in "[{":
+                inside.append(_Container(path, start, is_array=text[start] == "["))
+                self.at += 1
+            elif scalar := _SCALAR.match(text, start):
+                self.at = scalar.end()
+                self.value(path, start)
         return self.places
 
-    def plain_line(self, match: re.Match[str], table: KeyPath) -> KeyPath:
-        """Record a line that one match has read; return the table of the next line."""
-        key, _, array, header, comment = match.groups()
-        self.at = match.end()
-        if comment is not None:
-            self.comments.append(match.start("comment"))
-        if header is not None:
-            return self.enter([(one[0], *one.span()) for one in _KEY_PART.finditer(self.text, *match.span("header"))])
-        if key is not None:
-            path = (*table, key)
-            self.places[path] = Place(*match.span("key"), *match.span("value"))
-            if array is not None:
-                for index, one in enumerate(_ELEMENT.finditer(self.text, *match.span("array"))):
-                    self.places[*path, index] = Place(*one.span(), *one.span())
-        return table
+    def value(self, path: KeyPath, start: int) -> None:
+        """Record a value that ends here."""
+        key_start, key_end, *_ = self.places.get(path, (start, self.at))
+        self.places[path] = Place(key_start, key_end, start, self.at)
+
+    def key(self, path: KeyPath) -> tuple[KeyPath, Place]:
+        """Read a, "b" or a.b.c inside a table, and the sign behind it: its path and the place of its last part."""
+        while match := _KEY.match(self.text, self.at):
+            if path in self.newest:
+                path = (*path, self.newest[path])
+            path = (*path, _key_value(match[1]))
+            place = Place(*match.span(1), *match.span(1))
+            self.places.setdefault(path, place)
+            self.at = match.end()
+            if match[2] != ".":
+                return path, place
+        raise ValueError(f"no key at offset {self.at}")  # impossible for text that tomllib has accepted
 
     def header(self) -> KeyPath:
         """Read [a.b] or [[a.b]]; return the table of the next line."""
-        is_array = self.text.startswith("[[", self.at)
-        self.at += 1 + is_array
-        parts = self.dotted_key()
-        self.at += 1 + is_array
-        return self.enter(parts, is_array=is_array)
-
-    def enter(self, parts: list[tuple[str, int, int]], *, is_array: bool = False) -> KeyPath:
-        """Record the name of a header; return the table of the next line."""
-        path: KeyPath = ()
-        for number, (part, start, end) in enumerate(parts, start=1):
-            path = (*path, part)
-            self.places.setdefault(path, Place(start, end, start, end))
-            if is_array and number == len(parts):
-                index = self.last_element[path] = self.last_element.get(path, -1) + 1
-                self.places[*path, index] = Place(start, end, start, end)
-            if path in self.last_element:
-                path = (*path, self.last_element[path])
-        if not is_array:
-            # A table's own header replaces the place of an earlier [a.b] that implied it.
-            _, start, end = parts[-1]
-            self.places[path] = Place(start, end, start, end)
+        several = self.text.startswith("[[", self.at)
+        self.at += 1 + several
+        path, place = self.key(())
+        self.at += several
+        if several:
+            self.newest[path] = self.newest.get(path, -1) + 1
+            path = (*path, self.newest[path])
+        # A table's own header replaces the place of an earlier [a.b] that implied it.
+        self.places[path] = place
         return path
-
-    def dotted_key(self) -> list[tuple[str, int, int]]:
-        """Read a, "b" or a.b.c: each part with its span."""
-        parts = []
-        while True:
-            self.skip(_SPACE)
-            match = _KEY_PART.match(self.text, self.at)
-            if match is None:  # impossible for text that tomllib has accepted
-                raise ValueError(f"no key at offset {self.at}")
-            parts.append((_key_value(match.group()), match.start(), match.end()))
-            self.at = match.end()
-            self.skip(_SPACE)
-            if not self.text.startswith(".", self.at):
-                return parts
-            self.at += 1
-
-    def key(self, table: KeyPath) -> KeyPath:
-        """Read a key and its equals sign; the value follows."""
-        path = table
-        for part, start, end in self.dotted_key():
-            path = (*path, part)
-            self.places.setdefault(path, Place(start, end, start, end))
-        self.at += 1
-        self.skip(_SPACE)
-        return path
-
-    def close(self, path: KeyPath, start: int) -> None:
-        """Set the value span of a key or of an element of an array."""
-        key_start, key_end = self.places.get(path, (start, self.at))[:2]
-        self.places[path] = Place(key_start, key_end, start, self.at)
-
-    def key_and_value(self, table: KeyPath) -> None:
-        """Read one key = value, with everything inside the value."""
-        open_containers: list[_Container] = []
-        path = self.key(table)
-        while True:
-            # A value begins at `at`: open a container, or skip a scalar.
-            start = self.at
-            if self.text[start] in "[{":
-                self.at += 1
-                open_containers.append(_Container(path, start, is_array=self.text[start] == "["))
-            else:
-                self.skip(_SCALAR)
-                self.close(path, start)
-            following = self.next_in(open_containers)
-            if following is None:
-                return
-            path = following
-
-    def next_in(self, open_containers: list[_Container]) -> KeyPath | None:
-        """Close containers that end here; return the path of the next value, None after the last one."""
-        while open_containers:
-            container = open_containers[-1]
-            self.skip_lines()
-            if self.text[self.at] == ",":
-                self.at += 1
-                self.skip_lines()
-            if self.text[self.at] in "]}":
-                self.at += 1
-                self.close(container.path, container.start)
-                open_containers.pop()
-                continue
-            if container.is_array:
-                container.index += 1
-                return (*container.path, container.index - 1)
-            return self.key(container.path)
-        return None
 
 
 def _key_value(written: str) -> str:
@@ -215,20 +125,13 @@ def _key_value(written: str) -> str:
     return written
 
 
-def scan(text: str) -> tuple[dict[KeyPath, Place], list[int]]:
-    r"""Find the place of every key and array element, and of every comment.
+def places(text: str) -> dict[KeyPath, Place]:
+    r"""Find the place of every key and array element.
 
     Parameters
     ----------
     text
-        TOML that `tomllib.loads` has accepted.
-
-    Returns
-    -------
-    places
-        Place by key path, in order of first appearance.
-    comments
-        Offset of the hash of every comment.
+        TOML that `tomllib.loads` has accepted, with LF as line end.
 
     References
     ----------
@@ -237,12 +140,20 @@ def scan(text: str) -> tuple[dict[KeyPath, Place], list[int]]:
     Examples
     --------
     >>> text = "[bus]\nnodes = 2  # two\n"
-    >>> places, comments = scan(text)
-    >>> place = places["bus", "nodes"]
+    >>> place = places(text)["bus", "nodes"]
     >>> text[place.key_start : place.key_end], text[place.value_start : place.value_end]
     ('nodes', '2')
-    >>> [text[at:] for at in comments]
+    """
+    return _Scanner(text).document()
+
+
+def comments(text: str) -> list[int]:
+    r"""Find the hash of every comment of such a text.
+
+    Examples
+    --------
+    >>> text = 'name = "# no comment"  # two\n'
+    >>> [text[at:] for at in comments(text)]
     ['# two\n']
     """
-    scanner = _Scanner(text)
-    return scanner.document(), scanner.comments
+    return [match.start() for match in _STRING_OR_COMMENT.finditer(text) if match[1]]

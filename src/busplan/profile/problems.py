@@ -69,13 +69,13 @@ def _quoted(part: str) -> str:
     return part if bare else value_text(part)
 
 
-def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFinding]:
+def findings(error: ValidationError | None, data: dict[str, Any]) -> Iterator[KeyFinding]:
     """Translate a validation error.
 
     Parameters
     ----------
     error
-        Error of pydantic for `data`.
+        Error of pydantic for `data`; None if only the kind of bus is wrong.
     data
         The validated data.
 
@@ -84,8 +84,8 @@ def findings(error: ValidationError, data: dict[str, Any]) -> Iterator[KeyFindin
     KeyFinding
         One for each problem, in pydantic's order.
     """
-    found = dict.fromkeys((*_validated(error, data), *_of_nodes(data), *_unknown_kind(data)))
-    for one in found:
+    found = () if error is None else (*_validated(error, data), *_of_nodes(data))
+    for one in dict.fromkeys((*found, *_unknown_kind(data))):
         yield one._replace(named=named_path(data, one.path))
 
 
@@ -211,16 +211,14 @@ def refusal(error: ValidationError | None, data: dict[str, Any], document: Docum
 
     Parameters
     ----------
-    error
-        Error of pydantic for `data`; None if only the kind of bus is wrong.
-    data
-        The validated data.
+    error, data
+        As for `findings`.
     document
         The document of the data.
     """
-    found = _unknown_kind(data) if error is None else findings(error, data)
-    placed = sorted(((document.nearest(one.path), one) for one in found), key=lambda pair: pair[0])
-    return PlacedError(document.name, tuple(_problem(document, one) for _, one in placed))
+    found = (_problem(document, one) for one in findings(error, data))
+    placed = sorted(found, key=lambda problem: (problem.line, problem.column))
+    return PlacedError(document.name, tuple(placed))
 
 
 def _problem(document: Document, found: KeyFinding) -> PlacedProblem:
@@ -250,21 +248,19 @@ def refused_data(error: ValidationError | None, data: dict[str, Any]) -> Busplan
     Parameters
     ----------
     error, data
-        As for `refusal`.
+        As for `findings`.
     """
-    found = _unknown_kind(data) if error is None else findings(error, data)
-    return BusplanError(*(f"{one.key}: {one.message}" for one in found))
+    return BusplanError(*(f"{one.key}: {one.message}" for one in findings(error, data)))
 
 
 def refused_changes(
     error: ValidationError | None, data: dict[str, Any], changes: dict[str, object], origin: dict[str, str]
 ) -> BusplanError:
     """Make the error for changes of a profile; each problem names what set its key."""
-    found = _unknown_kind(data) if error is None else findings(error, data)
     sources: dict[KeyPath, str] = {
         path_of(data, key): origin.get(key, f"{key} {value}") for key, value in changes.items()
     }
-    return BusplanError(*(_of_changes(one, sources, kind=kind_of(data)) for one in found))
+    return BusplanError(*(_of_changes(one, sources, kind=kind_of(data)) for one in findings(error, data)))
 
 
 def _of_changes(found: KeyFinding, sources: dict[KeyPath, str], *, kind: str | None) -> str:

@@ -9,7 +9,7 @@ from busplan.errors import BusplanError
 from busplan.nearest import did_you_mean
 from busplan.profile.shipped import locate, shipped_names
 from busplan.profile.toml import decode, read_bytes, validate
-from busplan.profile.write import value_text
+from busplan.profile.write import short_text, value_text
 from busplan.servo.checks import dividing_step_us
 
 _CIRCLE: Final = re.compile(r"^(\[circle\].*\n)", re.MULTILINE)
@@ -148,9 +148,9 @@ def machine_text(machine: Machine, *, kind: str, name: str, file: str) -> str:
         axes=machine.axes,
         count=count,
         each=each,
-        period=value_text(_whole(machine.period_us)),
+        period=short_text(machine.period_us),
         bytes=machine.bytes_per_axis,
-        step=f"step_us = {value_text(_whole(step_us))} ".ljust(_COMMENTS_AT),
+        step=f"step_us = {short_text(step_us)} ".ljust(_COMMENTS_AT),
     )
     return _checked(text, name=name)
 
@@ -159,10 +159,6 @@ def _group(nodes: int, axes: int, *, machine: Machine, starter: Starter, file: s
     payload = (_PAYLOAD if axes else _PAYLOAD_WITHOUT_AXES).format(bytes=machine.bytes_per_axis)
     measure = starter.measure.format(file=file, group=f" --group axes-{axes}")
     return _GROUP.format(nodes=nodes, axes=axes, payload=payload, measure=measure, base=starter.base)
-
-
-def _whole(value: float) -> float:
-    return int(value) if value.is_integer() else value
 
 
 def _checked(text: str, *, name: str) -> str:

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from busplan.printable import printable
 from busplan.sections.profile import Profile
@@ -41,15 +42,20 @@ def value_text(value: object) -> str:
     raise TypeError(f"{value!r} is no value of a profile")
 
 
+def whole(value: Any) -> Any:
+    """A whole float as an integer, and any other value as it is: where the schema has a float, both mean the same."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
 def short_text(value: object) -> str:
-    """Write a value as TOML, a whole float without its fraction: where the schema has a float, both mean the same.
+    """Write a value as TOML, a whole float without its fraction.
 
     Examples
     --------
     >>> short_text(1200.0), short_text(0.83), short_text("unified")
     ('1200', '0.83', '"unified"')
     """
-    return value_text(int(value) if isinstance(value, float) and value.is_integer() else value)
+    return value_text(whole(value))
 
 
 def profile_text(profile: Profile) -> str:

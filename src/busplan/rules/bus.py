@@ -51,19 +51,23 @@ def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
 
 def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further nodes than [limits] requires."""
-    limit, one = subject.profile.limits.min_spare_nodes, subject.deciding
-    for counts in _counted(one):
+    limit = subject.profile.limits.min_spare_nodes
+    if limit is None:
+        return
+    for counts in _counted(subject.deciding):
         spare = (counts.safe_nodes or 0) - counts.nodes
-        if limit is not None and spare < limit:
+        if spare < limit:
             yield RuleProblem("limits.min_spare_nodes", _spare(counts, spare, limit), *_room(subject, counts))
 
 
 def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
     """The bus carries fewer further axes than [limits] requires."""
-    limit, one = subject.profile.limits.min_spare_axes, subject.deciding
-    for counts in _counted(one):
+    limit = subject.profile.limits.min_spare_axes
+    if limit is None:
+        return
+    for counts in _counted(subject.deciding):
         spare = (counts.safe_axes or 0) - counts.axes
-        if limit is not None and counts.axes and spare < limit:
+        if counts.axes and spare < limit:
             yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, limit), *_room(subject, counts))
 
 

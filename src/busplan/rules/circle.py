@@ -29,13 +29,13 @@ def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
         The profile, and the most simulated steps of each axis: a longer circle is not run.
     """
     profile, most_steps = subject.profile, subject.circle_steps
-    refused = circle_refusals(profile)
+    refused = circle_refusals(profile) if subject.deciding.circle_refused_by else ()
     yield from (("BP203", _refused(one, subject)) for one in refused)
     if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
         return
     from busplan.analysis.circle.failures import STABILITY
+    from busplan.analysis.circle.move import path_steps
     from busplan.analysis.circle.roundness import circle_test, to_attack
-    from busplan.analysis.circle.setup import path_steps
 
     steps = path_steps(profile)
     if steps > most_steps:

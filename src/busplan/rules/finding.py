@@ -41,6 +41,14 @@ class Finding(NamedTuple):
     """How it is mended, as lines of TOML: key = value."""
 
 
+class PlacedProblem(NamedTuple):
+    """A problem at its place, of which nobody knows yet whether a comment suppresses it."""
+
+    rule: Rule
+    problem: RuleProblem
+    spot: Spot
+
+
 def finding_of(rule: Rule, problem: RuleProblem, spot: Spot, *, words: str) -> Finding:
     """Make the finding of a problem.
 

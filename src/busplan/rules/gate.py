@@ -1,6 +1,6 @@
 """Check documents against all rules."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
 from busplan.analysis.circle.check import MOST_STEPS
@@ -14,7 +14,7 @@ from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
 from busplan.rules import circle
 from busplan.rules.baseline import Record, figures_of, keys_of
 from busplan.rules.file import BY_KIND
-from busplan.rules.finding import Finding, Subject, finding_of
+from busplan.rules.finding import Finding, PlacedProblem, Subject, finding_of
 from busplan.rules.registry import BASELINE, all_rules, cycle_rules
 from busplan.rules.regression import regression
 from busplan.rules.suppression import suppress
@@ -150,29 +150,24 @@ def check_document(
         return FileResult(document.name, profile.name, (), {}, failure=failure)
     subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
     own = cycle_rules(profile.bus.kind)
-    found = list(_findings(subject, own))
+    found = [_placed(document, rule, problem) for rule in own if rule.check for problem in rule.check(subject)]
     ran = {rule.code for rule in own}
     problems = list(circle.circle_problems(subject))
-    found += [_placed(subject, all_rules()[code], problem) for code, problem in problems]
+    found += [_placed(document, all_rules()[code], problem) for code, problem in problems]
     ran |= circle.answered(subject, problems)
     if baseline is not None:
         lost = regression(subject, baseline)
-        found += [_placed(subject, BASELINE, problem) for problem in lost]
+        found += [_placed(document, BASELINE, problem) for problem in lost]
         ran.add(BASELINE.code)
     if changes.each:
         # What a comment suppresses is of the file as it is.
         ran = set()
+    left, of_comments = suppress(found, document, ran=ran)
+    findings = [*(_said(placed, subject) for placed in left), *of_comments]
     one = subject.deciding
     fit = Fit(one.verdict, one.margin_corrected_us, one.uncertainty_us)
-    result = _result(document, profile.name, suppress(found, document, ran=ran))._replace(fit=fit)
+    result = _result(document, profile.name, findings)._replace(fit=fit)
     return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
-
-
-def _findings(subject: Subject, rules: Iterable[Rule]) -> Iterator[Finding]:
-    for rule in rules:
-        if rule.check is not None:
-            for problem in rule.check(subject):
-                yield _placed(subject, rule, problem)
 
 
 def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
@@ -192,11 +187,16 @@ def _of_file(error: PlacedError) -> Iterator[Finding]:
         yield finding_of(rule, RuleProblem(one.key, words), spot, words=words)
 
 
-def _placed(subject: Subject, rule: Rule, problem: RuleProblem) -> Finding:
-    """Make a finding at the line of the problem's key, or of the table that should have it."""
-    document = subject.document
+def _placed(document: Document, rule: Rule, problem: RuleProblem) -> PlacedProblem:
+    """Find the line of a problem's key, or of the table that should have it."""
     spot = document.spot(path_of(document.data() if problem.key.count(".") > 1 else {}, problem.key))
-    return finding_of(rule, problem, spot, words=f"{problem.key}: {problem.message}{subject.origin}")
+    return PlacedProblem(rule, problem, spot)
+
+
+def _said(placed: PlacedProblem, subject: Subject) -> Finding:
+    rule, problem, spot = placed
+    message = problem.message if isinstance(problem.message, str) else problem.message()
+    return finding_of(rule, problem, spot, words=f"{problem.key}: {message}{subject.origin}")
 
 
 def _result(document: Document, name: str | None, found: list[Finding]) -> FileResult:

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from busplan.buses.rule import Rule, RuleProblem
 from busplan.profile.document import Document, Spot
-from busplan.rules.finding import Finding, finding_of
+from busplan.rules.finding import Finding, PlacedProblem, finding_of
 from busplan.rules.registry import NEVER_SUPPRESSED, SUPPRESSION_WITHOUT_EFFECT, SUPPRESSION_WITHOUT_REASON, all_rules
 
 MARK: Final = "busplan:"
@@ -43,13 +43,15 @@ def suppressions(document: Document) -> Iterator[Suppression]:
         yield Suppression(codes, match["reason"].strip(), spot, line + 1 if alone else line)
 
 
-def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> list[Finding]:
-    """Remove suppressed findings, and add findings on the suppressions themselves.
+def suppress(
+    found: Iterable[PlacedProblem], document: Document, *, ran: set[str]
+) -> tuple[list[PlacedProblem], list[Finding]]:
+    """Remove suppressed problems, and find what is wrong with the suppressions themselves.
 
     Parameters
     ----------
     found
-        All findings of the document.
+        All problems of the document.
     document
         The document.
     ran
@@ -65,8 +67,8 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
             way_out = "add why behind the bracket"
             own.append(_finding(SUPPRESSION_WITHOUT_REASON, one, "the suppression says no reason", way_out))
         for code in one.codes:
-            hit = [finding for finding in left if finding.code == code and finding.line == one.of_line]
-            left = [finding for finding in left if finding not in hit]
+            hit = [each for each in left if each.rule.code == code and each.spot.line == one.of_line]
+            left = [each for each in left if each not in hit]
             if code not in all_rules():
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, f"{code or 'nothing'} is no code of a rule"))
             elif code in NEVER_SUPPRESSED:
@@ -74,7 +76,7 @@ def suppress(found: Iterable[Finding], document: Document, *, ran: set[str]) -> 
             elif not hit and code in ran:
                 message = f"{code} has nothing to suppress on line {one.of_line}"
                 own.append(_finding(SUPPRESSION_WITHOUT_EFFECT, one, message))
-    return left + own
+    return left, own
 
 
 def _finding(rule: Rule, one: Suppression, words: str, way_out: str = "") -> Finding:

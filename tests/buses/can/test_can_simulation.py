@@ -128,8 +128,7 @@ def judged(sent: Traffic, *, nodes: int, write_us: int, slack_us: int) -> Scene 
     lasts_us = waits(sent, own_us + plain(sent.read_us) + plain(sent.host_us), is_stuffed=True).lasts_us
     sent = sent._replace(period_us=int(lasts_us) + write_us + slack_us)
     each = streams(sent, is_stuffed=True)
-    last = max(each, key=lambda one: one.last)
-    if sum(one.sender().load for one in each if one is last or one.goes_before(last)) > MOST_LOAD:
+    if sum(one.sender().load for one in each) > MOST_LOAD:
         return None
     ranked = messages(sent, is_stuffed=True)
     if any(ranked.deadline_share(one) > 1 for one in ranked.by_priority()):

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.derivation.trace import Traced
 from busplan.buses.ethercat.equations import datagram_bytes, frame_bytes, room_bytes, sending_us
 from busplan.buses.ethercat.packing import Devices, frames_of, pack
+from busplan.elementwise import Traced
 
 MOST, LEAST = 1538, 84
 

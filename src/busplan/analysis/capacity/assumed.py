@@ -1,11 +1,12 @@
 """What a verdict rests on and nobody has measured: the assumed keys that carry much of the cycle or of its doubt."""
 
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 from busplan.analysis.derivation.inputs import given
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.network import Group, Network
+from busplan.buses.rule import RuleFigures
 from busplan.elementwise import plain
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
@@ -41,31 +42,7 @@ class HeavyAssumption(NamedTuple):
         return any(key == one or key.startswith(f"{one}.") for one in self.keys)
 
 
-class Carrying(Protocol):
-    """Figures of one cycle, under the timing model that decides."""
-
-    @property
-    def timing_model(self) -> str:
-        """Name of the timing model."""
-
-    @property
-    def period_us(self) -> float:
-        """The period [us]."""
-
-    @property
-    def required_us(self) -> float:
-        """What the cycle needs [us]."""
-
-    @property
-    def terms(self) -> Sequence[Any]:
-        """Its parts."""
-
-    @property
-    def doubts(self) -> Sequence[Any]:
-        """What its uncertainty is made of."""
-
-
-def heavy_assumptions(figures: Carrying, profile: Profile) -> tuple[HeavyAssumption, ...]:
+def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
     """The assumptions that carry more than a quarter of U squared or of the required time.
 
     Parameters
@@ -95,7 +72,7 @@ def _is_assumed(profile: Profile, key: str) -> bool:
     return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
 
 
-def _of_execution(figures: Carrying, profile: Profile, variance: float) -> list[_Share]:
+def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> list[_Share]:
     """The shares of the assumed execution times: what of its terms goes without them, and their part of U squared."""
     network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
     assumed = [one for one in network.groups if _counts(one, network)]

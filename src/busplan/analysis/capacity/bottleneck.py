@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from busplan.analysis.capacity.certainty import certainty
 from busplan.analysis.capacity.node_limit import safe_nodes
-from busplan.analysis.capacity.perturbations import without_execution
-from busplan.analysis.network import bus_of, network_of
+from busplan.analysis.network import bus_of, network_of, without_execution
 from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.network import Network
 from busplan.elementwise import plain

@@ -1,10 +1,13 @@
 """Capacity of a bus: does the cycle fit its period, with what margin, and how many nodes does it carry?"""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain
 from typing import Any, Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import (
+    FITS,
     VERDICTS,
     Certainty,
     VerdictWord,
@@ -25,31 +28,84 @@ from busplan.buses.network import Network
 from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT
 from busplan.buses.time_slice import required_time_slice_us, time_slice_us
 from busplan.elementwise import Number, choose, existing, larger, plain
-from busplan.profile.toml import at_periods
+from busplan.profile.toml import at_periods, override
 from busplan.sections.profile import Profile
 
+COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
+"""Figures that each group has for itself; where all nodes are alike, they are those of the whole."""
 
-class GroupCapacity(NamedTuple):
-    """How many nodes of one group a bus carries, the other groups as they are."""
+
+@dataclass(frozen=True, eq=False)
+class GroupCapacity:
+    """How many nodes of one group a bus carries, the other groups as they are.
+
+    They are computed when they are asked for, the largest and the safe number each by itself.
+    """
 
     name: str
+    """Empty where all nodes are alike."""
     nodes: int
     axes: int
     """Of all its nodes."""
-    max_nodes: int
-    max_axes: int
-    limited_by: str
-    """Key of the limit that keeps `max_nodes` from being more."""
-    safe_nodes: int | None
-    """This and the figures below exist for the timing model that decides."""
-    safe_axes: int | None
-    safe_limited_by: str | None
+    node_axes: int = field(repr=False)
+    timing_model: str = field(repr=False)
+    profile: Profile = field(repr=False)
+
+    @cached_property
+    def _largest(self) -> tuple[int, str]:
+        return largest_nodes(self.profile, model=self.timing_model, group=self.name)
+
+    @cached_property
+    def _safe(self) -> tuple[int, str] | tuple[None, None]:
+        decides = self.timing_model == bus_of(self.profile).deciding_model
+        return safe_nodes(self.profile, group=self.name) if decides else (None, None)
+
+    @property
+    def max_nodes(self) -> int:
+        """Most nodes that fit."""
+        return self._largest[0]
+
+    @property
+    def max_axes(self) -> int:
+        """Their axes."""
+        return self.node_axes * self.max_nodes
+
+    @property
+    def limited_by(self) -> str:
+        """Key of the limit that keeps `max_nodes` from being more."""
+        return self._largest[1]
+
+    @property
+    def safe_nodes(self) -> int | None:
+        """Most nodes that are shown to fit; this and the figures below exist for the timing model that decides."""
+        return self._safe[0]
+
+    @property
+    def safe_axes(self) -> int | None:
+        """Their axes."""
+        return None if self.safe_nodes is None else self.node_axes * self.safe_nodes
+
+    @property
+    def safe_limited_by(self) -> str | None:
+        """Key of the limit that keeps `safe_nodes` from being more."""
+        return self._safe[1]
+
+    def record(self) -> dict[str, Any]:
+        """All its figures by key."""
+        return {key: getattr(self, key) for key in ("name", "nodes", "axes", *COUNTS)}
+
+    def __eq__(self, other: object) -> bool:
+        # Two networks may have one capacity.
+        return isinstance(other, GroupCapacity) and self.record() == other.record()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.nodes, self.axes))
 
 
 class CapacityFigures(NamedTuple):
     """Capacity at one period under one timing model; what each figure is stands in the register of its bus.
 
-    The figures that only its kind of bus has, and the terms, are attributes like all others.
+    The figures that only its kind of bus has, the terms and the numbers of nodes are attributes like all others.
     """
 
     kind: str
@@ -68,11 +124,6 @@ class CapacityFigures(NamedTuple):
     margin_us: float
     binding_term: str
     """Name of the largest term."""
-    max_nodes: int | None
-    """This, the axes and the limit are None where there are groups: each has its own."""
-    max_axes: int | None
-    limited_by: str | None
-    """Key of the limit that keeps `max_nodes` from being more."""
     min_period_us: float | None
     """This and `safe_min_period_us` are None where no period that the bus knows is long enough."""
     min_slice_ratio: float
@@ -88,21 +139,59 @@ class CapacityFigures(NamedTuple):
     uncertainty_us: float | None
     """None also where nothing is known of it."""
     safe_required_us: float | None
-    safe_nodes: int | None
-    safe_axes: int | None
-    safe_limited_by: str | None
     safe_min_period_us: float | None
     not_shown: tuple[str, ...] | None
     """Keys of the limits that are neither broken nor shown to be kept, time among them."""
     verdict: VerdictWord | None
     doubts: tuple[Doubt, ...]
     """What the uncertainty is made of."""
-    groups: tuple[GroupCapacity, ...]
-    """One for each [[group]] of the profile."""
+    counts: tuple[GroupCapacity, ...]
+    """How many nodes fit: of each [[group]], or of all where they are alike."""
     safe: bool
     """Whether the bus is set so that it works reliably, beside fitting."""
     own: FigureValues
     """Figures that only this kind of bus has."""
+
+    @property
+    def groups(self) -> tuple[GroupCapacity, ...]:
+        """One for each [[group]] of the profile."""
+        return self.counts if self._whole is None else ()
+
+    @property
+    def _whole(self) -> GroupCapacity | None:
+        """The nodes, where all are alike; of groups each has its own figures, and those of the whole are None."""
+        first = self.counts[0]
+        return None if first.name else first
+
+    @property
+    def max_nodes(self) -> int | None:
+        """Most nodes that fit; None of groups."""
+        return None if self._whole is None else self._whole.max_nodes
+
+    @property
+    def max_axes(self) -> int | None:
+        """Their axes."""
+        return None if self._whole is None else self._whole.max_axes
+
+    @property
+    def limited_by(self) -> str | None:
+        """Key of the limit that keeps `max_nodes` from being more."""
+        return None if self._whole is None else self._whole.limited_by
+
+    @property
+    def safe_nodes(self) -> int | None:
+        """Most nodes that are shown to fit; None of groups, and under a timing model that does not decide."""
+        return None if self._whole is None else self._whole.safe_nodes
+
+    @property
+    def safe_axes(self) -> int | None:
+        """Their axes."""
+        return None if self._whole is None else self._whole.safe_axes
+
+    @property
+    def safe_limited_by(self) -> str | None:
+        """Key of the limit that keeps `safe_nodes` from being more."""
+        return None if self._whole is None else self._whole.safe_limited_by
 
     def __getattr__(self, key: str) -> Any:
         # Only what is no field comes here.
@@ -171,7 +260,7 @@ def capacity(
     )
 
 
-def figures(profile: Profile, *, model: str, with_counts: bool = True) -> CapacityFigures:
+def figures(profile: Profile, *, model: str) -> CapacityFigures:
     """Compute all figures of a profile at its own period under one timing model.
 
     Parameters
@@ -180,8 +269,6 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
         The network.
     model
         Timing model.
-    with_counts
-        If False, leave out the largest numbers of nodes, which take most of the time: `COUNTS` are None.
     """
     network = network_of(profile)
     bus = bus_of(profile)
@@ -193,51 +280,30 @@ def figures(profile: Profile, *, model: str, with_counts: bool = True) -> Capaci
     broken = tuple(key for key, code in codes.items() if code == BROKEN)
     exceeded = (*broken, *((TIME,) if late else ()))
     decides = model == bus.deciding_model
-    groups = tuple(_group_capacity(profile, name, model=model) for name in network.names) if with_counts else ()
-    whole = groups[0] if groups and network.is_uniform else None
-    counts: dict[str, Any] = {key: getattr(whole, key, None) for key in COUNTS}
+    counts = (
+        GroupCapacity(one.name, int(one.nodes), int(one.nodes) * one.node.axes, one.node.axes, model, profile)
+        for one in profile.alike_nodes
+    )
     return CapacityFigures(
         kind=bus.kind,
         timing_model=model,
         **numbers,
         terms=cycle.terms,
         binding_term=max(cycle.terms, key=lambda term: plain(term.us)).name,
-        **counts,
         exceeded=exceeded,
         fits=not exceeded,
         circle_refused_by=tuple(cause.name for cause in circle_refusals(profile)),
         **(_certainty_figures(cycle, codes) if decides else _UNDECIDED),
-        groups=() if whole else groups,
+        counts=tuple(counts),
         safe=bus.is_safe(network),
         own=own,
     )
 
 
-COUNTS: Final = ("max_nodes", "max_axes", "limited_by", "safe_nodes", "safe_axes", "safe_limited_by")
-"""Figures that each group has for itself; where all nodes are alike, they are those of the whole."""
 _UNDECIDED: Final[dict[str, Any]] = {
     **{one.key: None for one in CERTAINTY if one.key not in COUNTS},
     "doubts": (),
 }
-
-
-def _group_capacity(profile: Profile, name: str, *, model: str) -> GroupCapacity:
-    """How many nodes of one group fit; of the nodes of [node] by an empty name."""
-    said = next(one for one in profile.alike_nodes if one.name == name)
-    axes, decides = said.node.axes, model == bus_of(profile).deciding_model
-    nodes, limit = largest_nodes(profile, model=model, group=name)
-    safe, safe_limit = safe_nodes(profile, group=name) if decides else (None, None)
-    return GroupCapacity(
-        name=name,
-        nodes=int(said.nodes),
-        axes=int(said.nodes) * axes,
-        max_nodes=nodes,
-        max_axes=axes * nodes,
-        limited_by=limit,
-        safe_nodes=safe,
-        safe_axes=None if safe is None else axes * safe,
-        safe_limited_by=safe_limit,
-    )
 
 
 def _certainty_figures(cycle: BusCycle, limits: Mapping[str, Number]) -> dict[str, Any]:
@@ -322,3 +388,23 @@ def shortest_us(network: Network, needed_us: Number, *, is_shown: bool = False) 
         if limit.share is not None:
             found = larger(found, bus.periods.from_us((limit.shown if is_shown else limit.nominal).period_us(network)))
     return found
+
+
+def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
+    """Figures of a plan after a bus reset, where it fits as it is set and is not shown to fit then.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    deciding
+        Its figures under the model that decides.
+    """
+    changes = bus_of(profile).reset_changes
+    if deciding.verdict != FITS or not changes:
+        return None
+    reset = override(profile, dict(changes))
+    if reset == profile:
+        return None
+    found = figures(reset, model=deciding.timing_model)
+    return None if found.verdict == FITS else found

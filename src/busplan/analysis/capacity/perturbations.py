@@ -48,11 +48,6 @@ def perturbed(network: Network) -> Iterator[Perturbed]:
     yield from (_with_keys(network.profile, one) for one in (*own, *((reset,) if bus.reset_changes else ())))
 
 
-def without_execution(network: Network) -> Network:
-    """The same network, whose nodes execute in no time."""
-    return network._replace(groups=tuple(with_execution(one, read_us=0.0, write_us=0.0) for one in network.groups))
-
-
 def _slower(network: Network, *, if_nothing: str) -> Perturbed:
     factor = 1 + _EXECUTION_SHARE
     groups = tuple(

@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 from busplan.analysis.capacity.certainty import FITS
-from busplan.analysis.capacity.figures import Capacity, CapacityFigures, figures
+from busplan.analysis.capacity.figures import Capacity, CapacityFigures, after_reset, figures
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.advice import Change, advice
 from busplan.analysis.planning.constraints import Need, missed_limits
 from busplan.profile.toml import override
-from busplan.sections.profile import Profile
 
 
 class Verdict(NamedTuple):
@@ -60,23 +59,3 @@ def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
         change=change,
         no_change=no_change,
     )
-
-
-def after_reset(profile: Profile, deciding: CapacityFigures) -> CapacityFigures | None:
-    """Figures of a plan after a bus reset, where it fits as it is set and is not shown to fit then.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    deciding
-        Its figures under the model that decides.
-    """
-    changes = bus_of(profile).reset_changes
-    if deciding.verdict != FITS or not changes:
-        return None
-    reset = override(profile, dict(changes))
-    if reset == profile:
-        return None
-    found = figures(reset, model=deciding.timing_model)
-    return None if found.verdict == FITS else found

@@ -80,7 +80,7 @@ def failures_within(profile: Profile, *, most_steps: int) -> tuple[str, ...] | N
     most_steps
         Most simulated steps of each axis.
     """
-    from busplan.analysis.circle.setup import path_steps
+    from busplan.analysis.circle.move import path_steps
 
     try:
         steps = path_steps(profile)

@@ -163,7 +163,7 @@ def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
     least = [*_unfit(profile, axes, 0.0 if is_turn else None)]
     if least or not is_turn or not any(_unfit(profile, axes, LONGEST_SETTLING_US)):
         return least
-    from busplan.analysis.circle.setup import path_settling_us  # only what the lead-in decides loads numpy
+    from busplan.analysis.circle.move import path_settling_us  # only what the lead-in decides loads numpy
 
     return [*_unfit(profile, axes, path_settling_us(profile))]
 

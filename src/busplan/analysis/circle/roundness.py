@@ -17,8 +17,9 @@ from busplan.analysis.circle.failures import (
     circle_failures,
     tightest_margins,
 )
+from busplan.analysis.circle.move import loop_timing, path_setpoints
 from busplan.analysis.circle.refusal import require_circle
-from busplan.analysis.circle.setup import bus, loop_timing, path_setpoints, setup
+from busplan.analysis.circle.setup import bus, setup
 from busplan.profile.toml import at_periods
 from busplan.progress import Progress
 from busplan.sections.machine import CONTOUR_MEASURES

@@ -1,14 +1,17 @@
 """The circle tests of a comparison; importing this loads no simulation."""
 
+from collections.abc import Callable
 from itertools import count
 from typing import TYPE_CHECKING
 
-from busplan.analysis.comparison.difference import ComputeCircleFigures
 from busplan.progress import Progress, part_of
 
 if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures
     from busplan.sections.profile import Profile
+
+ComputeCircleFigures = Callable[["Profile"], "CircleFigures"]
+"""Runs the circle test of a profile."""
 
 
 def circle_tests(progress: Progress | None = None, *, of: int = 2) -> ComputeCircleFigures:

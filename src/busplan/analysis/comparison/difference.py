@@ -3,13 +3,14 @@
 The figures are those of `capacity`, `latency` and `circle_test`; only differences are computed here.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf, isclose, isfinite, log10
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias, TypeGuard
 
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.capacity.figures import CapacityFigures, figures
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
+from busplan.analysis.comparison.circle_tests import ComputeCircleFigures
 from busplan.analysis.network import bus_of, model_names
 from busplan.buses import figure as known
 from busplan.buses.bus import Bus
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
     from busplan.analysis.circle.roundness import CircleFigures
 
 Judgement = Literal["better", "worse", "same", "neutral"]
-ComputeCircleFigures = Callable[[Profile], "CircleFigures"]
-"""Runs the circle test of a profile."""
 
 ROUNDING: Final = 1e-9
 """Relative difference that float rounding can cause; figures that differ by less are the same."""

@@ -5,12 +5,10 @@ from math import ceil, floor, log2
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from busplan.analysis.capacity.certainty import FITS
-from busplan.analysis.capacity.figures import CapacityFigures, figures
+from busplan.analysis.capacity.figures import CapacityFigures, after_reset, figures
 from busplan.analysis.capacity.node_limit import safe_nodes
-from busplan.analysis.capacity.verdict import after_reset
 from busplan.analysis.circle.refusal import STEP
-from busplan.analysis.comparison.circle_tests import circle_tests
-from busplan.analysis.comparison.difference import ComputeCircleFigures
+from busplan.analysis.comparison.circle_tests import ComputeCircleFigures, circle_tests
 from busplan.analysis.derivation.inputs import given
 from busplan.analysis.network import varied_nodes
 from busplan.analysis.planning.freedoms import PERIOD

@@ -19,17 +19,17 @@ from busplan.analysis.circle.refusal import STEP
 from busplan.analysis.derivation.formulas import against
 from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import chosen, if_finite, remembered
-from busplan.analysis.derivation.origin import short
-from busplan.analysis.derivation.trace import Traced, found, value_of
+from busplan.analysis.derivation.trace import found
 from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.analysis.planning.advice import changeable
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, Term
 from busplan.buses.figure import CERTAINTY, MAX_NODES, SAFE_NODES, by_key
 from busplan.buses.network import Network
-from busplan.elementwise import Number
+from busplan.elementwise import Number, Traced, value_of
 from busplan.forms.numbers import listed
 from busplan.sections.profile import Profile
+from busplan.sourced import short
 
 _SENTENCES: Final = "sentences on what the command computes"
 OF_DOCUMENT: Final = ("missed_limits", "verdict_after_reset", "uncertainty_parts", "not_in_it", "not_applicable")

@@ -12,12 +12,13 @@ from busplan.analysis.circle.roundness import CircleFigures, circle_test
 from busplan.analysis.derivation.capacity import capacity_figures
 from busplan.analysis.derivation.inputs import traced, traced_profile
 from busplan.analysis.derivation.latency import remembered
-from busplan.analysis.derivation.origin import Input
-from busplan.analysis.derivation.trace import Traced, found
+from busplan.analysis.derivation.trace import found
 from busplan.analysis.network import bus_of, network_of
+from busplan.elementwise import Traced
 from busplan.progress import Progress
 from busplan.sections.machine import CONTOUR_MEASURES, AxisKeys
 from busplan.sections.profile import Profile
+from busplan.sourced import Input
 
 _GIVEN: Final = {
     "period_us": "cycle.period_us",

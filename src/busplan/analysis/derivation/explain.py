@@ -10,15 +10,16 @@ from typing import Final, NamedTuple
 from busplan.analysis.derivation.capacity import VERDICT_KEYS, capacity_figures, verdict_figure
 from busplan.analysis.derivation.formulas import formula_text
 from busplan.analysis.derivation.latency import TracedLatencies, latency_figures, latency_names, traced_latencies
-from busplan.analysis.derivation.origin import Input
-from busplan.analysis.derivation.trace import Traced, inputs, lines
+from busplan.analysis.derivation.trace import inputs, lines
 from busplan.analysis.network import bus_of, leading_model, model_names, network_of
 from busplan.analysis.register import CommandName, figure_named, figures_of
 from busplan.buses.figure import BIAS, CERTAINTY, MARGIN_CORRECTED, UNCERTAINTY, Figure
+from busplan.elementwise import Traced
 from busplan.errors import BusplanError
 from busplan.profile.toml import at_periods
 from busplan.progress import Progress
 from busplan.sections.profile import Profile
+from busplan.sourced import Input
 
 _GRADES: Final = ("assumed", "recalled", "calibrated", "derived", "measured", "published", "given")
 """From the weakest to the strongest; "given" values are choices, not knowledge."""

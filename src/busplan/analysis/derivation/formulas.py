@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from inspect import signature
 from typing import Final
 
-from busplan.analysis.derivation.origin import DIGITS, Input, short
-from busplan.analysis.derivation.trace import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Traced, value_of
-from busplan.elementwise import Number
-from busplan.sourced import SYMBOLS, Equation, Sourced
+from busplan.elementwise import CHOSEN, COMPARISON, FUNCTION, OPERATIONS, Number, Traced, value_of
+from busplan.sourced import DIGITS, SYMBOLS, Equation, Input, Sourced, short
 
 _ATOM: Final = 4
 _MOST_TERMS: Final = 24

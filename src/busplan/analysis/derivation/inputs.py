@@ -3,15 +3,14 @@
 from types import MappingProxyType
 from typing import Any, Final
 
-from busplan.analysis.derivation.origin import GivenTable, Input
-from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.network import bus_of
+from busplan.elementwise import GivenTable, Traced
 from busplan.profile.graded import comment_grade
 from busplan.profile.kinds import cycle_keys, models_of
 from busplan.sections.base import value_at, with_unchecked
 from busplan.sections.execution import TableExecution
 from busplan.sections.profile import Profile
-from busplan.sourced import SYMBOLS
+from busplan.sourced import SYMBOLS, Input
 
 _SYMBOLS: Final = MappingProxyType(
     {

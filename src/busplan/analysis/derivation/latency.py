@@ -4,14 +4,12 @@ from math import inf
 from typing import NamedTuple
 
 from busplan.analysis.derivation.inputs import traced_profile
-from busplan.analysis.derivation.origin import Input, short
-from busplan.analysis.derivation.trace import Traced
 from busplan.analysis.derivation.trace import found as result_of
 from busplan.analysis.network import bus_of, network_of
 from busplan.buses.cycle import BusLatency
-from busplan.elementwise import Number
+from busplan.elementwise import Number, Traced
 from busplan.sections.profile import Profile
-from busplan.sourced import Sourced
+from busplan.sourced import Input, Sourced, short
 
 
 def latency_names(profile: Profile) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from busplan.analysis.sweep.grid import Values, require_keys
 from busplan.buses.parts import Value
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
+from busplan.profile.write import whole
 from busplan.sections.base import value_at
 from busplan.sections.profile import Profile
 
@@ -100,9 +101,5 @@ def checked_direction(
         raise BusplanError(
             f"{option} {key}: {values.size:,} values; a map shows up to {MOST_VALUES} of a key. A sweep takes more"
         )
-    found = [_whole(one) for one in values.part(0, values.size).tolist()]
+    found = [whole(one) for one in values.part(0, values.size).tolist()]
     return Direction(key, tuple(found if values.has_words else sorted(found)))
-
-
-def _whole(value: Value) -> Value:
-    return int(value) if isinstance(value, float) and value.is_integer() else value

@@ -4,8 +4,8 @@ Those functions accept arrays, so a profile whose keys hold arrays gives arrays.
 axis of their own, so that a figure is computed only over the keys that it depends on. Figures in words are added here.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache, lru_cache, partial
 from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -27,13 +27,15 @@ from busplan.analysis.sweep.grid import Array, Chunk, Grid
 from busplan.buses.cycle import BusCycle
 from busplan.buses.figure import CERTAINTY, CIRCLE_REFUSED_BY, FITS, Sort
 from busplan.buses.network import Network
-from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit
+from busplan.buses.parts import BROKEN, NOT_SHOWN_KEPT, Limit, Value
 from busplan.elementwise import Number
 from busplan.sections.base import with_unchecked
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 CHUNK_POINTS: Final = 1 << 14
 """Points computed at once: their arrays fit into the processor's cache."""
+_CAUSES_KEPT: Final = 1 << 16
+"""Most values of which the causes that refuse a circle are kept: about ten megabytes."""
 
 Word: TypeAlias = str | float | list[str] | None
 """What stands in a column that is no array of numbers: a word, a value of a key that also takes words, a list, or
@@ -99,8 +101,11 @@ class SweepBlock(NamedTuple):
 
     def rows(self, name: str) -> Array:
         """One column as a flat array: point by point, and for each point timing model by timing model."""
-        parts = [np.broadcast_to(one.values, self.chunk.shape).ravel() for one in self.columns(name)]
-        return np.stack(parts, axis=1).ravel()
+        return self.interleaved([column.values for column in self.columns(name)])
+
+    def interleaved(self, by_model: Sequence[Array]) -> Array:
+        """Arrays that broadcast to the chunk's shape, one for each timing model, in the order of the rows."""
+        return np.stack([np.broadcast_to(own, self.chunk.shape).ravel() for own in by_model], axis=1).ravel()
 
 
 def sweep(
@@ -132,11 +137,12 @@ def sweep(
     ----------
     Paper, equations (1)-(11).
     """
+    causes_at = lru_cache(_CAUSES_KEPT)(partial(_causes, profile))
     for chunk in grid.chunks(chunk_points):
         found = {model: _figures(profile, chunk.values, model) for model in timing_models}
         decides = bus_of(profile).deciding_model
         own = found[decides] if decides in found else _figures(profile, chunk.values, decides)
-        refused = {CIRCLE_REFUSED_BY.key: _refused(profile, chunk, own[FITS.key].values)}
+        refused = {CIRCLE_REFUSED_BY.key: _refused(profile, chunk, own[FITS.key].values, causes_at)}
         yield SweepBlock(
             chunk,
             {key: _varied(values) for key, values in chunk.values.items()},
@@ -204,7 +210,22 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
 
 
-def _refused(profile: Profile, chunk: Chunk, fits: Array) -> Column:
+_Causes: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
+"""Keys for which a circle cannot be run, and those where its cycle fits the bus."""
+
+
+def _causes(profile: Profile, changes: tuple[tuple[str, Value], ...]) -> _Causes:
+    for key, value in changes:
+        profile = with_unchecked(profile, key, value)
+    of_loop = loop_refusals(profile) if profile.asks_for_circle else ()
+    of_run = run_refusals(profile, of_loop) if profile.asks_for_circle else ()
+    names = tuple(cause.name for cause in of_loop)
+    return names, (*names, *(cause.name for cause in of_run))
+
+
+def _refused(
+    profile: Profile, chunk: Chunk, fits: Array, causes_at: Callable[[tuple[tuple[str, Value], ...]], _Causes]
+) -> Column:
     """Keys for which the circle of each point cannot be run.
 
     They are asked point by point, but only over the keys that they rest on: the period and those of the circle, all
@@ -218,28 +239,24 @@ def _refused(profile: Profile, chunk: Chunk, fits: Array) -> Column:
         The points.
     fits
         Where the cycle fits the bus: elsewhere there is no circle to be run.
+    causes_at
+        `_causes` of the profile, which knows what it was asked before: chunks share values.
     """
     is_apart = profile.servo.loop == "node" and bus_of(profile).acts_at_once(network_of(profile))
     has_words = any(own.dtype == object for own in chunk.values.values())
     read = [
-        (number, key)
-        for number, key in enumerate(chunk.values)
+        (number, key, own.ravel().tolist())
+        for number, (key, own) in enumerate(chunk.values.items())
         if has_words or not is_apart or key.partition(".")[0] in CIRCLE_SECTIONS or key == "cycle.period_us"
     ]
     shape = [1] * len(chunk.shape)
-    for number, _ in read:
+    for number, _, _ in read:
         shape[number] = chunk.shape[number]
     known: dict[tuple[str, ...], int] = {}
     always, where_it_fits = np.zeros(shape, np.intp), np.zeros(shape, np.intp)
     for where in np.ndindex(*shape):
-        at = profile
-        for number, key in read:
-            at = with_unchecked(at, key, chunk.values[key].ravel().tolist()[where[number]])
-        of_loop = loop_refusals(at) if at.asks_for_circle else ()
-        causes = (*of_loop, *run_refusals(at, of_loop)) if at.asks_for_circle else ()
-        always[where], where_it_fits[where] = (
-            known.setdefault(tuple(cause.name for cause in each), len(known)) for each in (of_loop, causes)
-        )
+        causes = causes_at(tuple((key, values[where[number]]) for number, key, values in read))
+        always[where], where_it_fits[where] = (known.setdefault(names, len(known)) for names in causes)
     codes = always if np.array_equal(always, where_it_fits) else np.where(fits, where_it_fits, always)
     return Column(codes.astype(np.min_scalar_type(len(known))), tuple(map(list, known)))
 

@@ -1,23 +1,23 @@
 """Run the circle tests of a grid in chunks, on any executor: the same blocks whatever the chunks and their order."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
 from itertools import groupby, islice
-from typing import Final, NamedTuple, Protocol
+from typing import Final, Protocol
 
 from busplan.analysis.circle.estimate import NOTHING, Estimate, announce
+from busplan.analysis.sweep.asked import Sweep
 from busplan.analysis.sweep.blocks import SweepBlock, sweep
 from busplan.analysis.sweep.circles import (
     MOST_CIRCLES_UNASKED,
     CircleChunk,
     check_chunk,
-    figures_of,
     run_chunk,
     with_circles,
 )
 from busplan.analysis.sweep.execution import Here, ignored, run_in_order
-from busplan.analysis.sweep.grid import Array, Grid, Values
-from busplan.analysis.sweep.seeds import SEED, with_seeds
+from busplan.analysis.sweep.grid import Array
+from busplan.analysis.sweep.seeds import with_seeds
 from busplan.sections.profile import Profile
 
 _CHUNK_S: Final = 1.5
@@ -33,31 +33,6 @@ _BLOCK_TESTS: Final = range(16, 4097)
 """Tests of a block: by the grid alone, so that any executor gives the same row groups."""
 
 
-class CircleTests(NamedTuple):
-    """The circle tests of a sweep: one for each point, or for each point and seed."""
-
-    profile: Profile
-    grid: Grid
-    """Of the rows."""
-    seeds: Values | None = None
-    """Seeds of each row; None without a summary."""
-
-    @property
-    def each(self) -> int:
-        """Tests of a row."""
-        return 1 if self.seeds is None else self.seeds.size
-
-    @property
-    def number(self) -> int:
-        """All tests."""
-        return self.grid.points * self.each
-
-    def points(self) -> Iterator[dict[str, object]]:
-        """Values of the varied keys of each test, in the order of the grid; seeds change fastest."""
-        grid = self.grid if self.seeds is None else Grid({**self.grid.axes, SEED: self.seeds})
-        return _points(grid)
-
-
 class Kept(Protocol):
     """Results of earlier runs, and a place for new ones."""
 
@@ -71,22 +46,8 @@ class Kept(Protocol):
         """Keep the results of a chunk."""
 
 
-class _Nothing:
-    def __contains__(self, test: int) -> bool:
-        return False
-
-    def results(self, start: int, count: int) -> Array:
-        raise KeyError(start, count)
-
-    def add(self, start: int, results: Array) -> None:
-        pass
-
-
-NOTHING_KEPT: Final[Kept] = _Nothing()
-
-
 def require_circles(
-    tests: CircleTests,
+    asked: Sweep,
     executor: Executor,
     *,
     progress: Callable[[int], None] = ignored,
@@ -96,8 +57,8 @@ def require_circles(
 
     Parameters
     ----------
-    tests
-        The tests.
+    asked
+        The sweep.
     executor
         Where many points are checked.
     progress
@@ -111,23 +72,22 @@ def require_circles(
         The first such point, as from `check_chunk`.
     """
     cost = NOTHING
-    where = executor if tests.grid.points > MOST_CIRCLES_UNASKED else Here()
-    chunks = _chunks(tests.profile, enumerate(_points(tests.grid)), _CHECKED_AT_ONCE)
+    where = executor if asked.grid.points > MOST_CIRCLES_UNASKED else Here()
+    chunks = _chunks(asked.profile, enumerate(asked.grid.each_point()), _CHECKED_AT_ONCE)
     for number, one in enumerate(run_in_order(where, check_chunk, chunks, watch=watch), start=1):
         cost = cost.then(one)
-        progress(min(number * _CHECKED_AT_ONCE, tests.grid.points))
-    cost = cost._replace(steps=tests.each * cost.steps, time_s=tests.each * cost.time_s)
+        progress(min(number * _CHECKED_AT_ONCE, asked.grid.points))
+    cost = cost._replace(steps=asked.tests_each * cost.steps, time_s=asked.tests_each * cost.time_s)
     announce(cost)
     return cost
 
 
 def circle_blocks(
-    tests: CircleTests,
+    asked: Sweep,
     executor: Executor,
     *,
-    timing_models: Sequence[str],
     cost: Estimate,
-    kept: Kept = NOTHING_KEPT,
+    kept: Kept | None = None,
     progress: Callable[[int], None] = ignored,
     watch: Callable[[], None] = ignored,
 ) -> Iterator[SweepBlock]:
@@ -135,16 +95,14 @@ def circle_blocks(
 
     Parameters
     ----------
-    tests
-        The tests.
+    asked
+        The sweep.
     executor
         Where they run; it is not shut down.
-    timing_models
-        As in `sweep`.
     cost
         What all of them cost, from `require_circles`.
     kept
-        What need not be computed.
+        What need not be computed, and takes what was.
     progress
         Called with the number of tests that are done, in whatever order.
     watch
@@ -163,13 +121,14 @@ def circle_blocks(
     done = 0
 
     def known(chunk: CircleChunk) -> Array | None:
-        if chunk.start not in kept:
+        if kept is None or chunk.start not in kept:
             return None
         count(chunk)
         return kept.results(chunk.start, len(chunk.points))
 
     def finished(chunk: CircleChunk, results: Array) -> None:
-        kept.add(chunk.start, results)
+        if kept is not None:
+            kept.add(chunk.start, results)
         count(chunk)
 
     def count(chunk: CircleChunk) -> None:
@@ -177,14 +136,14 @@ def circle_blocks(
         done += len(chunk.points)
         progress(done)
 
-    size = chunk_tests(tests.number, time_s=cost.time_s)
-    runs = groupby(enumerate(tests.points()), key=lambda one: one[0] in kept)
-    chunks = (chunk for _, run in runs for chunk in _chunks(tests.profile, run, size))
+    size = chunk_tests(asked.tests, time_s=cost.time_s)
+    runs = groupby(enumerate(asked.test_points()), key=lambda test: kept is not None and test[0] in kept)
+    chunks = (chunk for _, run in runs for chunk in _chunks(asked.profile, run, size))
     found = run_in_order(executor, run_chunk, chunks, known=known, finished=finished, watch=watch)
-    figures = (one for results in found for one in figures_of(results))
-    most = max(1, _within(tests.number // _BLOCKS, _BLOCK_TESTS) // tests.each)
-    for block in sweep(tests.profile, tests.grid, timing_models=timing_models, chunk_points=most):
-        yield with_circles(block, figures) if tests.seeds is None else with_seeds(block, figures, tests.each)
+    results = (row for chunk in found for row in chunk)
+    most = max(1, _within(asked.tests // _BLOCKS, _BLOCK_TESTS) // asked.tests_each)
+    for block in sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=most):
+        yield with_circles(block, results) if asked.seeds is None else with_seeds(block, results, asked.tests_each)
 
 
 def chunk_tests(number: int, *, time_s: float) -> int:
@@ -208,11 +167,6 @@ def chunk_tests(number: int, *, time_s: float) -> int:
 
 def _within(number: int, bounds: range) -> int:
     return min(max(number, bounds[0]), bounds[-1])
-
-
-def _points(grid: Grid) -> Iterator[dict[str, object]]:
-    # Some at a time: an axis that is a list is looked through for each chunk.
-    return (chunk.point(index) for chunk in grid.chunks(_BLOCK_TESTS[-1]) for index in range(chunk.points))
 
 
 def _chunks(profile: Profile, points: Iterable[tuple[int, dict[str, object]]], most: int) -> Iterator[CircleChunk]:

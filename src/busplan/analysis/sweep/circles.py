@@ -1,8 +1,7 @@
 """Circle tests over a grid: one for each point, in any order and in any process."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import islice
-from math import isnan
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.circle.refusal import require_circle
 from busplan.analysis.circle.roundness import circle_test
 from busplan.analysis.circle.setup import bus, setup
-from busplan.analysis.sweep.blocks import Column, SweepBlock, figure_names
+from busplan.analysis.sweep.blocks import Column, SweepBlock
 from busplan.analysis.sweep.grid import Array, Grid
 from busplan.errors import BusplanError
 from busplan.profile.toml import override
@@ -32,13 +31,6 @@ MOST_CIRCLES_UNASKED: Final = 1000
 
 _TRUTHS: Final = (None, False, True)
 """Values of a column of truth values that may be missing, in the order of sorting."""
-
-Figures = tuple[float | bool | None, ...]
-
-
-def all_columns(profile: Profile, grid: Grid, *, circle: Sequence[str]) -> tuple[str, ...]:
-    """All columns of a sweep: the varied keys, the figures of `capacity`, and `circle`, those of circle tests."""
-    return (*grid.axes, *figure_names(profile), *circle)
 
 
 class CircleChunk(NamedTuple):
@@ -67,23 +59,7 @@ def _run(profile: Profile, point: dict[str, object]) -> list[float | None]:
     return [getattr(result, name) for name in CIRCLE_COLUMNS]
 
 
-def figures_of(results: Array) -> Iterator[Figures]:
-    """Figures of each test, from `run_chunk`.
-
-    Parameters
-    ----------
-    results
-        Shape (points, CIRCLE_COLUMNS).
-    """
-    are_truths = [CIRCLE_BY_KEY[name].sort == "truth" for name in CIRCLE_COLUMNS]
-    for row in results.tolist():
-        yield tuple(
-            None if isnan(value) else bool(value) if is_truth else value
-            for value, is_truth in zip(row, are_truths, strict=True)
-        )
-
-
-def require_few(grid: Grid, *, seeds: int = 1, option: str, consent: str) -> None:
+def require_few(grid: Grid, *, seeds: int, option: str, consent: str) -> None:
     """Refuse more circle tests than anyone runs by mistake.
 
     Parameters
@@ -130,28 +106,26 @@ def check_chunk(chunk: CircleChunk) -> Estimate:
     return cost
 
 
-def with_circles(block: SweepBlock, tests: Iterator[Figures]) -> SweepBlock:
+def with_circles(block: SweepBlock, results: Iterator[Array]) -> SweepBlock:
     """Add the columns of circle tests to a block: one test a point, the same beside every timing model.
 
     Parameters
     ----------
     block
         Its capacity.
-    tests
-        Figures of its points, and of those behind them.
+    results
+        Those of its points, and of those behind them, each of shape (CIRCLE_COLUMNS,).
     """
-    results = list(islice(tests, block.chunk.points))
-    circles = {
-        name: _column(name, [point[place] for point in results], shape=block.chunk.shape)
-        for place, name in enumerate(CIRCLE_COLUMNS)
-    }
+    columns = np.array([*islice(results, block.chunk.points)]).T.reshape(-1, *block.chunk.shape)
+    circles = {name: _column(name, values) for name, values in zip(CIRCLE_COLUMNS, columns, strict=True)}
     return block._replace(models=tuple({**figures, **circles} for figures in block.models))
 
 
-def _column(name: str, values: Sequence[float | None], *, shape: tuple[int, ...]) -> Column:
-    """Column of truth values, also missing ones, or of numbers with NaN for None."""
-    if all(isinstance(value, bool) for value in values):
-        return Column(np.array(values, dtype=bool).reshape(shape))
-    if CIRCLE_BY_KEY[name].sort == "truth":
-        return Column(np.array([_TRUTHS.index(value) for value in values], dtype=np.uint8).reshape(shape), _TRUTHS)
-    return Column(np.array([np.nan if value is None else value for value in values], dtype=float).reshape(shape))
+def _column(name: str, values: Array) -> Column:
+    """Column of numbers, or of truth values, which may be missing."""
+    if CIRCLE_BY_KEY[name].sort != "truth":
+        return Column(values)
+    missing = np.isnan(values)
+    if missing.any():
+        return Column(np.where(missing, 0, 1 + values).astype(np.uint8), _TRUTHS)
+    return Column(values.astype(bool))

@@ -1,9 +1,9 @@
 """The seam of execution: tasks on any executor, a bounded number at once, done in any order, given in theirs."""
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future
-from functools import partial
-from queue import Empty, SimpleQueue
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from itertools import islice
 from typing import Final, TypeVar
 
 Task = TypeVar("Task")
@@ -38,6 +38,10 @@ class Here(Executor):
 
 def unknown(_task: object) -> None:
     """Know no result: every task is run."""
+
+
+def _same(result: Result) -> Result:
+    return result
 
 
 def ignored(*_: object) -> None:
@@ -85,55 +89,49 @@ def run_in_order(
     CancelledError
         The executor cancelled a task.
     """
-    left = iter(tasks)
-    done: SimpleQueue[int] = SimpleQueue()
-    outstanding: dict[int, tuple[Task, Future[Result]]] = {}
-    results: dict[int, Future[Result]] = {}
-    taken = given = 0
+    order: deque[Future[Result]] = deque()
+    running: dict[Future[Result], Task] = {}
+    left = _handed_over(executor, function, tasks, known, running)
     is_open = True
     try:
-        while is_open or given < taken:
+        while is_open or order:
             # A task that is done is looked at before another is handed over.
-            while is_open and taken - given < most and done.empty() and given not in results:
-                try:
-                    task = next(left)
-                except StopIteration:
-                    is_open = False
-                    break
-                result = known(task)
-                if result is None:
-                    future = executor.submit(function, task)
-                    outstanding[taken] = task, future
-                    future.add_done_callback(partial(_note, done, taken))
-                else:
-                    results[taken] = Here().submit(lambda found: found, result)
-                taken += 1
-            for place in _those_done(done, is_waiting=given < taken and given not in results):
-                task, future = outstanding.pop(place)
-                results[place] = future
+            while is_open and len(order) < most and not any(map(Future.done, (*islice(order, 1), *running))):
+                following = [*islice(left, 1)]
+                is_open = bool(following)
+                order.extend(following)
+            if order and not order[0].done():
+                wait(running, _GLANCE_S, FIRST_COMPLETED)
+            for future in filter(Future.done, tuple(running)):
+                task = running.pop(future)
                 if future.cancelled() or future.exception() is not None:
                     is_open = False
                 else:
                     finished(task, future.result())
             watch()
-            while given in results:
-                future = results.pop(given)
-                given += 1
-                yield future.result()
+            while order and order[0] not in running:
+                yield order.popleft().result()
+    except BrokenExecutor:
+        running.clear()  # it ends its calls itself, and stumbles over one that is cancelled meanwhile
+        raise
     finally:
-        for _, future in outstanding.values():
+        for future in running:
             future.cancel()
 
 
-def _note(done: SimpleQueue[int], place: int, _: "Future[Result]") -> None:
-    done.put(place)
-
-
-def _those_done(done: SimpleQueue[int], *, is_waiting: bool) -> Iterator[int]:
-    """Give the places of all that is done; wait a little for the first."""
-    try:
-        yield done.get(timeout=_GLANCE_S) if is_waiting else done.get_nowait()
-        while True:
-            yield done.get_nowait()
-    except Empty:
-        return
+def _handed_over(
+    executor: Executor,
+    function: Callable[[Task], Result],
+    tasks: Iterable[Task],
+    known: Callable[[Task], Result | None],
+    running: dict[Future[Result], Task],
+) -> Iterator[Future[Result]]:
+    """Hand over one task after the other; those that are run stand in `running`."""
+    for task in tasks:
+        result = known(task)
+        if result is not None:
+            yield Here().submit(_same, result)
+            continue
+        future = executor.submit(function, task)
+        running[future] = task
+        yield future

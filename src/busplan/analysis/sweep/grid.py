@@ -14,6 +14,7 @@ from busplan.errors import BusplanError
 from busplan.profile.keys import named_tables
 from busplan.profile.kinds import cycle_keys
 from busplan.profile.toml import override
+from busplan.profile.write import whole
 from busplan.sections.profile import CIRCLE_SECTIONS, Profile
 
 Array = NDArray[Any]
@@ -21,6 +22,7 @@ Array = NDArray[Any]
 
 _CHECKED_EACH: Final = 100
 """Up to this many values of a key are all checked; of more, the extremes: every valid range is an interval."""
+_POINTS_AT_ONCE: Final = 4096
 MAX_POINTS: Final = 10**12
 """A larger grid would take weeks, so it is probably a typing error."""
 
@@ -148,6 +150,11 @@ class Grid(NamedTuple):
                 chunk = self._chunk(start, parts)
                 yield chunk
                 start += chunk.points
+
+    def each_point(self) -> Iterator[dict[str, object]]:
+        """Values of the keys of each point."""
+        # Some at a time: an axis that is a list is looked through for each chunk.
+        return (chunk.point(index) for chunk in self.chunks(_POINTS_AT_ONCE) for index in range(chunk.points))
 
     def _chunk(self, start: int, parts: list[tuple[int, int]]) -> Chunk:
         shape = tuple(stop - first for first, stop in parts)
@@ -300,7 +307,7 @@ def _samples(axis: Values) -> list[Value]:
     # In equal steps from a whole number, the second value is a fraction if any is.
     chosen = range(axis.size) if axis.size <= _CHECKED_EACH else (0, 1, axis.size - 1)
     values = (axis.part(index, index + 1).item() for index in chosen)
-    return [int(value) if isinstance(value, float) and value.is_integer() else value for value in values]
+    return list(map(whole, values))
 
 
 def _least(values: list[Value]) -> Value:

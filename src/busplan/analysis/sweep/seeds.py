@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
-from math import sqrt
+from math import nan, sqrt
 from statistics import NormalDist
 from types import MappingProxyType
 from typing import Final
@@ -11,7 +11,7 @@ import numpy as np
 
 from busplan.analysis.circle.figures import CIRCLE_BY_KEY
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, Figures
+from busplan.analysis.sweep.circles import CIRCLE_COLUMNS
 from busplan.analysis.sweep.grid import Array, Grid, Values
 from busplan.buses.figure import Figure
 from busplan.errors import BusplanError
@@ -93,53 +93,49 @@ def without_seed(grid: Grid, *, option: str) -> tuple[Grid, Values]:
     return Grid({key: axis for key, axis in grid.axes.items() if key != SEED}), grid.axes[SEED]
 
 
-def with_seeds(block: SweepBlock, tests: Iterator[Figures], seeds: int) -> SweepBlock:
+def with_seeds(block: SweepBlock, results: Iterator[Array], seeds: int) -> SweepBlock:
     """Add the columns of a summary to a block: a circle test for each point and seed, the same beside every model.
 
     Parameters
     ----------
     block
         Its capacity.
-    tests
-        Figures of its points, each with every seed, and of those behind them.
+    results
+        Those of its points, each with every seed, and of those behind them, each of shape (CIRCLE_COLUMNS,).
     seeds
         Tests of each point.
     """
-    rows = [summary(list(islice(tests, seeds))) for _ in range(block.chunk.points)]
+    rows = [summary(np.array([*islice(results, seeds)])) for _ in range(block.chunk.points)]
     columns = {name: _column([row[name] for row in rows], shape=block.chunk.shape) for name in SUMMARY_COLUMNS}
     return block._replace(models=tuple({**figures, **columns} for figures in block.models))
 
 
-def _column(values: Sequence[float | None], *, shape: tuple[int, ...]) -> Column:
-    kind = int if all(isinstance(value, int) for value in values) else float
-    return Column(np.array([np.nan if value is None else value for value in values], dtype=kind).reshape(shape))
+def _column(values: Sequence[float], *, shape: tuple[int, ...]) -> Column:
+    return Column(np.array(values).reshape(shape))
 
 
-def summary(results: Sequence[Figures]) -> dict[str, float | None]:
-    """Summarise the circle tests of one point: `SUMMARY_COLUMNS`; None for what a circle lacks.
+def summary(results: Array) -> dict[str, float]:
+    """Summarise the circle tests of one point: `SUMMARY_COLUMNS`; NaN for what a circle lacks.
 
     Parameters
     ----------
     results
-        Figures of each seed, in the order of `CIRCLE_COLUMNS`.
+        Shape (seeds, CIRCLE_COLUMNS), as from `run_chunk`.
     """
-    by_key = dict(zip(CIRCLE_COLUMNS, zip(*results, strict=True), strict=True))
-    passed = by_key["passed"]
-    failed = None if None in passed else len(passed) - sum(map(bool, passed))
+    by_key = dict(zip(CIRCLE_COLUMNS, results.T, strict=True))
+    failed = float(np.sum(1 - by_key["passed"]))
     spreads = (_spread(key, by_key[key]) for key in _SPREAD)
     numbers = (len(results), *_shares(failed, len(results)), *(number for own in spreads for number in own))
     return dict(zip(SUMMARY_COLUMNS, numbers, strict=True))
 
 
-def _shares(failed: int | None, tests: int) -> tuple[float | None, ...]:
+def _shares(failed: float, tests: int) -> tuple[float, ...]:
     """Share of tests that failed, and its 95 % interval.
 
     References
     ----------
     Wilson, Probable inference, the law of succession, and statistical inference, 1927.
     """
-    if failed is None:
-        return (None,) * 3
     z = NormalDist().inv_cdf((1 + _SHARE) / 2)
     middle = (failed + z**2 / 2) / (tests + z**2)
     half = z / (tests + z**2) * sqrt(failed * (tests - failed) / tests + z**2 / 4)
@@ -149,15 +145,12 @@ def _shares(failed: int | None, tests: int) -> tuple[float | None, ...]:
     return failed / tests, low, high
 
 
-def _spread(key: str, values: Sequence[float | bool | None]) -> tuple[float | None, ...]:
+def _spread(key: str, values: Array) -> tuple[float, ...]:
     """Mean, standard deviation, 95 % quantile and worst, in the order of `_PARTS`."""
-    if None in values:
-        return (None,) * len(_PARTS)
-    found: Array = np.array(values, dtype=float)
     # From the first on, so that equal values have exactly their mean, and no deviation.
-    off = found - found[0]
-    std = float(np.std(off, ddof=1)) if found.size > 1 else None
+    off = values - values[0]
+    std = float(np.std(off, ddof=1)) if values.size > 1 else nan
     is_more_better = CIRCLE_BY_KEY[key].better == "more"
-    quantile = np.quantile(found, 1 - _SHARE if is_more_better else _SHARE)
-    worst = found.min() if is_more_better else found.max()
-    return float(found[0] + off.mean()), std, float(quantile), float(worst)
+    quantile = np.quantile(values, 1 - _SHARE if is_more_better else _SHARE)
+    worst = values.min() if is_more_better else values.max()
+    return float(values[0] + off.mean()), std, float(quantile), float(worst)

@@ -7,20 +7,19 @@ meaning as metadata, the schema has the profile.
 import io
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-from pyarrow.ipc import new_stream, open_stream
 from pyarrow.parquet import ParquetWriter as FileWriter
 
 from busplan import __version__
+from busplan.analysis.sweep.asked import Sweep, column_figures
 from busplan.analysis.sweep.blocks import Column, SweepBlock
-from busplan.analysis.sweep.columns import column_figures
 from busplan.analysis.sweep.grid import Array, Values
-from busplan.answers.sweep.rows import SweepTable
+from busplan.answers.sweep.rows import sweep_facts
 from busplan.buses.figure import Figure, Sort, unit_of
 from busplan.forms.csv_rows import spelled
 from busplan.printable import json_text
@@ -39,21 +38,21 @@ _NUMPY: Final = MappingProxyType({pa.float64(): np.float64, pa.int64(): np.int64
 """NumPy's types; older versions of pyarrow name them only where pandas is installed."""
 
 
-def table_schema(table: SweepTable) -> pa.Schema:
+def table_schema(sweep: Sweep) -> pa.Schema:
     """Types of the columns, with their units; metadata say what the rows are of.
 
     The keys of the metadata are `busplan.version`, `busplan.profile` (TOML) and `busplan.sweep` (the first line of JSON
     lines). At the end of a file comes `busplan.complete`.
     """
-    figures = column_figures(table.profile)
+    figures = column_figures(sweep.profile)
     fields = [
-        _axis_field(name, table.grid.axes[name]) if name in table.grid.axes else _field(name, figures[name])
-        for name in table.columns
+        _axis_field(name, sweep.grid.axes[name]) if name in sweep.grid.axes else _field(name, figures[name])
+        for name in sweep.columns
     ]
     metadata = {
         "busplan.version": __version__,
-        "busplan.profile": profile_text(table.profile),
-        "busplan.sweep": json_text(table.facts),
+        "busplan.profile": profile_text(sweep.profile),
+        "busplan.sweep": json_text(sweep_facts(sweep)),
     }
     return pa.schema(fields, metadata=metadata)
 
@@ -73,43 +72,26 @@ def _axis_type(axis: Values) -> pa.DataType:
     return pa.from_numpy_dtype(values.dtype)
 
 
-def encoded(block: SweepBlock, *, schema: pa.Schema) -> bytes:
-    """Encode a block as a stream of Arrow.
-
-    Parameters
-    ----------
-    block
-        Part of a sweep.
-    schema
-        From `table_schema`.
-    """
-    arrays = [_array(block.columns(field.name), block.chunk.shape, field.type) for field in schema]
-    buffer = io.BytesIO()
-    with new_stream(buffer, schema) as stream:
-        stream.write_batch(pa.record_batch(arrays, schema=schema))
-    return buffer.getvalue()
-
-
-def _array(columns: list[Column], shape: tuple[int, ...], kind: pa.DataType) -> pa.Array:
-    """One column: point by point, and for each point timing model by timing model."""
+def _array(block: SweepBlock, name: str, kind: pa.DataType) -> pa.Array:
+    """One column of a block."""
     if kind == _WORDS:
-        return _words(columns, shape)
-    parts = [_numbers(one) for one in columns]
-    missing = _rows([np.isnan(one) for one in parts], shape)
-    values = _rows(parts, shape)
+        return _words(block, name)
+    values = block.interleaved([_numbers(column) for column in block.columns(name)])
+    missing = np.isnan(values)
     return pa.array(np.where(missing, 0, values).astype(_NUMPY[kind]), mask=missing)
 
 
-def _words(columns: list[Column], shape: tuple[int, ...]) -> pa.Array:
+def _words(block: SweepBlock, name: str) -> pa.Array:
     """Text as in CSV, each once in the dictionary; what is empty there is null."""
-    texts = [[str(spelled(word)) for word in one.words or ()] for one in columns]
+    columns = block.columns(name)
+    texts = [[str(spelled(word)) for word in column.words or ()] for column in columns]
     known = dict.fromkeys(text for own in texts for text in own if text)
     codes = {text: code for code, text in enumerate(known)}
     found = [
         np.array([codes.get(text, -1) for text in own], dtype=np.int32)[one.values]
         for own, one in zip(texts, columns, strict=True)
     ]
-    values = _rows(found, shape)
+    values = block.interleaved(found)
     indices = pa.array(values, mask=values < 0)
     return pa.DictionaryArray.from_arrays(indices, pa.array(list(known), type=pa.string()))
 
@@ -121,16 +103,12 @@ def _numbers(column: Column) -> Array:
     return np.array([np.nan if word is None else word for word in column.words], dtype=float)[column.values]
 
 
-def _rows(parts: list[Array], shape: tuple[int, ...]) -> Array:
-    return np.stack([np.broadcast_to(one, shape).ravel() for one in parts], axis=1).ravel()
-
-
 class ParquetWriter:
     """Writes rows as a Parquet file, a row group for some blocks.
 
     Parameters
     ----------
-    table
+    sweep
         What the rows are of.
     write
         Writes bytes to the destination, which need not be seekable.
@@ -138,24 +116,19 @@ class ParquetWriter:
 
     points = BLOCK_POINTS
 
-    def __init__(self, table: SweepTable, write: Callable[[bytes], object]) -> None:
-        self._schema = table_schema(table)
-        self.encode: Callable[[SweepBlock], bytes] = partial(encoded, schema=self._schema)
+    def __init__(self, sweep: Sweep, write: Callable[[bytes], object]) -> None:
+        self._schema = table_schema(sweep)
         self._stream = _Stream(write)
         self._pending: list[pa.Table] = []
 
-    def begin(self) -> None:
-        """Begin the file."""
-        with self._stream.open():
-            self._file = FileWriter(self._stream, self._schema)
-
-    def join(self, encoded: bytes) -> None:
+    def add(self, block: SweepBlock) -> None:
         """Add a block."""
-        self._pending.append(open_stream(encoded).read_all())
-        if sum(one.num_rows for one in self._pending) >= GROUP_ROWS:
+        arrays = [_array(block, field.name, field.type) for field in self._schema]
+        self._pending.append(pa.table(arrays, schema=self._schema))
+        if sum(part.num_rows for part in self._pending) >= GROUP_ROWS:
             self._write_group()
 
-    def end(self, *, complete: bool) -> None:
+    def finish(self, *, complete: bool) -> None:
         """Write the footer."""
         if self._pending:
             self._write_group()
@@ -163,11 +136,16 @@ class ParquetWriter:
         with self._stream.open():
             self._file.close()
 
+    @cached_property
+    def _file(self) -> FileWriter:
+        with self._stream.open():
+            return FileWriter(self._stream, self._schema)
+
     def _write_group(self) -> None:
-        group = pa.concat_tables(self._pending).unify_dictionaries()
+        group, file = pa.concat_tables(self._pending).unify_dictionaries(), self._file
         self._pending = []
         with self._stream.open():
-            self._file.write_table(group, row_group_size=group.num_rows)
+            file.write_table(group, row_group_size=group.num_rows)
 
 
 class _Stream(io.RawIOBase):

@@ -10,9 +10,9 @@ import numpy as np
 from busplan.analysis.capacity.certainty import FITS, VERDICTS
 from busplan.analysis.capacity.figures import COUNTS
 from busplan.analysis.network import bus_of
+from busplan.analysis.sweep.asked import Sweep, column_figures
 from busplan.analysis.sweep.blocks import SweepBlock
-from busplan.analysis.sweep.columns import column_figures
-from busplan.analysis.sweep.grid import Array, Grid
+from busplan.analysis.sweep.grid import Array
 from busplan.answers.sweep.seeds import SeedTally
 from busplan.buses.figure import CIRCLE_REFUSED_BY, TIMING_MODEL, Figure
 from busplan.forms.blocks import (
@@ -56,21 +56,13 @@ SUMMARY_COLUMNS: Final = (
 """Default figures of a summary over seeds."""
 
 
-def default_columns(profile: Profile, circle: Collection[str]) -> tuple[str, ...]:
-    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    circle
-        All columns of circle tests.
-    """
-    of_circle = (key for key in (*CIRCLE_COLUMNS, *SUMMARY_COLUMNS) if key in circle)
-    if not profile.group:
+def default_columns(sweep: Sweep) -> tuple[str, ...]:
+    """Default figures of a table; where nodes are in groups, counts of each instead of those of the whole."""
+    of_circle = (key for key in (*CIRCLE_COLUMNS, *SUMMARY_COLUMNS) if key in sweep.columns)
+    if not sweep.profile.group:
         return (*_RANKS, *of_circle)
     whole = (key for key in _RANKS if key not in COUNTS)
-    return (*whole, *(f"group.{one.name}.safe_nodes" for one in profile.group), *of_circle)
+    return (*whole, *(f"group.{one.name}.safe_nodes" for one in sweep.profile.group), *of_circle)
 
 
 class Tally:
@@ -78,30 +70,24 @@ class Tally:
 
     Parameters
     ----------
-    profile
-        The network.
-    grid
-        Values of its keys.
-    timing_models
-        The timing models, in the order of the rows of a point.
-    seeds
-        Circle tests that a point's row summarises; None where there is no summary.
+    sweep
+        What is counted.
     """
 
-    def __init__(self, profile: Profile, grid: Grid, timing_models: Sequence[str], *, seeds: int | None = None) -> None:
+    def __init__(self, sweep: Sweep) -> None:
         self.points = 0
-        self.profile = profile
-        self.expected = grid.points
-        self.bus = bus_of(profile)
-        self._varied = frozenset(grid.axes)
-        self._models = timing_models
-        self._fits = [0] * len(timing_models)
+        self.profile = sweep.profile
+        self.expected = sweep.grid.points
+        self.bus = bus_of(sweep.profile)
+        self._varied = frozenset(sweep.grid.axes)
+        self._models = sweep.timing_models
+        self._fits = [0] * len(sweep.timing_models)
         self._unsafe = 0
         self._refused = 0
         self._refused_by: dict[str, None] = {}
         self._passed: list[int] | None = None
         self._unjudged = 0
-        self._seeds = None if seeds is None else SeedTally(seeds)
+        self._seeds = None if sweep.seeds is None else SeedTally(sweep.seeds.size)
 
     @property
     def rows(self) -> int:

@@ -249,6 +249,7 @@ LIMITS: Final = (
         _largest_identifier,
         _most_identifier,
         way_out="smaller identifiers, or those of 29 bits, have room",
+        is_slow=True,
     ),
     Limit(
         "identifiers",
@@ -257,6 +258,7 @@ LIMITS: Final = (
         lambda _network: 0,
         way_out="identifiers further apart have room",
         has_rule=True,
+        is_slow=True,
         says=lambda network: _and_more([words for _, words in _collisions_in_words(traffic_of(network))]),
     ),
     Limit(
@@ -276,6 +278,7 @@ LIMITS: Final = (
         lambda _network: 1,
         way_out="a smaller identifier, or less traffic before it, makes a message earlier",
         has_rule=True,
+        is_slow=True,
         says=lambda network: _all_late(traffic_of(network)),
         breaks=_is_late,
         kept_from_us=partial(_kept_from_us, _is_late),

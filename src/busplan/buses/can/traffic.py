@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 from busplan.buses.can.constants import COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER
 from busplan.buses.can.equations import share_bytes
 from busplan.buses.network import Network
-from busplan.elementwise import Number, SpecialNumber, choose, larger, pointwise
+from busplan.elementwise import Number, Traced, choose, larger, pointwise
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
@@ -135,7 +135,7 @@ class Sent:
         messages = (number for one in traffic.messages for number in (one.identifier, one.payload_bytes))
         order = (traffic.sync_identifier, *(one.identifier for one in traffic.pdos), *messages)
         return all(isinstance(one, int | float) for one in order) and not any(
-            isinstance(one, SpecialNumber) for one in traffic.numbers()
+            isinstance(one, Traced) for one in traffic.numbers()
         )
 
     @cached_property

@@ -17,7 +17,7 @@ from busplan.buses.ieee1394.constants import (
 from busplan.buses.ieee1394.timing import TIMING_MODELS, Delays, Link, TimingModelName, delays
 from busplan.buses.ieee1394.transactions import LATENCY_SYMBOLS, link_of
 from busplan.buses.network import Network
-from busplan.elementwise import Number, is_off, is_one, larger, named, plain, rounded_down, total
+from busplan.elementwise import Number, is_off, larger, named, plain, rounded_down, total
 
 
 class CycleWithStarts(BusCycle):
@@ -64,7 +64,7 @@ class CycleWithStarts(BusCycle):
         shared
             The delays over other hops of the bus, where they have been computed.
         """
-        found = delays(link, model=TIMING_MODELS[self.model], alone=is_one(self.network.nodes), shared=shared)
+        found = delays(link, model=TIMING_MODELS[self.model], alone=self.network.nodes == 1, shared=shared)
         for key, number in (
             ("arbitration_us", found.arbitration_us),
             ("acknowledge_us", found.acknowledge_us),

@@ -1,6 +1,7 @@
 """Rules of the gate that only an IEEE 1394 bus has: its limits, its gap count, its packets, its two timing models."""
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -116,19 +117,19 @@ def gap_count_wasteful(subject: RuleSubject) -> Iterator[RuleProblem]:
     if "cycle starts" in one.exceeded:
         return  # no time is left, so none can be saved
     if one.gap_count > one.safe_gap_count and _bus(subject).cable_is_standard:
-        after = subject.after({"bus.gap_count": "optimal"})
-        won = "" if one.safe_nodes is None else _won((after.safe_nodes or 0) - one.safe_nodes)
-        saved, _ = told_apart(one.required_us - after.required_us, 0.0)
-        safe = one.safe_gap_count
-        yield RuleProblem(
-            "bus.gap_count",
-            f"gap count {one.gap_count} is above the {safe} that {one.hops} hops need; "
-            f"{safe} saves {saved} us a cycle{won}",
-        )
+        yield RuleProblem("bus.gap_count", partial(_wasted, subject))
 
 
-def _won(nodes: int) -> str:
-    return f" and wins {nodes} node{'s' * (nodes != 1)}"
+def _wasted(subject: RuleSubject) -> str:
+    """Say what a gap count above the table costs."""
+    one, after = subject.deciding, subject.after({"bus.gap_count": "optimal"})
+    saved, _ = told_apart(one.required_us - after.required_us, 0.0)
+    safe, nodes = one.safe_gap_count, one.safe_nodes
+    words = f"gap count {one.gap_count} is above the {safe} that {one.hops} hops need; {safe} saves {saved} us a cycle"
+    if nodes is None:
+        return words
+    won = (after.safe_nodes or 0) - nodes
+    return f"{words} and wins {won} node{'s' * (won != 1)}"
 
 
 RULES: Final = (

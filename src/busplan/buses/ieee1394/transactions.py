@@ -16,7 +16,7 @@ from busplan.buses.ieee1394.timing import (
     transaction,
 )
 from busplan.buses.network import Group, Network
-from busplan.elementwise import Number, SpecialNumber, alike, is_one, named, plain, worded
+from busplan.elementwise import Number, Traced, alike, named, plain, worded
 from busplan.sections.transactions import TransactionKind
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def exchange(
         payload_bytes=size,
         overhead_bytes=group.said.payload.overhead_bytes,
         responder=responder,
-        alone=is_one(network.nodes),
+        alone=network.nodes == 1,
         common=common,
     )
     uncertainty_us = group.read_uncertainty_us if is_read else group.write_uncertainty_us
@@ -215,7 +215,7 @@ def exchange(
 
 def _with_names(phases: Phases, suffix: str) -> Phases:
     """The same phases, each with its symbol if they are traced numbers."""
-    if not isinstance(phases.latency_us, SpecialNumber):
+    if not isinstance(phases.latency_us, Traced):
         return phases
     return Phases(
         **{key: named(value, key, f"{LATENCY_SYMBOLS[key]}{suffix}") for key, value in phases._asdict().items()}

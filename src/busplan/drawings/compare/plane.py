@@ -10,6 +10,7 @@ from busplan.analysis.network import bus_of, network_of
 from busplan.buses.figure import Ink
 from busplan.elementwise import plain
 from busplan.forms.numbers import period
+from busplan.forms.scale import round_numbers
 
 INKS_OF_LINES: Final[tuple[Ink, ...]] = ("request", "contention", "work", "sync", "acknowledge", "response", "reserve")
 """Colours of the lines; each has a letter, too."""
@@ -76,12 +77,7 @@ def own_axes(found: KindComparison) -> int:
 
 def axes_labels(plane: Plane) -> list[int]:
     """Round numbers of axes to label, as few as can be read."""
-    for factors in ((1, 2, 5), (1, 3), (1,)):
-        found = [factor * 10**power for power in range(8) for factor in factors]
-        inside = [one for one in found if one <= plane.top_axes]
-        if len(inside) <= _MOST_LABELS:
-            break
-    return inside
+    return [int(one) for one in round_numbers(1, plane.top_axes, most=_MOST_LABELS)]
 
 
 def period_labels(found: KindComparison) -> list[tuple[float, str]]:

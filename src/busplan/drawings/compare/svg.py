@@ -15,36 +15,26 @@ from busplan.drawings.compare.plane import (
     period_labels,
     plane_of,
 )
-from busplan.drawings.svg_style import style_sheet
-from busplan.forms.inks import INKS
+from busplan.forms.inks import DARK, INKS
 from busplan.forms.numbers import period, plural
-from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
+from busplan.forms.picture import styled
+from busplan.forms.svg import LINE, PHONE, anchor, drawing, inside, markup, paragraph, text_at
 
 _HEIGHT: Final = 240
 _LETTER: Final = 7
 """Width of a letter, about."""
 _GAP: Final = 12
 _RADIUS: Final = 7
-_EDGE: Final = (5.0, 95.0)
-"""Percent of the width from which labels stand beside their place."""
-_STROKES: Final = "".join(f"{{0}} .line-{ink}{{{{stroke:{INKS[ink].light}}}}}\n" for ink in INKS_OF_LINES)
-_DARK_STROKES: Final = "".join(f"{{0}} .line-{ink}{{{{stroke:{INKS[ink].dark}}}}}\n" for ink in INKS_OF_LINES)
-_STYLE: Final = f"""\
-{{0}} .line{{{{fill:none;stroke-width:2}}}}
-{{0}} .dot{{{{stroke:#ffffff;stroke-width:1.5}}}}
-{{0}} .mark{{{{font-size:10px;font-weight:700;fill:#ffffff}}}}
-{{0}} .own{{{{stroke:#10151c;stroke-width:1;stroke-dasharray:2 3}}}}
-{_STROKES}"""
-_DARK_STYLE: Final = f"""\
-{{0}} .dot{{{{stroke:#12161c}}}}
-{{0}} .mark{{{{fill:#10151c}}}}
-{{0}} .own{{{{stroke:#ffffff}}}}
-{_DARK_STROKES}"""
-
-
-def stylesheet() -> str:
-    """CSS for light and dark backgrounds, scoped to the class of the drawing."""
-    return style_sheet(".busplan-kinds", light=_STYLE, dark=_DARK_STYLE)
+_STROKES, _DARK_STROKES = (
+    "".join(f".chart.kinds .line-{ink}{{stroke:{INKS[ink][side]}}}\n" for ink in INKS_OF_LINES) for side in (0, 1)
+)
+STYLE: Final = f"""\
+.chart.kinds .line{{fill:none;stroke-width:2}}
+.chart.kinds .dot{{stroke:var(--paper);stroke-width:1.5}}
+.chart.kinds .mark{{font-size:10px;font-weight:700;fill:var(--paper);stroke:none}}
+{_STROKES}{DARK}{{{_DARK_STROKES}}}
+"""
+"""Rules of the drawing."""
 
 
 def compare_svg(found: KindComparison, *, title: str, inline: bool = False) -> str:
@@ -61,17 +51,14 @@ def compare_svg(found: KindComparison, *, title: str, inline: bool = False) -> s
     inline
         If True, leave out style sheet and title: the page has them.
     """
-    root = drawing(title, css="busplan-kinds")
+    root = drawing(title, css="chart kinds")
     SubElement(root, "desc").text = "Most axes that are shown to fit over the period, both logarithmic"
-    if not inline:
-        SubElement(root, "style").text = stylesheet()
-        SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
     body = inside(root, x_percent=2.5, width_percent=95.0, y=0)
     y = _GAP if inline else paragraph(body, title, y=8, css="head") + _GAP
     plane, lines = plane_of(found), kind_lines(found)
     y = _area(body, found, plane, lines, y=y)
     root.set("height", str(_legend(body, lines, y=y) + _GAP))
-    return markup(root)
+    return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
 def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindLine, ...], *, y: int) -> int:
@@ -94,7 +81,7 @@ def _area(body: Element, found: KindComparison, plane: Plane, lines: tuple[KindL
         # Every label has its place on a phone; this machine's own is on its line.
         if number % every == 0 and period_us != own_us:
             at_percent = 100 * plane.x(period_us)
-            text_at(area, text, x=f"{at_percent:.5g}%", y=bottom + 18, css="small", anchor=_anchor(at_percent))
+            text_at(area, text, x=f"{at_percent:.5g}%", y=bottom + 18, css="small", anchor=anchor(at_percent))
     text_at(area, "period, logarithmic", x="100%", y=bottom + 36, css="small", anchor="end")
     return bottom + 2 * LINE + _GAP
 
@@ -108,7 +95,7 @@ def _own(area: Element, found: KindComparison, plane: Plane, *, top: int) -> Non
         y = str(_y(plane, axes, top=top))
         SubElement(area, "line", {"x1": "0", "x2": "100%", "y1": y, "y2": y, "class": "own"})
     words = f"this machine: {period(found.profile.cycle.period_us)}, {plural(axes, 'axis')}"
-    text_at(area, words, x=x, y=top - _RADIUS - 2, css="small", anchor=_anchor(at_percent, least=40.0, most=60.0))
+    text_at(area, words, x=x, y=top - _RADIUS - 2, css="small", anchor=anchor(at_percent, edge=40))
 
 
 def _line(area: Element, line: KindLine, plane: Plane, *, top: int) -> None:
@@ -135,7 +122,3 @@ def _legend(body: Element, lines: tuple[KindLine, ...], *, y: int) -> int:
 
 def _y(plane: Plane, axes: int, *, top: int) -> int:
     return round(top + _HEIGHT * (1 - plane.y(axes)))
-
-
-def _anchor(percent: float, *, least: float = _EDGE[0], most: float = _EDGE[1]) -> str:
-    return "start" if percent < least else "end" if percent > most else "middle"

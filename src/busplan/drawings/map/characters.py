@@ -7,8 +7,9 @@ from typing import Final
 from busplan.analysis.map.cells import Cell, NotDrawn
 from busplan.analysis.map.trade_off import TradeOff
 from busplan.drawings.legend import legend_lines
-from busplan.drawings.map.labels import LOOKS, Looks, legend_of, look_of, looks_of, placed_labels, value_text
+from busplan.drawings.map.labels import LOOKS, Looks, legend_of, look_of, looks_of, value_text
 from busplan.forms.lines import BLANK, Line, Mark
+from busplan.forms.scale import placed_labels
 
 _BRACKETED: Final = 3
 """Columns of a cell with room for brackets."""

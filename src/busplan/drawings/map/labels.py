@@ -1,6 +1,6 @@
 """What all drawings of a map say: names of states, limits, directions and values, and the mark of each region."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from string import ascii_lowercase
 from types import MappingProxyType
 from typing import Final, NamedTuple
@@ -139,37 +139,3 @@ def cell_words(found: TradeOff, cell: Cell) -> str:
     """Say the setting of a cell, its state and its limit."""
     limit = limit_words(cell, found.profile)
     return f"{setting_words(found, cell)}: {state_words(cell.state, found)}{limit and f', {limit}'}"
-
-
-def placed_labels(texts: Sequence[str], *, own: int | None, pitch: float, letter: float) -> dict[int, float]:
-    """Place labels in the middle of their columns, this design's first, as far as none touches another.
-
-    Parameters
-    ----------
-    texts
-        A label for each column.
-    own
-        Column of this design.
-    pitch
-        Width of a column, in the unit of the result.
-    letter
-        Width of a letter.
-
-    Returns
-    -------
-    dict
-        Where each label begins, by column.
-
-    Examples
-    --------
-    >>> placed_labels(["8", "12", "100", "16"], own=3, pitch=3, letter=1)
-    {0: 1.0, 1: 3.5, 3: 9.5}
-    """
-    placed: dict[int, float] = {}
-    for column in sorted(range(len(texts)), key=lambda one: one != own):
-        start = max(0.0, (column + 0.5) * pitch - letter * len(texts[column]) / 2)
-        end = start + letter * (len(texts[column]) + 1)
-        others = ((begin, begin + letter * (len(texts[one]) + 1)) for one, begin in placed.items())
-        if all(start >= behind or end <= begin for begin, behind in others):
-            placed[column] = start
-    return dict(sorted(placed.items()))

@@ -13,11 +13,11 @@ from busplan.drawings.map.labels import (
     look_of,
     looks_of,
     map_title,
-    placed_labels,
     title_of,
     value_text,
 )
-from busplan.drawings.svg_style import style_sheet
+from busplan.forms.picture import styled
+from busplan.forms.scale import placed_labels
 from busplan.forms.svg import LINE, PHONE, drawing, inside, markup, paragraph, text_at
 
 _CELL: Final = 20
@@ -28,23 +28,13 @@ _MOST_TALL: Final = 32
 _LETTER: Final = 7
 """Width of a letter, about."""
 _GAP: Final = 12
-_STYLE: Final = """\
-{0} .cell{{stroke:#ffffff;stroke-width:1}}
-{0} .mark{{font-size:12px;font-weight:700;fill:#10151c}}
-{0} .own{{fill:none;stroke:#10151c;stroke-width:3}}
-{0} .here{{font-weight:700;fill:#1c2430}}
+STYLE: Final = """\
+.chart.map .cell{stroke:var(--paper);stroke-width:1}
+.chart.map .mark{font-size:12px;font-weight:700;fill:#10151c;stroke:none}
+.chart.map .own{fill:none;stroke:var(--ink);stroke-width:3;stroke-dasharray:none}
+.chart.map .here{font-weight:700;fill:var(--ink)}
 """
-_DARK_STYLE: Final = """\
-{0} .cell{{stroke:#12161c}}
-{0} .mark{{fill:#10151c}}
-{0} .own{{stroke:#ffffff}}
-{0} .here{{fill:#ffffff}}
-"""
-
-
-def stylesheet() -> str:
-    """CSS for light and dark backgrounds, scoped to the class of the drawing."""
-    return style_sheet(".busplan-map", light=_STYLE, dark=_DARK_STYLE)
+"""Rules of the drawing."""
 
 
 def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
@@ -61,11 +51,8 @@ def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
     inline
         If True, leave out style sheet, title and legend: the page has them.
     """
-    root = drawing(title, css="busplan-map")
+    root = drawing(title, css="chart map")
     SubElement(root, "desc").text = map_title(found)
-    if not inline:
-        SubElement(root, "style").text = stylesheet()
-        SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     looks = looks_of(found)
     y = 0 if inline else paragraph(body, title, y=8, css="head") + _GAP
@@ -73,7 +60,7 @@ def map_svg(found: TradeOff, *, title: str, inline: bool = False) -> str:
     if not inline:
         y = _legend(body, found, looks, y=y + _GAP) + _GAP
     root.set("height", str(y))
-    return markup(root)
+    return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
 def _map(body: Element, found: TradeOff, looks: Looks, *, y: int) -> int:

@@ -32,10 +32,10 @@ from busplan.drawings.timeline.period import (
     period_title,
     rest,
 )
-from busplan.drawings.timeline.svg_style import stylesheet
 from busplan.forms.blocks import figure_value
 from busplan.forms.columns import sentence_text
 from busplan.forms.numbers import figure_text
+from busplan.forms.picture import styled
 from busplan.forms.svg import LINE, PHONE, Scale, drawing, inside, markup, paragraph, text_at
 
 _BAR: Final = 18
@@ -46,6 +46,15 @@ _GUTTER_PERCENT: Final = 15
 _MOST_TALL_LANES: Final = 24
 _MOST_BARS: Final = 400
 """Most bars in the lanes of a page; with more events, a bar is a transaction."""
+STYLE: Final = """\
+.chart.timeline .over{fill:var(--bad);fill-opacity:.16}
+.chart.timeline .track{fill:var(--raised)}
+.chart.timeline .late, .chart.timeline .bad{fill:var(--bad)}
+.chart.timeline .end{stroke:var(--ink);stroke-width:1.5;stroke-dasharray:3 2}
+.chart.timeline .window{fill:none;stroke:var(--ink);stroke-width:2}
+.chart.timeline .idle{stroke:none}
+"""
+"""Rules of the drawing."""
 
 
 def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
@@ -62,11 +71,8 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     inline
         If True, leave out style sheet, verdict, subject and legend: the page has them.
     """
-    root = drawing(title, css="busplan-timeline")
+    root = drawing(title, css="chart timeline")
     SubElement(root, "desc").text = sentence_text(subject(plan))
-    if not inline:
-        SubElement(root, "style").text = stylesheet()
-        SubElement(root, "rect", {"class": "paper", "width": "100%", "height": "100%"})
     body = root if inline else inside(root, x_percent=2.5, width_percent=95.0, y=0)
     window = drawn_window(plan)
     height = 0 if inline else _above(body, plan, window, title=title) + _GAP
@@ -78,7 +84,7 @@ def timeline_svg(plan: Schedule, *, title: str, inline: bool = False) -> str:
     if not inline:
         height = _legend(body, plan, y=height + _GAP) + _GAP
     root.set("height", str(height))
-    return markup(root)
+    return markup(root) if inline else styled(markup(root), css=STYLE)
 
 
 def is_coarse(window: Schedule) -> bool:
