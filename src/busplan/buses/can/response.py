@@ -7,7 +7,7 @@ revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property, reduce
+from functools import reduce
 from itertools import count, repeat
 from math import ceil, inf
 from typing import Any, NamedTuple, TypeAlias
@@ -171,6 +171,8 @@ BELOW = 1 - 1e-9
 
 _MANY = 50
 """Senders from which on arrays are faster."""
+_FEW_POINTS = 2000
+"""Points up to which one array of all senders is faster than an array of each."""
 
 
 class TooManyStepsError(Exception):
@@ -193,6 +195,7 @@ class Arrivals:
         self.frames_us: Points = 0.0
         """One instance of each [us]."""
         self._of_jitter_us: Points = 0.0
+        self._known_rows: dict[int, Sequence[Points]] = {}
         for frames_us, period_us, jitter_us in senders:
             load = frames_us / period_us
             self.load = self.load + load
@@ -200,25 +203,35 @@ class Arrivals:
             self._of_jitter_us = self._of_jitter_us + load * jitter_us
 
     def in_window_us(self, window_us: Points) -> Points:
-        """Frames that arrive in a window of time, sum ceil((window + J) / T) C [us]."""
-        if isinstance(window_us + self._of_jitter_us, float):
-            return self._in_plain_window_us(window_us)
-        found_us: Points = 0.0
+        """Frames that arrive in a window of time, sum ceil((window + J) / T) C, added in their order [us]."""
+        is_plain = isinstance(window_us + self._of_jitter_us, float)
+        if len(self._senders) < _MANY and is_plain:
+            return reduce(lambda sum_us, one: sum_us + ceil((window_us + one[2]) / one[1]) * one[0], self._senders, 0.0)
+        if self._senders and getattr(window_us, "size", 1) < _FEW_POINTS:
+            import numpy as np
+
+            us, period_us, jitter_us = self._rows(getattr(window_us, "ndim", 0))
+            found_us: Points = np.cumsum(np.ceil((window_us + jitter_us) / period_us) * us, axis=0)[-1]
+            return float(found_us) if is_plain else found_us
+        found_us = 0.0
         for frames_us, period_us, jitter_us in self._senders:
             found_us = found_us + rounded_up((window_us + jitter_us) / period_us) * frames_us
         return found_us
 
-    @cached_property
-    def _in_plain_window_us(self) -> Callable[[Any], float]:
-        """The same of plain numbers: as the array of senders where there are many, in the same order."""
-        if len(self._senders) < _MANY:
-            return lambda window_us: reduce(
-                lambda sum_us, one: sum_us + ceil((window_us + one[2]) / one[1]) * one[0], self._senders, 0.0
-            )
-        import numpy as np
+    def _rows(self, axes: int) -> Sequence[Points]:
+        """Frames, periods and jitters, each as one array of all senders over so many axes of points."""
+        if axes not in self._known_rows:
+            import numpy as np
 
-        us, period_us, jitter_us = np.array(self._senders).T
-        return lambda window_us: float(np.cumsum(np.ceil((window_us + jitter_us) / period_us) * us)[-1])
+            columns = []
+            for column in zip(*self._senders, strict=True):
+                shape = np.broadcast_shapes((1,) * axes, *map(np.shape, column))
+                rows = np.empty((len(column), *shape))
+                for place, numbers in enumerate(column):
+                    rows[place] = numbers
+                columns.append(rows)
+            self._known_rows[axes] = columns
+        return self._known_rows[axes]
 
     def bound_us(self, before_us: Points, *, bit_us: Points = 0.0) -> Points:
         """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us].
