@@ -280,6 +280,17 @@ def choose(condition: Number, yes: Number, no: Number) -> Number:
     return np.where(condition, yes, no)
 
 
+def is_everywhere(condition: Number) -> bool:
+    """Whether a condition holds, at each point of an array.
+
+    Examples
+    --------
+    >>> is_everywhere(2 > 3)
+    False
+    """
+    return bool(getattr(condition, "all", lambda: condition)())
+
+
 def square_root(number: Number) -> Number:
     """The square root of a number that is 0 or more, rounded alike for numbers of any sort.
 

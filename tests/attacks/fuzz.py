@@ -49,6 +49,9 @@ LONGEST_S: Final = 5.0
 """Of what runs no circle, as the memory; a circle that is asked for takes what it takes, up to a hang."""
 HANG_S: Final = 10.0
 """Of processor time, so that a busy machine makes no hang."""
+CIRCLES_HANG_S: Final = 120.0
+"""The same of a call that asks for circles: each takes a while."""
+ASKS_FOR_CIRCLES: Final = frozenset({"circle-test", "--circle", "--circle-steps", "--max-circles"})
 MOST_MB: Final = 300.0
 MOST_BYTES: Final = 4 << 30
 """Of the whole run, so that a call that takes them fails, and not the machine."""
@@ -267,7 +270,7 @@ def call(*arguments: str) -> Call:
     start = time.process_time()
     try:
         with (
-            alarm(HANG_S),
+            alarm(CIRCLES_HANG_S if asks_for_circles(arguments) else HANG_S),
             mock.patch.multiple(sys, argv=["busplan", *arguments], stdin=StringIO(), stdout=out, stderr=err),
         ):
             run()
@@ -282,6 +285,11 @@ def call(*arguments: str) -> Call:
         stream.flush()
     written, said = (stream.buffer.getvalue() for stream in (out, err))
     return Call(arguments, code, written, said.decode(), seconds, grown_mb)
+
+
+def asks_for_circles(arguments: tuple[str, ...]) -> bool:
+    """Whether a call asks for circles."""
+    return not ASKS_FOR_CIRCLES.isdisjoint(arguments)
 
 
 @contextmanager
@@ -392,7 +400,7 @@ def broken_promises(done: Call, form: str) -> Iterator[str]:
         yield done.err
     if done.code == 2 and not done.err:
         yield "exit code 2 without a word"
-    is_asked = not {"circle-test", "--circle", "--circle-steps", "--max-circles"}.isdisjoint(done.arguments)
+    is_asked = asks_for_circles(done.arguments)
     if done.seconds > LONGEST_S and not is_asked:
         yield f"takes {done.seconds:.1f} s"
     if done.grown_mb > MOST_MB and not is_asked:
@@ -587,6 +595,7 @@ def main() -> int:
     parser.add_argument("profiles", type=int, help="how many profiles")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--calls", type=int, default=6, help="calls of each profile")
+    parser.add_argument("--stories", type=int, default=3, help="one profile in so many is asked of every command")
     parser.add_argument("--quiet", action="store_true", help="failures without their profiles")
     options = parser.parse_args()
     counts, kinds, failures = Counter[str](), kind_names(), 0
@@ -602,7 +611,7 @@ def main() -> int:
                 kinds[number % len(kinds)],
                 asked=rng.sample(every, options.calls),
                 counts=counts,
-                story=number % 3 == 0,
+                story=number % options.stories == 0,
             ):
                 failures += 1
                 print(f"\n{options.seed} {number}: busplan {' '.join(one.arguments)}\n{one.message.strip()}")  # noqa: T201

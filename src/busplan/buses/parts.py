@@ -64,6 +64,8 @@ class Limit(NamedTuple):
     """A cycle fits without it, but nothing is advised that breaks it."""
     says: Callable[[Network], str] | None = None
     """What is said of a broken one, where more than its value is: instead of `over`."""
+    breaks: Callable[[Network], Number] | None = None
+    """Whether a network breaks it, where that is sooner told than its value; of one without doubt."""
 
     is_of_period: bool = False
     """The period alone breaks it: a plan takes no period that does."""
@@ -99,6 +101,8 @@ class Limit(NamedTuple):
 
     def is_broken(self, network: Network) -> Number:
         """Whether a network breaks it, whatever is not known: a truth, or an array of them."""
+        if self.breaks is not None:
+            return self.breaks(network)
         return self.least_value(network) > self.most(network) * (1 + FIT_ROUNDING)
 
     def period_us(self, network: Network) -> Number:

@@ -55,7 +55,7 @@ def messages(draw: st.DrawFn, most_load: float = 0.95) -> list[Sender]:
 
 def arrived_us(each: Sequence[Sender], span_us: float) -> float:
     """Frames that arrive in a span of time [us]."""
-    return sum(ceil((span_us + one.jitter_us) / one.period_us) * one.frames_us for one in each)
+    return sum(float(ceil((span_us + one.jitter_us) / one.period_us) * one.frames_us) for one in each)
 
 
 def analysed(each: Sequence[Sender], place: int, *, bit_us: float) -> Response:

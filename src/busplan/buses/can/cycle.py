@@ -1,6 +1,6 @@
 """The SYNC cycle: SYNC, feedback, the host, commands, and what other messages make it wait for."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property, lru_cache, partial, reduce
 from itertools import chain, islice
 from math import inf
@@ -10,18 +10,16 @@ from busplan.buses.can.constants import EXPECTED_STUFFING
 from busplan.buses.can.equations import bit_us, frame_us, payload_us
 from busplan.buses.can.response import Response
 from busplan.buses.can.streams import Stream, frame_sizes, streams
-from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import is_higher, last_identifier, response, waits
+from busplan.buses.can.traffic import LOOP, NAMES, SYNC, Message, Pdos, Sent, Traffic, traffic_of, without_times
+from busplan.buses.can.waiting import is_higher, last_cyclic, response, waits
 from busplan.buses.cycle import BusCycle, BusEvent, BusLatency, Doubt, LeftOut, Term
 from busplan.buses.network import Group, Network
-from busplan.elementwise import FIT_ROUNDING, Number, choose, larger, named, plain, pointwise, rounded_up, total
+from busplan.elementwise import FIT_ROUNDING, Number, choose, is_off, larger, named, plain, rounded_up, total
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
 TimingModelName = Literal["worst-stuffing", "no-stuffing"]
 WORST: Final[TimingModelName] = "worst-stuffing"
 NONE: Final[TimingModelName] = "no-stuffing"
-_MOST_ANSWERS: Final = 1024
-"""Responses that a cycle remembers: those of the points of a grid one after the other."""
 _RESTS_ON: Final = {"cycle_host_us": "bus.host_us"}
 """The key that a term comes from alone."""
 
@@ -44,13 +42,8 @@ class CanCycle(BusCycle):
         return traffic_of(self.network)
 
     @cached_property
-    def _numbers(self) -> tuple[Number, ...]:
-        return self.traffic.numbers()
-
-    @cached_property
-    def _answer(self) -> "Callable[..., _Answer]":
-        """The stream at a place and its response, of plain numbers; each is found once."""
-        return lru_cache(maxsize=_MOST_ANSWERS)(partial(_answer, self.traffic, self.is_stuffed))
+    def _sent(self) -> Sent:
+        return Sent(self.traffic)
 
     @cached_property
     def _wire(self) -> dict[str, Number]:
@@ -113,13 +106,20 @@ class CanCycle(BusCycle):
         extra_us
             By how much the rest takes longer [us].
         """
+        return self._own_waits_us if is_off(extra_us) else self._waits_beside_us(self._on_bus_us + extra_us)
+
+    @cached_property
+    def _own_waits_us(self) -> tuple[Number, Number]:
+        """The same where nothing takes longer [us]."""
+        return self._waits_beside_us(self._on_bus_us + 0.0)
+
+    def _waits_beside_us(self, others_us: Number) -> tuple[Number, Number]:
         if not self._messages:
             return 0.0, 0.0
-        others_us = named(self._on_bus_us + extra_us, "others_us", "others")
+        others_us = named(others_us, "others_us", "others")
 
         def found(key: str, words: str) -> Number:
-            own = partial(_waits, self.traffic, self.is_stuffed, key)
-            return pointwise(own, others_us, *self._numbers, words=words)
+            return self._sent.of(partial(_waits, self.is_stuffed, key), others_us, words=words)
 
         words = "w = others + 3 B + sum of ceil((w + J + bit) / T) C, the smallest one, or a bound of it at high load"
         lasts_us = named(found("lasts_us", words), "busy_us", "w")
@@ -137,9 +137,8 @@ class CanCycle(BusCycle):
     @cached_property
     def _last(self) -> Number:
         """The largest identifier of SYNC and all PDOs."""
-        traffic = without_times(self.traffic)
-        words = "the largest identifier of SYNC and all PDOs"
-        return named(pointwise(partial(_last, traffic), *traffic.numbers(), words=words), "last_identifier", "id_last")
+        sent, words = Sent(without_times(self.traffic)), "the largest identifier of SYNC and all PDOs"
+        return named(sent.of(_last, words=words), "last_identifier", "id_last")
 
     def computed_terms(self) -> tuple[Term, ...]:
         """The cycle in the order of the wire."""
@@ -182,7 +181,7 @@ class CanCycle(BusCycle):
         found = waits(self.traffic, plain(self._on_bus_us), is_stuffed=self.is_stuffed)
         blocks = (
             BusEvent("blocking", "cycle_blocking_us", one.frame_us, f"message {one.name} of a lower priority")
-            for one in found.blocks
+            for one in found.blocks()
         )
         yield from islice(blocks, 1)
         yield BusEvent("sync", "cycle_sync_us", plain(self.sync_us), "SYNC")
@@ -271,7 +270,7 @@ class CanCycle(BusCycle):
         """Figures of the stream at a place among those that end a PDO or a message."""
 
         def found(key: str, words: str) -> Number:
-            return pointwise(partial(_phase, self._answer, place, key), *self._numbers, words=words)
+            return self._sent.of_points(partial(_phase, self.is_stuffed, place, key), words=words)
 
         jitter_us = found("jitter_us", f"how late {name} may be queued")
         frame_us_ = found("frame_us", f"the last frame of {name}")
@@ -314,32 +313,29 @@ def _execution_us(group: Group, kind: TransactionKind, uncertainties: int) -> Nu
     return slowest_us + uncertainties * doubt_us
 
 
-def _waits(traffic: Traffic, is_stuffed: bool, key: str, others_us: float, *numbers: float) -> float:
+def _waits(is_stuffed: bool, key: str, traffic: Traffic, others_us: Number) -> Number:
     """One figure of what a cycle waits for."""
-    found: float = getattr(waits(traffic.with_numbers(*numbers), others_us, is_stuffed=is_stuffed), key)
+    found: Number = getattr(waits(traffic, others_us, is_stuffed=is_stuffed), key)
     return found
 
 
-def _last(traffic: Traffic, *numbers: float) -> float:
-    return last_identifier(streams(traffic.with_numbers(*numbers), is_stuffed=True))
-
-
-def _phase(answer: "Callable[..., _Answer]", place: int, key: str, *numbers: float) -> float:
-    """One figure of the response of the stream at a place; infinite where it does not exist."""
-    own, worst = answer(place, *numbers)
-    if hasattr(own, key):
-        said: float = getattr(own, key)
-        return said
-    found: float = inf if worst is None else getattr(worst, key)
+def _last(traffic: Traffic) -> Number:
+    found: Number = last_cyclic(streams(traffic, is_stuffed=True))
     return found
 
 
-_Answer = tuple[Stream, Response | None]
+def _phase(is_stuffed: bool, place: int, key: str, traffic: Traffic) -> float:
+    """One figure of the stream at a place among those that end a PDO or a message, and of its response.
+
+    It is infinite where it does not exist.
+    """
+    own, worst = _answer(traffic, place, is_stuffed=is_stuffed)
+    said: float = getattr(own if hasattr(own, key) else worst, key, inf)
+    return said
 
 
-def _answer(traffic: Traffic, is_stuffed: bool, place: int, *numbers: float) -> _Answer:
+@lru_cache(maxsize=1024)
+def _answer(traffic: Traffic, place: int, *, is_stuffed: bool) -> tuple[Stream, Response | None]:
     """The stream at a place among those that end a PDO or a message, with its response."""
-    plain_traffic = traffic.with_numbers(*numbers)
-    ends = (one for one in streams(plain_traffic, is_stuffed=is_stuffed) if one.is_end)
-    own = next(islice(ends, place, None))
-    return own, response(own, plain_traffic, is_stuffed=is_stuffed)
+    own = next(islice((one for one in streams(traffic, is_stuffed=is_stuffed) if one.is_end), place, None))
+    return own, response(own, traffic, is_stuffed=is_stuffed)

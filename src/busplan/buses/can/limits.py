@@ -1,19 +1,20 @@
 """What a CAN bus and the CANopen identifiers forbid, the load of the bus, and deadlines."""
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import partial, reduce
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from busplan.buses.can.constants import FRAME_BYTES, MAX_IDENTIFIER, MOST_NODES, MOST_PDOS, MOST_STEPS, SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
-from busplan.buses.can.streams import Stream, collisions, streams
-from busplan.buses.can.traffic import Traffic, traffic_of, without_times
-from busplan.buses.can.waiting import messages
+from busplan.buses.can.response import TooManyStepsError
+from busplan.buses.can.streams import Stream, collisions, identifiers_twice, last_identifier, streams
+from busplan.buses.can.traffic import Sent, Traffic, traffic_of, without_times
+from busplan.buses.can.waiting import Messages, messages
 from busplan.buses.network import Network
 from busplan.buses.node_time import NODE_LIMIT
 from busplan.buses.parts import Limit
-from busplan.elementwise import Number, larger, plain, pointwise, total
+from busplan.elementwise import Number, is_everywhere, larger, plain, pointwise, total
 from busplan.sections.base import MAX_TIME_US
 
 
@@ -26,7 +27,7 @@ def _late_streams(traffic: Traffic) -> Iterator[tuple[Stream, float]]:
     """Messages that miss their deadline, each with its response over its deadline."""
     each = messages(traffic, is_stuffed=True)
     for one in streams(traffic, is_stuffed=True):
-        if one.is_message and (share := each.deadline_share(one)) > 1:
+        if one.is_message and (share := plain(each.deadline_share(one))) > 1:
             yield one, share
 
 
@@ -52,12 +53,12 @@ def _late(one: Stream, share: float, traffic: Traffic) -> str:
     return f"it has no worst-case response time, for with it the bus has a load of {load:.1%}{steps}"
 
 
-def _slowest(traffic: Traffic, *numbers: float) -> float:
-    """The largest response over deadline of any message [1]."""
-    each, found = messages(traffic.with_numbers(*numbers), is_stuffed=True), 0.0
+def _slowest(traffic: Traffic) -> float:
+    """The largest response over deadline of any message of plain numbers [1]."""
+    each, found = messages(traffic, is_stuffed=True), 0.0
     # The lowest priorities first: one of them has no response time, or none has.
     for one in each.by_priority():
-        found = max(found, each.deadline_share(one))
+        found = max(found, plain(each.deadline_share(one)))
         if found == inf:
             break
     return found
@@ -66,8 +67,75 @@ def _slowest(traffic: Traffic, *numbers: float) -> float:
 def _deadline(network: Network) -> Number:
     if not network.profile.message:
         return 0.0
-    traffic = traffic_of(network)
-    return pointwise(partial(_slowest, traffic), *traffic.numbers(), words="busy periods of all messages")
+    return Sent(traffic_of(network)).of_points(_slowest, words=_DEADLINE_WORDS)
+
+
+def _largest(traffic: Traffic, share: Callable[[Messages, Stream], Number]) -> Number:
+    each = messages(traffic, is_stuffed=True)
+    return reduce(larger, (share(each, one) for one in each.by_priority()))
+
+
+def _is_late(network: Network) -> Number:
+    """Whether any message misses its deadline: exact response times are found only where bounds of them do not tell."""
+    if not network.profile.message:
+        return False
+    sent = Sent(traffic_of(network))
+    least = sent.of(lambda traffic: _largest(traffic, Messages.least_share), words=_DEADLINE_WORDS)
+    most = sent.of(lambda traffic: _largest(traffic, Messages.bound_share), words=_DEADLINE_WORDS)
+
+    def is_late(at: float, least: float, most: float) -> bool:
+        return bool(_has_late(sent.at(at))) if least <= 1 < most else least > 1
+
+    if sent.is_ordered and not isinstance(least + most, float):
+        return _late_points(sent.traffic, least, most)
+    return pointwise(is_late, sent.place, least, most, words=_DEADLINE_WORDS)
+
+
+def _late_points(traffic: Traffic, least: Any, most: Any) -> Number:
+    """Whether any message misses its deadline at each point of arrays, of which bounds of it are known."""
+    import numpy as np
+
+    numbers: tuple[Any, ...] = traffic.numbers()
+    shape = np.broadcast_shapes(np.shape(least), np.shape(most), *map(np.shape, numbers))
+    least, most = (np.broadcast_to(one, shape).ravel() for one in (least, most))
+    columns = [one if isinstance(one, int | float) else np.broadcast_to(one, shape).ravel() for one in numbers]
+    late = least > 1
+    asked = np.flatnonzero((least <= 1) & (most > 1))
+    # Points of like loads take like numbers of steps.
+    asked = asked[np.argsort(most[asked])]
+    waiting = [asked[first : first + _POINTS_AT_ONCE] for first in range(0, len(asked), _POINTS_AT_ONCE)]
+    while waiting:
+        some = waiting.pop()
+        at = some if len(some) > 1 else some[0]
+        row = (one if isinstance(one, int | float) else one[at] for one in columns)
+        try:
+            late[some] = _has_late(traffic.with_numbers(*map(_as_plain, row)))
+        except TooManyStepsError:
+            waiting += np.array_split(some, 2)
+    found: Number = late.reshape(shape)
+    return found
+
+
+def _as_plain(number: Any) -> Number:
+    """One point of an array as a plain number."""
+    found: Number = getattr(number, "item", lambda: number)() if getattr(number, "ndim", 0) == 0 else number
+    return found
+
+
+_POINTS_AT_ONCE: Final = 4096
+"""Points whose response times are found together."""
+
+
+def _has_late(traffic: Traffic) -> Number:
+    each, found = messages(traffic, is_stuffed=True), False
+    for one in each.by_priority():
+        found = found | (each.deadline_share(one) > 1)
+        if is_everywhere(found):
+            break
+    return found
+
+
+_DEADLINE_WORDS: Final = "busy periods of all messages"
 
 
 def shared_identifiers(traffic: Traffic) -> tuple[tuple[str, str], ...]:
@@ -99,23 +167,17 @@ def _from(first: int, shared: int) -> str:
     return f"{shared} identifiers from {first:#x}" if shared > 1 else f"the identifier {first:#x}"
 
 
-def _shared(traffic: Traffic, *numbers: float) -> float:
-    each = streams(traffic.with_numbers(*numbers), is_stuffed=True)
-    return sum(shared for *_, shared in collisions(each))
-
-
 def _collisions(network: Network) -> Number:
-    traffic = without_times(traffic_of(network))
-    return pointwise(partial(_shared, traffic), *traffic.numbers(), words="identifiers that stand twice")
-
-
-def _last(traffic: Traffic, *numbers: float) -> float:
-    return max(one.last for one in streams(traffic.with_numbers(*numbers), is_stuffed=True))
+    return _of_identifiers(network, identifiers_twice, words="identifiers that stand twice")
 
 
 def _largest_identifier(network: Network) -> Number:
-    traffic = without_times(traffic_of(network))
-    return pointwise(partial(_last, traffic), *traffic.numbers(), words="the largest identifier")
+    return _of_identifiers(network, last_identifier, words="the largest identifier")
+
+
+def _of_identifiers(network: Network, function: Callable[[Sequence[Stream]], Number], *, words: str) -> Number:
+    sent = Sent(without_times(traffic_of(network)))
+    return sent.of(lambda traffic: function(streams(traffic, is_stuffed=True)), words=words)
 
 
 def _most_identifier(network: Network) -> Number:
@@ -218,6 +280,7 @@ LIMITS: Final = (
         has_rule=True,
         is_slow=True,
         says=lambda network: _all_late(traffic_of(network)),
-        kept_from_us=partial(_kept_from_us, lambda network: _deadline(network) > 1),
+        breaks=_is_late,
+        kept_from_us=partial(_kept_from_us, _is_late),
     ),
 )

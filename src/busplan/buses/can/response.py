@@ -7,39 +7,43 @@ revisited and revised, Real-Time Systems 35, 2007, equations (4)-(12).
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
+from functools import reduce
 from itertools import count, repeat
 from math import ceil, inf
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from busplan.buses.can.constants import MOST_STEPS, SATURATED
+from busplan.elementwise import choose, is_everywhere, larger, rounded_up, smaller
+
+Points: TypeAlias = Any
+"""A plain number, or an array with one for each point; never a traced one."""
 
 
 class Sender(NamedTuple):
-    """Frames that one identifier, or several of one kind, put on the bus."""
+    """Frames that one identifier, or several of one kind, put on the bus. The numbers may be arrays."""
 
-    frames_us: float
+    frames_us: Points
     """All frames of one instance, in the worst case [us]."""
-    period_us: float
-    jitter_us: float = 0.0
+    period_us: Points
+    jitter_us: Points = 0.0
     """How late an instance may be queued; negative where the first comes so much behind the start [us]."""
 
     @property
-    def load(self) -> float:
+    def load(self) -> Points:
         """Share of the bus, 0..1 [1]."""
         return self.frames_us / self.period_us
 
 
 class Response(NamedTuple):
-    """The worst case of one message: R = J + B + I + q (C - T) + C."""
+    """The worst case of one message: R = J + B + I + q (C - T) + C. The numbers may be arrays."""
 
-    blocking_us: float
+    blocking_us: Points
     """B, the longest frame of a lower priority [us]."""
-    instance: int
+    instance: Points
     """q of the worst instance in the busy period, from 0 [1]."""
-    interference_us: float
+    interference_us: Points
     """I, frames of higher priorities that go before it [us]."""
-    us: float
+    us: Points
     """R [us]."""
 
 
@@ -78,35 +82,55 @@ def worst_response(
     >>> worst_response(Sender(1000, 3500), [Sender(1000, 2500), Sender(1000, 3500)], blocking_us=0, bit_us=8)
     Response(blocking_us=0, instance=1, interference_us=5000.0, us=3500.0)
     """
+    try:
+        return worst_instance(own, higher, blocking_us=blocking_us, bit_us=bit_us, first_us=first_us)
+    except TooManyStepsError:
+        return None
+
+
+def worst_instance(
+    own: Sender, higher: Sequence[Sender], *, blocking_us: Points, bit_us: Points, first_us: Points = 0.0
+) -> Response | None:
+    """As `worst_response`, of arrays, too: R is infinite at points that have none, and None says that none has one.
+
+    Raises
+    ------
+    TooManyStepsError
+        It takes over `MOST_STEPS` to find, at all points together.
+    """
     before = Arrivals(higher)
-    if before.load + own.load >= SATURATED:
+    is_over = before.load + own.load >= SATURATED
+    if is_everywhere(is_over):
         return None
     steps, ahead_us = iter(range(int(MOST_STEPS))), blocking_us + first_us
-    bound_us, per_us = before.bound_us(ahead_us, bit_us=bit_us), own.frames_us / (1 - before.load)
-    worst, waits_us = None, 0.0
-    try:
-        for instance in count():
-            late_us = own.jitter_us + own.frames_us - instance * own.period_us
-            if worst and late_us + bound_us + instance * per_us <= worst.us:
-                break  # the bound falls from one instance to the next
+    bound_us = before.bound_us(ahead_us, bit_us=bit_us)
+    per_us = own.frames_us / (1 - choose(is_over, 0.0, before.load))
+    worst, waits_us = Response(blocking_us, 0, 0.0, choose(is_over, inf, 0.0)), 0.0
+    for instance in count():
+        late_us = own.jitter_us + own.frames_us - instance * own.period_us
+        if instance:
+            # The bound falls from one instance to the next.
+            is_over = is_over | (late_us + bound_us + instance * per_us <= worst.us)
+            if is_everywhere(is_over):
+                return worst
             if instance == 1:
                 from_us = ahead_us + own.frames_us + before.frames_us
-                busy_us = Arrivals((own, *higher)).settled_us(ahead_us, steps, from_us=from_us)
-            if instance and instance * own.period_us >= busy_us + own.jitter_us:
-                break
-            # It waits at least as long as the instance before it, and for that one.
-            own_us = instance * own.frames_us
-            waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us)
-            if worst is None or waits_us + late_us > worst.us:
-                worst = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
-    except _TooManyStepsError:
-        return None
-    return worst
+                busy_us = Arrivals((own, *higher)).settled_us(ahead_us, steps, from_us=from_us, is_settled=is_over)
+            is_over = is_over | (instance * own.period_us >= busy_us + own.jitter_us)
+            if is_everywhere(is_over):
+                return worst
+        # It waits at least as long as the instance before it, and for that one.
+        own_us = instance * own.frames_us
+        waits_us = before.settled_us(ahead_us + own_us, steps, bit_us=bit_us, from_us=waits_us, is_settled=is_over)
+        found = Response(blocking_us, instance, waits_us - blocking_us - own_us, waits_us + late_us)
+        is_worse = choose(is_over, False, found.us > worst.us if instance else True)
+        worst = Response(*(choose(is_worse, new, old) for new, old in zip(found, worst, strict=True)))
+    raise AssertionError
 
 
 def settled_us(
-    others_us: float, senders: Sequence[Sender], *, more_us: Callable[[float], float] = lambda _: 0.0
-) -> float:
+    others_us: Points, senders: Sequence[Sender], *, more_us: Callable[[Points], Points] = lambda _: 0.0
+) -> Points:
     """A span of time that ends when everything that arrives in it has been sent [us].
 
     Parameters
@@ -130,20 +154,28 @@ def settled_us(
     1200.0
     """
     arrivals = Arrivals(senders)
-    if arrivals.load > _NEARLY_FULL:
-        return arrivals.bound_us(others_us + more_us(inf))
-    return arrivals.settled_us(others_us, repeat(0), more_us=more_us)
+    is_full = arrivals.load > _NEARLY_FULL
+    if is_full is False:
+        return arrivals.settled_us(others_us, repeat(0), more_us=more_us)
+    bound_us = arrivals.bound_us(others_us + more_us(inf))
+    if is_full is True:
+        return bound_us
+    return choose(is_full, bound_us, arrivals.settled_us(others_us, repeat(0), more_us=more_us, is_settled=is_full))
 
 
 _NEARLY_FULL = 0.99
 """Load above which the smallest span takes too many steps to find."""
-_BELOW = 1 - 1e-9
+BELOW = 1 - 1e-9
 """A bound from below is taken so much lower, so that rounding does not put it above what it bounds."""
+
+
 _MANY = 50
 """Senders from which on arrays are faster."""
+_FEW_POINTS = 2000
+"""Points up to which one array of all senders is faster than an array of each."""
 
 
-class _TooManyStepsError(Exception):
+class TooManyStepsError(Exception):
     """A span takes too many steps to find."""
 
 
@@ -158,56 +190,78 @@ class Arrivals:
 
     def __init__(self, senders: Sequence[Sender]) -> None:
         self._senders = senders
-        self.load = 0.0
+        self.load: Points = 0.0
         """Share of the bus, 0..1 [1]."""
-        self.frames_us = 0.0
+        self.frames_us: Points = 0.0
         """One instance of each [us]."""
-        self._of_jitter_us = 0.0
+        self._of_jitter_us: Points = 0.0
+        self._known_rows: dict[int, Sequence[Points]] = {}
         for frames_us, period_us, jitter_us in senders:
             load = frames_us / period_us
-            self.load += load
-            self.frames_us += frames_us
-            self._of_jitter_us += load * jitter_us
+            self.load = self.load + load
+            self.frames_us = self.frames_us + frames_us
+            self._of_jitter_us = self._of_jitter_us + load * jitter_us
 
-    @cached_property
-    def in_window_us(self) -> Callable[[float], float]:
-        """Frames that arrive in a window of time, sum ceil((window + J) / T) C [us]."""
-        if len(self._senders) < _MANY:
-            return lambda window_us: sum(
-                ceil((window_us + jitter_us) / period_us) * us for us, period_us, jitter_us in self._senders
-            )
-        import numpy as np
+    def in_window_us(self, window_us: Points) -> Points:
+        """Frames that arrive in a window of time, sum ceil((window + J) / T) C, added in their order [us]."""
+        is_plain = isinstance(window_us + self._of_jitter_us, float)
+        if len(self._senders) < _MANY and is_plain:
+            return reduce(lambda sum_us, one: sum_us + ceil((window_us + one[2]) / one[1]) * one[0], self._senders, 0.0)
+        if self._senders and getattr(window_us, "size", 1) < _FEW_POINTS:
+            import numpy as np
 
-        us, period_us, jitter_us = np.array(self._senders).T
-        return lambda window_us: float(np.ceil((window_us + jitter_us) / period_us) @ us)
+            us, period_us, jitter_us = self._rows(getattr(window_us, "ndim", 0))
+            found_us: Points = np.cumsum(np.ceil((window_us + jitter_us) / period_us) * us, axis=0)[-1]
+            return float(found_us) if is_plain else found_us
+        found_us = 0.0
+        for frames_us, period_us, jitter_us in self._senders:
+            found_us = found_us + rounded_up((window_us + jitter_us) / period_us) * frames_us
+        return found_us
 
-    def bound_us(self, before_us: float, *, bit_us: float = 0.0) -> float:
+    def _rows(self, axes: int) -> Sequence[Points]:
+        """Frames, periods and jitters, each as one array of all senders over so many axes of points."""
+        if axes not in self._known_rows:
+            import numpy as np
+
+            columns = []
+            for column in zip(*self._senders, strict=True):
+                shape = np.broadcast_shapes((1,) * axes, *map(np.shape, column))
+                rows = np.empty((len(column), *shape))
+                for place, numbers in enumerate(column):
+                    rows[place] = numbers
+                columns.append(rows)
+            self._known_rows[axes] = columns
+        return self._known_rows[axes]
+
+    def bound_us(self, before_us: Points, *, bit_us: Points = 0.0) -> Points:
         """A span that is no shorter than the smallest w = before + sum ceil((w + J + bit) / T) C [us].
 
         ceil(x) is less than x + 1, so w <= (before + sum (1 + (J + bit) / T) C) / (1 - load).
         """
         most_us = before_us + self.frames_us + self._of_jitter_us + self.load * bit_us
-        return most_us / (1 - min(self.load, SATURATED))
+        return most_us / (1 - smaller(self.load, SATURATED))
 
     def settled_us(
         self,
-        before_us: float,
+        before_us: Points,
         steps: Iterable[int],
         *,
-        bit_us: float = 0.0,
-        from_us: float = 0.0,
-        more_us: Callable[[float], float] = lambda _: 0.0,
-    ) -> float:
+        bit_us: Points = 0.0,
+        from_us: Points = 0.0,
+        more_us: Callable[[Points], Points] = lambda _: 0.0,
+        is_settled: Points = False,
+    ) -> Points:
         """The smallest w = before + more(w) + sum ceil((w + J + bit) / T) C that is no less than `from_us` [us].
 
-        The load is below 1; `steps` are as many as may be taken.
+        The load is below 1, but for the points of an array that are settled; `steps` are as many as may be taken.
         """
         # ceil(x) is no less than x: no solution lies below that of the sum without rounding.
-        least_us = (before_us + self._of_jitter_us + self.load * bit_us) / (1 - self.load)
-        span_us = max(from_us, before_us, least_us * _BELOW)
+        least_us = (before_us + self._of_jitter_us + self.load * bit_us) / (1 - choose(is_settled, 0.0, self.load))
+        span_us = larger(larger(from_us, before_us), least_us * BELOW)
         for _ in steps:
             further_us = before_us + more_us(span_us) + self.in_window_us(span_us + bit_us)
-            if further_us <= span_us:
+            is_end = further_us <= span_us
+            if is_everywhere(is_end | is_settled):
                 return span_us
-            span_us = further_us
-        raise _TooManyStepsError
+            span_us = larger(further_us, span_us)
+        raise TooManyStepsError

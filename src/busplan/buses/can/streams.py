@@ -1,39 +1,41 @@
 """Every frame of a network with its identifiers, and which of them collide."""
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
-from itertools import chain, islice, repeat
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache, reduce
+from itertools import chain, combinations, repeat
+from typing import Any, Final, NamedTuple, TypeVar
 
 from busplan.buses.can.constants import FRAME_BYTES, MOST_PDOS, PDO_STEP
 from busplan.buses.can.equations import frame_us
-from busplan.buses.can.response import Sender
+from busplan.buses.can.response import Points, Sender
 from busplan.buses.can.traffic import FOLLOWS, SYNC, Pdos, Traffic
-from busplan.elementwise import Number, plain
+from busplan.elementwise import choose, larger, plain, rounded_up, smaller, total
+
+Found = TypeVar("Found")
 
 
 class Stream(NamedTuple):
-    """Frames of one sort, with identifiers one behind the other. Plain numbers."""
+    """Frames of one sort, with identifiers one behind the other. What orders them is plain."""
 
     name: str
     group: str
     block: int
     """Identifier from which on the first group has them: a message in a block that grows stays behind it."""
-    first: int
-    identifiers: int
+    first: Points
+    identifiers: Points
     """How many identifiers; each sends once in a period [1]."""
-    data_bytes: int
-    frame_us: float
-    period_us: float
-    jitter_us: float
-    deadline_us: float
+    data_bytes: Points
+    frame_us: Points
+    period_us: Points
+    jitter_us: Points
+    deadline_us: Points
     is_message: bool = False
     is_end: bool = True
     """Whether the PDO, or the message, is complete with it."""
 
     @property
-    def last(self) -> int:
+    def last(self) -> Points:
         """The last identifier."""
         return self.first + self.identifiers - 1
 
@@ -42,23 +44,41 @@ class Stream(NamedTuple):
         """What it is called."""
         return f"{self.group} {self.name}" if self.group else self.name
 
-    def sender(self, count: int | None = None) -> Sender:
+    def sender(self, count: Points | None = None) -> Sender:
         """Its frames, or some of them, as a source."""
         return Sender((self.identifiers if count is None else count) * self.frame_us, self.period_us, self.jitter_us)
 
     def goes_before(self, other: "Stream") -> bool:
-        """Whether its frames win the arbitration against the last frame of another."""
-        return (self.block if other.is_message else self.first) <= other.last
+        """Whether its frames win the arbitration against the last frame of another; of plain numbers."""
+        return bool((self.block if other.is_message else self.first) <= other.last)
 
 
-@lru_cache(maxsize=256)
+def remembered(*, maxsize: int) -> "Callable[[Callable[..., Found]], Callable[..., Found]]":
+    """Remember what a function of traffic gives for plain numbers; arrays are computed each time."""
+
+    def of(function: Callable[..., Found]) -> Callable[..., Found]:
+        known = lru_cache(maxsize=maxsize)(function)
+
+        def ask(traffic: Traffic, *others: Any, is_stuffed: bool) -> Found:
+            try:
+                hash((traffic, others))
+            except TypeError:
+                return function(traffic, *others, is_stuffed=is_stuffed)
+            return known(traffic, *others, is_stuffed=is_stuffed)
+
+        return ask
+
+    return of
+
+
+@remembered(maxsize=256)
 def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
-    """Every stream of a network of plain numbers: SYNC, feedback, command, and other messages.
+    """Every stream of a network: SYNC, feedback, command, and other messages.
 
     Parameters
     ----------
     traffic
-        What it sends, in plain numbers.
+        What it sends, as `Sent.of` gives it.
     is_stuffed
         Whether the stuff bits of the worst case are counted.
     """
@@ -66,45 +86,62 @@ def streams(traffic: Traffic, *, is_stuffed: bool) -> tuple[Stream, ...]:
 
 
 def _streams(traffic: Traffic, is_stuffed: bool) -> Iterator[Stream]:
-    def wire_us(data_bytes: float) -> float:
-        return plain(
-            frame_us(
-                data_bytes,
-                identifier_bits=traffic.identifier_bits,
-                bit_rate_kbit_s=traffic.bit_rate_kbit_s,
-                is_stuffed=is_stuffed,
-            )
+    def sent(name: str, block: int, size: Points, **more: Any) -> Stream:
+        us = frame_us(
+            size,
+            identifier_bits=traffic.identifier_bits,
+            bit_rate_kbit_s=traffic.bit_rate_kbit_s,
+            is_stuffed=is_stuffed,
+        )
+        own: dict[str, Any] = {"period_us": traffic.period_us, "jitter_us": 0.0, "deadline_us": traffic.period_us}
+        return Stream(
+            name,
+            **{"group": "", "first": block, "identifiers": 1, **own, **more},
+            block=block,
+            data_bytes=size,
+            frame_us=us,
         )
 
-    def sent(name: str, first: int, size: int) -> Stream:
-        period_us = plain(traffic.period_us)
-        return Stream(name, "", first, first, 1, size, wire_us(size), period_us, 0.0, period_us)
-
-    yield sent(SYNC, _int(traffic.sync_identifier), _int(traffic.sync_bytes))
+    yield sent(SYNC, int(plain(traffic.sync_identifier)), _whole(traffic.sync_bytes))
     block = {"read": FOLLOWS, "write": FOLLOWS}
-    free = dict(block)
+    free: dict[str, Points] = dict(block)
     for one in traffic.pdos:
-        said, count = _int(one.identifier), _int(one.pdos)
+        said, count = int(plain(one.identifier)), _whole(one.pdos)
         first = free[one.kind] if said == FOLLOWS else said
         if said != FOLLOWS:
             block[one.kind] = said
         free[one.kind] = first + count
-        sizes = tuple(islice(frame_sizes(one), _MOST_FRAMES))
-        for number, size in enumerate(sizes):
+        frames = _most_frames(one)
+        for number in range(frames):
             step = number * int(PDO_STEP)
-            own = sent(one.name, first + step, size)
-            yield own._replace(
-                group=one.group, block=block[one.kind] + step, identifiers=count, is_end=number == len(sizes) - 1
+            left_bytes = _whole(one.payload_bytes) - number * int(FRAME_BYTES)
+            own = sent(
+                one.name,
+                block[one.kind] + step,
+                larger(smaller(left_bytes, int(FRAME_BYTES)), 0),
+                group=one.group,
+                first=first + step,
+                identifiers=count,
+                is_end=number == frames - 1,
             )
+            is_there = left_bytes > 0  # not at every point of an array
+            yield own._replace(identifiers=choose(is_there, count, 0), frame_us=choose(is_there, own.frame_us, 0.0))
     for message in traffic.messages:
-        own = sent(message.name, _int(message.identifier), _int(message.payload_bytes))
-        times: dict[str, Any] = {key: getattr(message, key) for key in ("period_us", "jitter_us", "deadline_us")}
-        yield own._replace(is_message=True, **times)
+        times = {key: getattr(message, key) for key in ("period_us", "jitter_us", "deadline_us")}
+        yield sent(
+            message.name, int(plain(message.identifier)), int(plain(message.payload_bytes)), is_message=True, **times
+        )
+
+
+def _most_frames(one: Pdos) -> int:
+    """Frames of a PDO that have streams, the most at any point."""
+    frames: Any = rounded_up(one.payload_bytes / FRAME_BYTES)
+    return min(int(frames.max() if hasattr(frames, "max") else frames), _MOST_FRAMES)
 
 
 def frame_sizes(one: Pdos) -> Iterator[int]:
     """Data of each frame of a PDO of plain numbers, of which there may be billions [bytes]."""
-    full, rest = divmod(_int(one.payload_bytes), int(FRAME_BYTES))
+    full, rest = divmod(int(plain(one.payload_bytes)), int(FRAME_BYTES))
     return chain(repeat(int(FRAME_BYTES), full), repeat(rest, int(rest > 0)))
 
 
@@ -112,14 +149,30 @@ _MOST_FRAMES: Final = int(MOST_PDOS) + 1
 """Frames of one PDO that have streams: with one more than a bus allows, its limit is broken already."""
 
 
-def _int(number: Number) -> int:
-    return int(plain(number))
+def _whole(number: Points) -> Points:
+    """A number that is whole, as an int where it is plain."""
+    return int(number) if isinstance(number, int | float) else number
+
+
+def last_identifier(each: Iterable[Stream]) -> Points:
+    """The largest identifier of some streams."""
+    return reduce(larger, (choose(one.identifiers > 0, one.last, 0) for one in each))
+
+
+def identifiers_twice(each: Sequence[Stream]) -> Points:
+    """How many identifiers stand twice, or more often [1]."""
+    if all(isinstance(one.last, int) for one in each):
+        return sum(shared for *_, shared in collisions(each))
+    return total(
+        larger(smaller(one.last, other.last) - larger(one.first, other.first) + 1, 0)
+        for one, other in combinations(each, 2)
+    )
 
 
 def collisions(each: Sequence[Stream]) -> Iterator[tuple[Stream, Stream, int, int]]:
-    """Pairs of streams that share identifiers, with the first they share, and how many."""
-    ordered = sorted(range(len(each)), key=lambda place: each[place].first)
-    firsts = [each[place].first for place in ordered]
+    """Pairs of streams of plain numbers that share identifiers, with the first they share, and how many."""
+    ordered = sorted(range(len(each)), key=lambda place: plain(each[place].first))
+    firsts = [plain(each[place].first) for place in ordered]
     pairs = (
         sorted((place, other))
         for number, place in enumerate(ordered)

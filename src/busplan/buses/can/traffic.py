@@ -1,13 +1,14 @@
 """What a network sends: SYNC, the PDOs of its nodes, and other messages."""
 
-from collections.abc import Iterator, Sequence
-from functools import reduce
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, lru_cache, reduce
+from itertools import islice
 from typing import Any, Final, NamedTuple
 
 from busplan.buses.can.constants import COMMAND_IDENTIFIER, FEEDBACK_IDENTIFIER
 from busplan.buses.can.equations import share_bytes
 from busplan.buses.network import Network
-from busplan.elementwise import Number, choose, larger
+from busplan.elementwise import Number, Traced, choose, larger, pointwise
 from busplan.sections.alike_nodes import AlikeNodes
 from busplan.sections.transactions import TRANSACTION_KINDS, TransactionKind
 
@@ -67,28 +68,86 @@ class Traffic(NamedTuple):
 
     def numbers(self) -> tuple[Number, ...]:
         """All its numbers in one row, as `with_numbers` takes them."""
-        own = (getattr(self, key) for key in _PLAIN_FIELDS)
-        return (*own, *(number for one in (*self.pdos, *self.messages) for number in _numbers(one)))
+        pdos = (number for one in self.pdos for number in one[_PDO_WORDS:])
+        own: tuple[Any, ...] = self[:_OWN_NUMBERS]
+        return (*own, *pdos, *(number for one in self.messages for number in one[_MESSAGE_WORDS:]))
 
-    def with_numbers(self, *numbers: float) -> "Traffic":
+    def with_numbers(self, *numbers: Number) -> "Traffic":
         """The same senders with other numbers, in the order of `numbers`."""
-        rest = iter(numbers)
-        own: dict[str, Any] = {key: next(rest) for key in _PLAIN_FIELDS}
-        pdos = tuple(_with_numbers(one, rest) for one in self.pdos)
-        return Traffic(**own, pdos=pdos, messages=tuple(_with_numbers(one, rest) for one in self.messages))
+        rest: Iterator[Any] = iter(numbers)
+        own = tuple(islice(rest, _OWN_NUMBERS))
+        pdos = tuple(Pdos(one.kind, one.group, *islice(rest, len(Pdos._fields) - _PDO_WORDS)) for one in self.pdos)
+        count = len(Message._fields) - _MESSAGE_WORDS
+        messages = tuple(Message(one.name, *islice(rest, count)) for one in self.messages)
+        return Traffic._make((*own, pdos, messages))
 
 
-_PLAIN_FIELDS: Final = Traffic._fields[:-2]
-"""Its numbers beside PDOs and messages, which stand behind them."""
-_WORDS: Final = ("kind", "group", "name")
+_OWN_NUMBERS: Final = len(Traffic._fields) - 2
+"""Fields before the PDOs and the messages."""
+_PDO_WORDS: Final = 2
+_MESSAGE_WORDS: Final = 1
+"""Fields of words, which stand before the numbers."""
 
 
-def _numbers(one: Any) -> Iterator[Number]:
-    return (getattr(one, key) for key in one._fields if key not in _WORDS)
+class Sent:
+    """Traffic whose numbers may be of any sort, to be asked with functions that put its senders in order.
 
+    Parameters
+    ----------
+    traffic
+        What is sent.
+    """
 
-def _with_numbers(one: Any, numbers: Iterator[float]) -> Any:
-    return one._replace(**{key: next(numbers) for key in one._fields if key not in _WORDS})
+    def __init__(self, traffic: Traffic) -> None:
+        self.traffic = traffic
+        self._known: Callable[[int], Traffic]
+
+    def of(self, function: Callable[..., Any], *others: Number, words: str) -> Number:
+        """What a function of the traffic gives.
+
+        Parameters
+        ----------
+        function
+            Takes traffic of plain numbers and arrays, the identifiers and the sizes of messages plain, and `others`. It
+            is asked once, or for each point alone where those vary, and where a derivation is recorded.
+        others
+            Its other arguments.
+        words
+            What a derivation says of it.
+        """
+        if self.is_ordered:
+            found: Number = function(self.traffic, *others)
+            return found
+        return self.of_points(function, *others, words=words)
+
+    def of_points(self, function: Callable[..., float], *others: Number, words: str) -> Number:
+        """What a function of traffic of plain numbers gives, point by point; arguments as `of` has them."""
+        return pointwise(lambda at, *more: function(self.at(at), *more), self.place, *others, words=words)
+
+    def at(self, place: float) -> Traffic:
+        """The traffic of plain numbers at a place."""
+        return self._known(int(place))
+
+    @cached_property
+    def is_ordered(self) -> bool:
+        """Whether identifiers and sizes of messages are plain, and no number is traced."""
+        traffic = self.traffic
+        messages = (number for one in traffic.messages for number in (one.identifier, one.payload_bytes))
+        order = (traffic.sync_identifier, *(one.identifier for one in traffic.pdos), *messages)
+        return all(isinstance(one, int | float) for one in order) and not any(
+            isinstance(one, Traced) for one in traffic.numbers()
+        )
+
+    @cached_property
+    def place(self) -> Number:
+        """The place of the traffic of each point; points that are alike have one."""
+        places: dict[tuple[float, ...], int] = {}
+        place = pointwise(
+            lambda *numbers: places.setdefault(numbers, len(places)), *self.traffic.numbers(), words="all that is sent"
+        )
+        rows = tuple(places)
+        self._known = lru_cache(maxsize=1024)(lambda at: self.traffic.with_numbers(*rows[at]))
+        return place
 
 
 class _Senders(NamedTuple):

@@ -1,18 +1,28 @@
-"""What a cycle of plain numbers waits for, and the worst-case response of each stream."""
+"""What a cycle waits for, and the worst-case response of each stream."""
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Iterator, Sequence
+from functools import reduce
 from itertools import accumulate, chain, islice, repeat
-from math import ceil, inf
+from math import inf
+from operator import add
 from typing import Final, NamedTuple
 
 from busplan.buses.can.constants import MOST_BLOCKS, SATURATED
 from busplan.buses.can.equations import bit_us
-from busplan.buses.can.response import Response, settled_us, worst_response
-from busplan.buses.can.streams import Stream, streams
+from busplan.buses.can.response import (
+    BELOW,
+    Points,
+    Response,
+    Sender,
+    TooManyStepsError,
+    settled_us,
+    worst_instance,
+    worst_response,
+)
+from busplan.buses.can.streams import Stream, last_identifier, remembered, streams
 from busplan.buses.can.traffic import NAMES, SYNC, Traffic
-from busplan.elementwise import Number, plain
+from busplan.elementwise import choose, is_everywhere, larger, plain, rounded_up, smaller, total
 
 _CYCLIC: Final = (SYNC, *NAMES.values())
 _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
@@ -21,36 +31,38 @@ _FEEDBACK, _COMMAND = NAMES["read"], NAMES["write"]
 class Waits(NamedTuple):
     """What a cycle waits for, from the queued SYNC to the end of the last command."""
 
-    lasts_us: float
+    lasts_us: Points
     """All of it [us]."""
-    blocks: tuple[Stream, ...]
-    """Messages of a lower priority than SYNC and all PDOs, one for each frame that goes where these leave the bus idle;
-    the longest first."""
+    blocking_us: Points
+    """Frames of a lower priority than SYNC and all PDOs that go where these leave the bus idle [us]."""
+    lower: tuple[Stream, ...]
+    """Messages of a lower priority than SYNC and all PDOs, the longest first."""
 
-    @property
-    def blocking_us(self) -> float:
-        """All these frames [us]."""
-        return sum(one.frame_us for one in self.blocks)
+    def blocks(self) -> Iterator[Stream]:
+        """One of them for each frame that goes, of plain numbers."""
+        counts = (int(plain(_frames_within(one, self.lasts_us))) for one in self.lower)
+        each = (repeat(one, count) for one, count in zip(self.lower, counts, strict=True))
+        return islice(chain.from_iterable(each), int(MOST_BLOCKS))
 
 
-def is_higher(message: Number, last: Number) -> Number:
+def is_higher(message: Points, last: Points) -> Points:
     """Whether an identifier goes before the last one of SYNC and all PDOs; of any sort."""
     return message <= last
 
 
-def last_identifier(each: Sequence[Stream]) -> int:
+def last_cyclic(each: Iterable[Stream]) -> Points:
     """The largest identifier of SYNC and all PDOs."""
-    return max(one.last for one in each if not one.is_message)
+    return last_identifier(one for one in each if not one.is_message)
 
 
-@lru_cache(maxsize=256)
-def waits(traffic: Traffic, others_us: float, *, is_stuffed: bool) -> Waits:
+@remembered(maxsize=256)
+def waits(traffic: Traffic, others_us: Points, *, is_stuffed: bool) -> Waits:
     """Find how long a cycle lasts with the frames of other messages.
 
     Parameters
     ----------
     traffic
-        What is sent, in plain numbers.
+        What is sent, as `Sent.of` gives it.
     others_us
         SYNC, the wait for the slowest feedback, all PDOs and the host's own time [us].
     is_stuffed
@@ -65,25 +77,44 @@ def waits(traffic: Traffic, others_us: float, *, is_stuffed: bool) -> Waits:
     before, too: the last frame of that cycle started as long before its end as the last frame of this one does.
     """
     each = streams(traffic, is_stuffed=is_stuffed)
-    last, bit = last_identifier(each), plain(bit_us(traffic.bit_rate_kbit_s))
+    last, bit = last_cyclic(each), bit_us(traffic.bit_rate_kbit_s)
     messages = [one for one in each if one.is_message]
-    higher = [one._replace(jitter_us=one.jitter_us + bit).sender() for one in messages if is_higher(one.first, last)]
-    lower = sorted((one for one in messages if not is_higher(one.first, last)), key=lambda one: -one.frame_us)
-    most = int(MOST_BLOCKS)
+    higher = [
+        Sender(choose(is_higher(one.first, last), one.frame_us, 0.0), one.period_us, one.jitter_us + bit)
+        for one in messages
+        if is_higher(one.first, last) is not False
+    ]
+    # Every frame has one bit rate and one format: the one with the most data is the longest.
+    by_length = sorted(messages, key=lambda one: -plain(one.data_bytes))
+    lower = tuple(one for one in by_length if is_higher(one.first, last) is not True)
 
-    def waiting(span_us: float) -> Waits:
-        there = (repeat(one, ceil(min((span_us + one.deadline_us) / one.period_us, most))) for one in lower)
-        return Waits(span_us, tuple(islice(chain.from_iterable(there), most)))
+    def blocking_us(span_us: Points) -> Points:
+        blocked: Points = 0.0
+        left: Points = int(MOST_BLOCKS)
+        for one in lower:
+            count = choose(is_higher(one.first, last), 0, smaller(_frames_within(one, span_us), left))
+            for number in range(int(MOST_BLOCKS)):
+                blocked = blocked + choose(count > number, one.frame_us, 0.0)
+            left = left - count
+            if is_everywhere(left == 0):
+                break
+        return blocked
 
-    return waiting(settled_us(others_us, higher, more_us=lambda span_us: waiting(span_us).blocking_us))
+    lasts_us = settled_us(others_us, higher, more_us=blocking_us)
+    return Waits(lasts_us, blocking_us(lasts_us), lower)
 
 
-def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, float]:
+def _frames_within(one: Stream, span_us: Points) -> Points:
+    """Frames of a message of a lower priority that go within a span of time, of which three are enough [1]."""
+    return rounded_up(smaller((span_us + one.deadline_us) / one.period_us, int(MOST_BLOCKS)))
+
+
+def queued_us(each: Sequence[Stream], traffic: Traffic, *, is_stuffed: bool) -> dict[str, Points]:
     """How late the last feedback and all commands may be queued behind the start of their cycle, by name [us]."""
-    us = {name: sum(one.sender().frames_us for one in each if one.name == name) for name in _CYCLIC}
-    others_us = sum(us.values()) + plain(traffic.read_us) + plain(traffic.host_us)
+    us = {name: total(one.sender().frames_us for one in each if one.name == name) for name in _CYCLIC}
+    others_us = total(us.values()) + traffic.read_us + traffic.host_us
     commands_us = waits(traffic, others_us, is_stuffed=is_stuffed).lasts_us - us[_COMMAND]
-    return {_FEEDBACK: commands_us - plain(traffic.host_us) - us[_FEEDBACK], _COMMAND: commands_us}
+    return {_FEEDBACK: commands_us - traffic.host_us - us[_FEEDBACK], _COMMAND: commands_us}
 
 
 class _Start:
@@ -101,7 +132,7 @@ class _Start:
         Time of a bit [us].
     """
 
-    def __init__(self, ranked: Sequence[Stream], late: Sequence[str], offset_us: float, bit_us: float) -> None:
+    def __init__(self, ranked: Sequence[Stream], late: Sequence[str], offset_us: Points, bit_us: Points) -> None:
         self.senders = [
             one.sender()._replace(jitter_us=-offset_us) if late and not one.is_message else one.sender()
             for one in ranked
@@ -110,12 +141,14 @@ class _Start:
             one.frames_us * (stream.name in late) for one, stream in zip(self.senders, ranked, strict=True)
         )
         # ceil(x) is less than x + 1.
-        self.most_us = _sums(one.frames_us + one.load * (max(one.jitter_us, 0.0) + bit_us) for one in self.senders)
+        # ceil(x) is no less than x.
+        self.least_us = _sums(one.load * (one.jitter_us + bit_us) for one in self.senders)
+        self.most_us = _sums(one.frames_us + one.load * (larger(one.jitter_us, 0.0) + bit_us) for one in self.senders)
 
 
-def _sums(numbers: Iterator[float]) -> list[float]:
+def _sums(numbers: Iterator[Points]) -> list[Points]:
     """Sums of the first of some numbers, from none to all."""
-    return [0.0, *accumulate(numbers)]
+    return [0.0, *accumulate(numbers, add)]
 
 
 class Messages:
@@ -128,7 +161,7 @@ class Messages:
     Parameters
     ----------
     traffic
-        What is sent, in plain numbers.
+        What is sent, as `Sent.of` gives it.
     is_stuffed
         Whether the stuff bits of the worst case are counted.
     """
@@ -137,69 +170,96 @@ class Messages:
         each = streams(traffic, is_stuffed=is_stuffed)
         self._ranked = sorted(each, key=_rank)
         self._ranks = [_rank(one) for one in self._ranked]
-        self._bit_us = plain(bit_us(traffic.bit_rate_kbit_s))
-        period_us, late_us = plain(traffic.period_us), queued_us(each, traffic, is_stuffed=is_stuffed)
+        self._bit_us = bit_us(traffic.bit_rate_kbit_s)
+        period_us, late_us = traffic.period_us, queued_us(each, traffic, is_stuffed=is_stuffed)
         places = (((), 0.0), ((_FEEDBACK, _COMMAND), late_us[_FEEDBACK]), ((_COMMAND,), late_us[_COMMAND]))
-        self._starts = [_Start(self._ranked, late, max(period_us - us, 0.0), self._bit_us) for late, us in places]
+        self._starts = [_Start(self._ranked, late, larger(period_us - us, 0.0), self._bit_us) for late, us in places]
         self._loads = _sums(one.load for one in self._starts[0].senders)
-        frames_us = (one.frame_us for one in reversed(self._ranked))
-        self._longest_us = [*accumulate(frames_us, max, initial=0.0)][::-1]
+        frames_us: Iterator[Points] = (one.frame_us for one in reversed(self._ranked))
+        nothing: Points = 0.0
+        self._longest_us: list[Points] = [*accumulate(frames_us, larger, initial=nothing)][::-1]
         """The longest frame from each rank on."""
 
     def by_priority(self) -> Iterator[Stream]:
         """The messages, that of the lowest priority first."""
         return (one for one in reversed(self._ranked) if one.is_message)
 
-    def load(self, own: Stream) -> float:
+    def load(self, own: Stream) -> Points:
         """Load of the bus by a message and all that goes before it [1]."""
         return self._loads[self._behind(own)]
 
     def response(self, own: Stream) -> Response | None:
-        """Worst-case response of a message; None where `worst_response` has none."""
-        behind, found = self._behind(own), []
-        at = self._ranked.index(own)
+        """Worst-case response of a message of plain numbers; None where `worst_response` has none."""
+        try:
+            found = [*self._responses(own)]
+        except TooManyStepsError:
+            return None
+        each = [one for one in found if one is not None]
+        return max(each, key=lambda one: plain(one.us)) if len(each) == len(found) else None
+
+    def _responses(self, own: Stream) -> Iterator[Response | None]:
+        """The worst instance of a message from each start of a busy period."""
+        behind = self._behind(own)
+        at = next(place for place, one in enumerate(self._ranked) if one.is_message and one.name == own.name)
         for start in self._starts:
-            one = worst_response(
+            yield worst_instance(
                 own.sender(),
                 start.senders[:at] + start.senders[at + 1 : behind],
                 blocking_us=self._longest_us[behind],
                 bit_us=self._bit_us,
                 first_us=start.first_us[behind],
             )
-            if one is None:
-                return None
-            found.append(one)
-        return max(found, key=lambda one: one.us)
 
-    def deadline_share(self, own: Stream) -> float:
-        """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1]."""
+    def bound_share(self, own: Stream) -> Points:
+        """A bound of the response over the deadline; infinite where the load of the bus leaves no response [1]."""
         behind, sender = self._behind(own), own.sender()
-        if self._loads[behind] < SATURATED:
-            blocking_us, own_most_us = (
-                self._longest_us[behind],
-                sender.frames_us + sender.load * (sender.jitter_us + self._bit_us),
-            )
-            most_us = (
-                max(one.first_us[behind] + one.most_us[behind] for one in self._starts) - own_most_us + blocking_us
-            )
-            bound_us = own.jitter_us + own.frame_us + most_us / (1 - self._loads[behind] + sender.load)
-            if bound_us <= own.deadline_us:
-                return bound_us / own.deadline_us
-        found = self.response(own)
-        return inf if found is None else found.us / own.deadline_us
+        load, own_most_us = self._loads[behind], sender.frames_us + sender.load * (sender.jitter_us + self._bit_us)
+        starts_us = (one.first_us[behind] + one.most_us[behind] for one in self._starts)
+        most_us = reduce(larger, starts_us) - own_most_us + self._longest_us[behind]
+        has_response = load < SATURATED
+        idle = choose(has_response, 1 - load + sender.load, 1.0)
+        return choose(has_response, (own.jitter_us + own.frame_us + most_us / idle) / own.deadline_us, inf)
+
+    def least_share(self, own: Stream) -> Points:
+        """What the response over the deadline is at least, of a busy period that begins with SYNC [1]."""
+        behind, sender = self._behind(own), own.sender()
+        load, waits_us = self._loads[behind], self._starts[0].least_us[behind] + self._longest_us[behind]
+        waits_us = waits_us - sender.load * (sender.jitter_us + self._bit_us)
+        has_response = load < SATURATED
+        idle = choose(has_response, 1 - load + sender.load, 1.0)
+        least_us = own.jitter_us + own.frame_us + waits_us / idle
+        return choose(has_response, least_us / own.deadline_us * BELOW, inf)
+
+    def deadline_share(self, own: Stream) -> Points:
+        """Response over deadline, or a bound of it that is no more than 1; infinite without a response [1].
+
+        Raises
+        ------
+        TooManyStepsError
+            It takes too many steps to find at some of several points.
+        """
+        bound = self.bound_share(own)
+        tells = (bound <= 1) | (bound == inf)
+        if is_everywhere(tells):
+            return bound
+        if isinstance(bound, float):
+            found = self.response(own)
+            return inf if found is None else found.us / own.deadline_us
+        us = (inf if one is None else one.us for one in self._responses(own))
+        return choose(tells, bound, reduce(larger, us) / own.deadline_us)
 
     def _behind(self, own: Stream) -> int:
         """The first rank behind a message."""
-        return bisect_right(self._ranks, own.first)
+        return bisect_right(self._ranks, plain(own.first))
 
 
 def _rank(one: Stream) -> int:
-    return one.first if one.is_message else one.block
+    return one.block
 
 
-@lru_cache(maxsize=16)
+@remembered(maxsize=16)
 def messages(traffic: Traffic, *, is_stuffed: bool) -> Messages:
-    """The messages of a network of plain numbers; see `Messages`."""
+    """The messages of a network; see `Messages`."""
     return Messages(traffic, is_stuffed=is_stuffed)
 
 
@@ -225,7 +285,9 @@ def response(own: Stream, traffic: Traffic, *, is_stuffed: bool) -> Response | N
     if own.is_message:
         return messages(traffic, is_stuffed=is_stuffed).response(own)
     others = [one for one in streams(traffic, is_stuffed=is_stuffed) if one is not own]
-    lower_us = (one.frame_us for one in others if not one.goes_before(own) and (own.name != SYNC or one.is_message))
+    lower_us = (
+        plain(one.frame_us) for one in others if not one.goes_before(own) and (own.name != SYNC or one.is_message)
+    )
     higher = [one.sender() for one in others if one.goes_before(own)]
     if own.identifiers > 1:
         higher.append(own.sender(own.identifiers - 1))
