@@ -46,7 +46,8 @@ class CheckAnswer(Answer):
         """Whether every file could be checked, and none has an error."""
         return not self._found.failed and not self._found.has_findings("error")
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         return check_report(self._found)
 
     def _headline(self) -> str:

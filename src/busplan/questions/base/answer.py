@@ -30,7 +30,7 @@ class Answer(ABC):
 
     def to_json(self) -> str:
         """Return the document of the command's `--format json` as text."""
-        return render(self._report(), "json")
+        return render(self.report(), "json")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the document of the command's `--format json` as new plain data."""
@@ -41,7 +41,7 @@ class Answer(ABC):
     @property
     def html(self) -> str:
         """The page of the command's `--format html`: one file without network or script."""
-        return render(self._report(), "html")
+        return render(self.report(), "html")
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the answer to a file in the form of its ending; an old file is whole until the new one replaces it.
@@ -83,18 +83,18 @@ class Answer(ABC):
 
     def _text(self, form: Form) -> str:
         """The answer in a form."""
-        return self.to_json() if form == "json" else render(self._report(), form)
+        return self.to_json() if form == "json" else render(self.report(), form)
 
     @abstractmethod
-    def _report(self) -> Report:
-        """The report of the command."""
+    def report(self) -> Report:
+        """The answer in blocks, which every form but JSON and CSV is made of."""
 
     def _headline(self) -> str:
         """The answer in one line."""
-        return next(block_lines(self._report().blocks())).text
+        return next(block_lines(self.report().blocks())).text
 
     def __str__(self) -> str:
-        return render(self._report(), "table").removesuffix("\n")
+        return render(self.report(), "table").removesuffix("\n")
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._headline()}>"
@@ -102,9 +102,9 @@ class Answer(ABC):
     def _repr_html_(self) -> str:
         from busplan.forms.html import fragment
 
-        return fragment(self._report())
+        return fragment(self.report())
 
     def _repr_svg_(self) -> str | None:
         from busplan.forms.picture import first_picture
 
-        return first_picture(self._report().blocks())
+        return first_picture(self.report().blocks())

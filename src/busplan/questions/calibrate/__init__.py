@@ -84,7 +84,8 @@ class CalibrateAnswer(Answer):
         _, form, *_ = fit_sentences(self.calibration)
         return f"{self.profile.name}: {sentence_text(form)}"
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.calibrate.report import calibration_report
 
         return calibration_report(self.calibration, source=self.source, applied_to=None)

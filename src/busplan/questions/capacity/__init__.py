@@ -41,7 +41,8 @@ class CapacityAnswer(Answer):
         """All sets of figures, period by period, and in each period timing model by timing model."""
         return self._found.results
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.capacity.report import capacity_report
 
         if not self.sensitivities:

@@ -18,7 +18,8 @@ class CircleTestAnswer(Answer, CircleTest):
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.circle.report import circle_report
 
         return circle_report(self)

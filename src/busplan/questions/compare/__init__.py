@@ -40,7 +40,8 @@ class CompareAnswer(Answer, KindComparison):
     def _repr_svg_(self) -> str | None:
         return self._svg() if self.compared else None
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.compare.report import compare_report
 
         return compare_report(self)

@@ -63,7 +63,8 @@ class DiffAnswer(Answer):
             raise BusplanError(f"tolerance_percent {allowed:g}: must be 0 or more")
         return tuple(self._found.regressions(tolerance=allowed / 100))
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.diff.report import diff_report
 
         return diff_report(self._found, arguments=self.arguments)

@@ -23,7 +23,8 @@ class EvidenceAnswer(Answer):
 
     kinds: tuple[KindEvidence, ...]
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.evidence.report import evidence_report
 
         return evidence_report(self.kinds)

@@ -35,7 +35,8 @@ class ExplainAnswer(Answer):
     derivations: tuple[Derivation, ...]
     assumptions: tuple[Input, ...]
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.explain.assumptions import assumptions_report
         from busplan.questions.explain.report import explain_report
 

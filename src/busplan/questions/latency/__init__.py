@@ -15,7 +15,8 @@ class LatencyAnswer(Answer, LatencyResult):
 
     __slots__ = ()
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.latency.report import latency_report
 
         return latency_report(self)

@@ -27,7 +27,8 @@ class MapAnswer(Answer, TradeOff):
 
         return map_svg(self, title=sentence_text(headline(self)))
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.map.report import map_report
 
         return map_report(self)

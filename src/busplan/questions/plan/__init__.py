@@ -19,7 +19,8 @@ class PlanAnswer(Answer, Plan):
 
     __slots__ = ()
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.plan.report import plan_report
 
         return plan_report(self)

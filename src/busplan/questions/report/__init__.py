@@ -38,7 +38,8 @@ class ReportAnswer(Answer):
         """All answers for each profile."""
         return tuple(one.answer for one in self.profiles)
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         page, changes = page_report(self.profiles, title=self.title), self.profiles[0].changes
         # As on the command line, where all profiles have the same ones.
         return changed_report(page, changes) if all(one.changes == changes for one in self.profiles) else page

@@ -115,7 +115,8 @@ class SweepAnswer(Answer):
         writer.finish(complete=True)
         return b"".join(written)
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.sweep)))
         top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
         tally = Tally(self.sweep)

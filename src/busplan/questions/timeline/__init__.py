@@ -17,7 +17,8 @@ class TimelineAnswer(Answer, Schedule):
         """Totals of the events in the window, by kind."""
         return totals(self)
 
-    def _report(self) -> Report:
+    def report(self) -> Report:
+        """The answer in blocks."""
         from busplan.questions.timeline.report import timeline_report
 
         return timeline_report(self)
