@@ -7,13 +7,18 @@ import pytest
 from busplan.cli.vary import parse_axes
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
-from busplan.questions.sweep.grid import Listed
+from busplan.questions.sweep import axis_values
+from busplan.questions.sweep.grid import Listed, Values
 
 PROFILE = load("paper-1ms").profile
 
 
+def axes(texts: list[str]) -> list[Values]:
+    return [axis_values(PROFILE, key, text, name="--vary") for key, text in parse_axes(texts).items()]
+
+
 def values(spec: str) -> list[object]:
-    (axis,) = parse_axes([f"bus.gap_count={spec}"], profile=PROFILE).values()
+    (axis,) = axes([f"bus.gap_count={spec}"])
     return list(axis.values) if isinstance(axis, Listed) else axis.part(0, axis.size).tolist()
 
 
@@ -79,4 +84,4 @@ def test_values(spec: str, expected: list[object]) -> None:
 )
 def test_nonsense_is_refused(texts: list[str], message: str) -> None:
     with pytest.raises(BusplanError, match=re.escape(message)):
-        parse_axes(texts, profile=PROFILE)
+        axes(texts)

@@ -109,10 +109,12 @@ def _found(plan: "Profile", x: str | None, y: str | None, *, jobs: int | None, w
 
 def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: bool) -> "Direction | None":
     from busplan.questions.map.direction import checked_direction
+    from busplan.questions.sweep import axis_values
 
     if text is None:
         return None
-    key, values = parse_axis(text, profile=plan, option=option)
+    key, words = parse_axis(text, option=option)
+    values = axis_values(plan, key, words, name=option)
     circle_option = None if with_circle else "--circle"
     return checked_direction(plan, key, values, option=option, circle_option=circle_option)
 

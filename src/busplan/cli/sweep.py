@@ -175,30 +175,31 @@ def sweep_command(
     require_apart(outputs, inputs=profile_files(profile))
     plot_form_ = None if plot is None else plot_form(plot)
     from busplan.cli.workers import available_processors
-    from busplan.questions.sweep.asked import Names, checked_sweep
+    from busplan.questions.sweep import Names, checked_sweep
 
     loaded = load_changed(profile, changes)
-    axes = parse_axes(vary or [], profile=loaded)
+    varied = parse_axes(vary or [])
     for one in changes.each:
-        for key in axes:
+        for key in varied:
             require_separate(one, key, typed=f"--vary {key}")
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
     asked = checked_sweep(
         loaded,
-        axes,
+        varied,
         timing_models=None if timing == ALL_MODELS else [timing],
         circle=circle,
         summary=summary,
         force=force,
-        names=Names(),
+        changes=changes,
+        names=Names("--vary", "--timing", "--circle", "--summary", "--force"),
     )
     _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
     chosen = _columns(asked, columns, short=form in TOP_FORMS, sort_by=sort_by)
     run_sweep(
         SweepJob(
-            asked._replace(columns=chosen, changes=changes),
+            asked._replace(columns=chosen),
             form=form,
             output=output,
             top=top or _DEFAULT_TOP,
@@ -208,7 +209,7 @@ def sweep_command(
             plot=plot,
             plot_form=plot_form_,
             figure=figure,
-            jobs=(jobs or available_processors()) if circle else None,
+            jobs=jobs or available_processors(),
             cluster=cluster,
             resume=resume,
         )
@@ -259,13 +260,9 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
 
 def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
     """Refuse a column that does not exist or is not numeric."""
-    from busplan.questions.sweep.blocks import word_figures
-
-    words = {*word_figures(sweep.profile), *(key for key, axis in sweep.grid.axes.items() if axis.has_words)}
-    numbers = [name for name in sweep.columns if name not in words]
     for option, name in asked.items():
-        if name is not None and name not in numbers:
-            raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(numbers)}")
+        if name is not None and name not in sweep.numbers:
+            raise BusplanError(f"{option} {name}: expected a column in numbers: {', '.join(sweep.numbers)}")
 
 
 def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) -> tuple[str, ...]:
@@ -276,7 +273,7 @@ def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) ->
             if name not in sweep.columns:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
     elif short:
-        from busplan.questions.sweep.top import default_columns
+        from busplan.questions.sweep import default_columns
 
         chosen = default_columns(sweep)
     else:

@@ -1,27 +1,23 @@
 """Run a sweep: compute, write and count block by block."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Final, Literal, NamedTuple, NoReturn, get_args
+from typing import TYPE_CHECKING, BinaryIO, Final, Literal, NamedTuple, Protocol, cast, get_args
 
 from busplan.cli.answering import give, report_with
 from busplan.cli.interrupt import StoppedError, signals_noted, stopped_by
 from busplan.cli.output import CANNOT, emit_document, say
 from busplan.cli.progress import progress_bar
-from busplan.errors import BusplanError, WorkerLostError
+from busplan.errors import WorkerLostError
 from busplan.files import document_bytes, new_file, partial_path
 from busplan.forms import Form, Picture, RowsForm, render
-from busplan.progress import Progress
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
     from busplan.cli.sweep_parts import Parts
+    from busplan.questions.sweep import Digest, FigureData, Work
     from busplan.questions.sweep.asked import Sweep
     from busplan.questions.sweep.blocks import SweepBlock
-    from busplan.questions.sweep.plot import FigureData
-    from busplan.questions.sweep.top import Tally
     from busplan.questions.sweep.writers import RowsWriter
 
 SweepForm = Literal[Form, RowsForm]
@@ -45,12 +41,19 @@ class SweepJob(NamedTuple):
     plot_form: Picture | None
     figure: str | None
     """Column of the picture; None for the default one."""
-    jobs: int | None
-    """Processes for circle tests, where there is no cluster; None without circle tests."""
+    jobs: int
+    """Processes for circle tests, where there is no cluster."""
     cluster: str | None
     """Address of a Dask scheduler whose workers run the circle tests."""
     resume: bool
     """If True, go on with the parts of a sweep that did not end."""
+
+
+class _Taker(Protocol):
+    """What takes the blocks of a sweep, in order."""
+
+    def add(self, block: "SweepBlock") -> None:
+        """Take one more block."""
 
 
 class _StoppedBetweenError(Exception):
@@ -68,10 +71,12 @@ def run_sweep(job: SweepJob) -> None:
         Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
     from busplan.forms.columns import sentence_text
-    from busplan.questions.sweep.top import Tally
+    from busplan.questions.sweep import Digest
     from busplan.questions.words.documents import changes_sentences
 
-    sweep, drawing, tally = job.sweep, _drawing(job), Tally(job.sweep)
+    sweep, drawing = job.sweep, _drawing(job)
+    is_top = job.form in TOP_FORMS
+    digest = Digest(sweep, top=job.top if is_top else 0, sort_by=job.sort_by, ascending=job.ascending)
     with ExitStack() as stack:
         # Left last: parts go when their file is complete.
         parts = _parts(job, stack)
@@ -83,18 +88,21 @@ def run_sweep(job: SweepJob) -> None:
                 if job.output
                 else None
             )
-            sink = _sink(job, file, tally)
-            takers: list[Callable[[SweepBlock], None]] = [tally.add, sink.add, *([drawing.add] if drawing else [])]
-            lost = _work(job, takers, parts, points=sink.points, stopped=lambda: noted() is not None)
-        complete = tally.points == sweep.grid.points
-        sink.finish(complete=complete)
-        if job.form not in TOP_FORMS or file is not None:
-            say(*map(sentence_text, (*changes_sentences(sweep.changes), *tally.sentences())))
+            writer = _writer(job, file)
+            takers = [taker for taker in (digest, writer, drawing) if taker is not None]
+            lost = _work(job, takers, parts, writer, stopped=lambda: noted() is not None)
+        complete = digest.points == sweep.grid.points
+        if writer is None:
+            _write_top(job, digest, file)
+        else:
+            writer.finish(complete=complete)
+        if not is_top or file is not None:
+            say(*map(sentence_text, (*changes_sentences(sweep.changes), *digest.sentences())))
         if not complete:
             kept = f"; kept in {partial_path(job.output)}" if job.output else ""
             signal = noted()
             cause = "interrupted" if lost is None or signal is not None else str(lost)
-            say(f"{cause} after {tally.points:,} of {sweep.grid.points:,} points{kept}")
+            say(f"{cause} after {digest.points:,} of {sweep.grid.points:,} points{kept}")
             if parts is not None and parts.tests:
                 say(f"{parts.tests:,} of {sweep.tests:,} circle tests are in {parts.folder}: go on with --resume")
             raise StoppedError(CANNOT) if signal is None else stopped_by(signal)
@@ -110,24 +118,25 @@ def run_sweep(job: SweepJob) -> None:
 
 def _work(
     job: SweepJob,
-    takers: "Sequence[Callable[[SweepBlock], None]]",
+    takers: "Sequence[_Taker]",
     parts: "Parts | None",
+    writer: "RowsWriter | None",
     *,
-    points: int,
     stopped: Callable[[], bool],
 ) -> WorkerLostError | None:
     """Pass each block to all takers, until the end or a stop; return the error of a lost worker."""
+    from busplan.questions.sweep import sweep_blocks
 
     def watch() -> None:
         if stopped():
             raise _StoppedBetweenError
 
+    sizes = {} if writer is None else {"chunk_points": writer.points}
     try:
-        with progress_bar("sweep") as report, _blocks(job, parts, points, report, watch) as blocks:
+        with _how(job, parts, watch) as work, closing(sweep_blocks(job.sweep, work, **sizes)) as blocks:
             for block in blocks:
-                for take in takers:
-                    take(block)
-                watch()
+                for taker in takers:
+                    taker.add(block)
     except _StoppedBetweenError:
         return None
     except WorkerLostError as error:
@@ -138,14 +147,13 @@ def _work(
 def _drawing(job: SweepJob) -> "FigureData | None":
     if job.plot is None:
         return None
-    from busplan.questions.sweep.plot import FigureData, require_drawable
+    from busplan.questions.sweep import FigureData
 
-    require_drawable(job.sweep.grid, option="--plot")
-    return FigureData(job.sweep, figure=job.figure)
+    return FigureData(job.sweep, figure=job.figure, option="--plot")
 
 
 def _parts(job: SweepJob, stack: ExitStack) -> "Parts | None":
-    if job.jobs is None or job.output is None:
+    if not job.sweep.circle or job.output is None:
         return None
     from busplan.cli.sweep_parts import kept_parts
 
@@ -153,94 +161,46 @@ def _parts(job: SweepJob, stack: ExitStack) -> "Parts | None":
 
 
 @contextmanager
-def _blocks(
-    job: SweepJob, parts: "Parts | None", points: int, report: Progress, watch: Callable[[], None]
-) -> "Iterator[Iterable[SweepBlock]]":
-    """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
-    from busplan.questions.sweep.blocks import sweep
+def _how(job: SweepJob, parts: "Parts | None", watch: Callable[[], None]) -> "Iterator[Work]":
+    """How the work is run: capacity in this thread, circle tests in worker processes or on a cluster."""
+    from busplan.questions.sweep import Work
 
-    asked = job.sweep
-    if job.jobs is None:
-        blocks = sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=points)
-        yield _reported(blocks, asked.grid.points, report)
-        return
-    from busplan.questions.sweep.circle_run import circle_blocks, require_circles
-
+    work = Work(progress=progress_bar, watch=watch, kept=parts)
     with ExitStack() as stack:
         if parts is not None:
             stack.callback(parts.flush)
-        where, watch = stack.enter_context(_where(job, watch))
-        with progress_bar("check of the points") as checked:
-            cost = require_circles(asked, where, progress=lambda done: checked(done, asked.grid.points), watch=watch)
-        yield circle_blocks(
-            asked,
-            where,
-            cost=cost,
-            kept=parts,
-            progress=lambda done: report(done, asked.tests),
-            watch=watch,
-        )
+        if job.cluster is not None:
+            from busplan.cli.cluster import cluster
 
-
-@contextmanager
-def _where(job: SweepJob, watch: Callable[[], None]) -> "Iterator[tuple[Executor, Callable[[], None]]]":
-    """Executor of circle tests, and what must be watched while it works."""
-    if job.cluster is not None:
-        from busplan.cli.cluster import cluster
-
-        with cluster(job.cluster) as (there, look):
+            there, look = stack.enter_context(cluster(job.cluster))
 
             def watch_both() -> None:
                 watch()
                 look()
 
-            yield there, watch_both
-        return
-    from busplan.cli.workers import executor
+            work = work._replace(executor=there, watch=watch_both)
+        elif job.sweep.circle:
+            from busplan.cli.workers import executor
 
-    with executor(min(job.jobs or 1, job.sweep.tests)) as here:
-        yield here, watch
-
-
-def _reported(blocks: "Iterable[SweepBlock]", points: int, report: Progress) -> "Iterator[SweepBlock]":
-    for block in blocks:
-        yield block
-        report(block.chunk.start + block.chunk.points, points)
+            work = work._replace(executor=stack.enter_context(executor(min(job.jobs, job.sweep.tests))))
+        yield work
 
 
-def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> "RowsWriter":
-    """Destination for the blocks: the top rows, or every row."""
+def _writer(job: SweepJob, file: BinaryIO | None) -> "RowsWriter | None":
+    """Writer of every row; None where the answer has the top rows."""
     match job.form:
         case "csv" | "json" | "jsonl" | "parquet":
-            from busplan.questions.sweep.writers import rows_writer
+            from busplan.questions.sweep import rows_writer
 
             return rows_writer(job.form, job.sweep, emit_document if file is None else file.write)
         case _:
-            return _TopSink(job, job.form, file, tally)
+            return None
 
 
-class _TopSink:
-    """Keeps the top rows for an answer at the end."""
-
-    def __init__(self, job: SweepJob, form: Form, file: BinaryIO | None, tally: "Tally") -> None:
-        from busplan.questions.sweep.blocks import CHUNK_POINTS
-        from busplan.questions.sweep.top import TopRows
-
-        self.points = CHUNK_POINTS
-        self._job, self._form, self._file, self._tally = job, form, file, tally
-        self._rows = TopRows(job.sweep.columns, sort_by=job.sort_by, ascending=job.ascending, top=job.top)
-        self.add = self._rows.add
-
-    def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - `tally` has the number of points
-        """Write the answer."""
-        from busplan.questions.sweep.top import sweep_report
-
-        report = report_with(self._job.sweep.changes, sweep_report(self._rows, self._tally, document=_not_kept))
-        if self._file is None:
-            give(report._replace(is_whole=self._job.is_whole), self._form)
-        else:
-            self._file.write(document_bytes(render(report, self._form)))
-
-
-def _not_kept() -> NoReturn:
-    raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")
+def _write_top(job: SweepJob, digest: "Digest", file: BinaryIO | None) -> None:
+    """Write the answer with the top rows."""
+    report = report_with(job.sweep.changes, digest.report())
+    if file is None:
+        give(report._replace(is_whole=job.is_whole), cast("Form", job.form))
+    else:
+        file.write(document_bytes(render(report, cast("Form", job.form))))

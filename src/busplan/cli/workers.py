@@ -13,7 +13,6 @@ from typing import TypeVar
 
 from busplan.cli.interrupt import ENDING
 from busplan.errors import WorkerLostError
-from busplan.questions.sweep.execution import Here
 
 Result = TypeVar("Result")
 
@@ -27,6 +26,8 @@ def available_processors() -> int:
 def executor(number: int) -> Iterator[Executor]:
     """Give an executor that works here, or in several processes, as `workers`."""
     if number == 1:
+        from busplan.questions.sweep import Here
+
         yield Here()
         return
     with workers(number) as crew:

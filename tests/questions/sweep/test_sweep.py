@@ -19,7 +19,7 @@ from busplan.questions.fit.network import bus_of, model_names
 from busplan.questions.sweep.asked import Sweep
 from busplan.questions.sweep.blocks import figure_names, sweep
 from busplan.questions.sweep.circle_run import require_circles
-from busplan.questions.sweep.execution import Here
+from busplan.questions.sweep.execution import Work
 from busplan.questions.sweep.grid import Chunk, Even, Grid, Listed, Steps, Values, checked_grid, grid_models
 from busplan.sections.profile import Profile
 
@@ -232,10 +232,10 @@ def test_a_long_sweep_of_circles_says_what_it_costs_before_it_runs(
     )
     # 25,133,560 steps of each axis at 2 ms, which take about 5 s; where the cycle does not fit, nothing is simulated.
     two = checked_grid(big, {"cycle.period_us": Listed((2000, 100))}, with_circle=True)
-    require_circles(Sweep(big, two, (), ()), Here())
+    require_circles(Sweep(big, two, (), ()), Work())
     assert caplog.messages == []
     three = checked_grid(big, {"delivery.seed": Listed((1, 2, 3))}, with_circle=True)
-    require_circles(Sweep(big, three, (), ()), Here())
+    require_circles(Sweep(big, three, (), ()), Work())
     (said,) = caplog.messages
     assert said.startswith("circle test: 150,801,360 steps, about ")
     # The memory of one: they run one behind the other.

@@ -1,4 +1,8 @@
-"""`busplan.sweep`."""
+"""`busplan.sweep`.
+
+A sweep that is too large for memory is computed block by block: `checked_sweep`, `sweep_blocks`, and a `Digest`, a
+`FigureData` or a writer that takes the blocks.
+"""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -13,24 +17,36 @@ from busplan.errors import BusplanError
 from busplan.forms import ROWS_ENDINGS, RowsForm
 from busplan.forms.blocks import Report
 from busplan.forms.csv_rows import spelled
-from busplan.profile.kinds import words_of
 from busplan.questions.base.answer import Answer
-from busplan.questions.base.inputs import Models, ProfileLike, checked_models, items, load_profile
-from busplan.questions.sweep import blocks as analysis
+from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_profile
 from busplan.questions.sweep.asked import Names, Sweep, checked_sweep
 from busplan.questions.sweep.blocks import Column, SweepBlock
-from busplan.questions.sweep.circle_run import circle_blocks, require_circles
-from busplan.questions.sweep.execution import Here
-from busplan.questions.sweep.grid import Array, Grid, Values
-from busplan.questions.sweep.plot import FigureData, require_drawable
-from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
-from busplan.questions.sweep.values import listed, parse_values, stepped
+from busplan.questions.sweep.circle_run import sweep_blocks
+from busplan.questions.sweep.execution import Here, Work
+from busplan.questions.sweep.grid import Array, Grid
+from busplan.questions.sweep.plot import FigureData
+from busplan.questions.sweep.top import Digest, default_columns
+from busplan.questions.sweep.values import axis_values
 from busplan.questions.sweep.writers import rows_writer
 from busplan.sections.profile import Profile
 
+__all__ = [
+    "Digest",
+    "FigureData",
+    "Here",
+    "Names",
+    "SweepAnswer",
+    "Work",
+    "axis_values",
+    "checked_sweep",
+    "default_columns",
+    "rows_writer",
+    "sweep",
+    "sweep_blocks",
+]
+
 MOST_POINTS: Final = 2_000_000
 """Most points, about half a gigabyte of memory. The command line has no such limit."""
-_NAMES: Final = Names("vary", "timing_model", "circle=True", "summary=True", "force=True")
 _SHOWN: Final = 20
 """Rows of the report."""
 
@@ -100,7 +116,6 @@ class SweepAnswer(Answer):
 
     def _svg(self) -> str:
         """The picture of `busplan sweep --plot`."""
-        require_drawable(self.grid, option="the picture of a sweep")
         drawn = FigureData(self.sweep)
         for block in self.blocks:
             drawn.add(block)
@@ -118,12 +133,10 @@ class SweepAnswer(Answer):
     def report(self) -> Report:
         """The answer in blocks."""
         shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.sweep)))
-        top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
-        tally = Tally(self.sweep)
+        digest = Digest(self.sweep._replace(columns=tuple(shown)), top=_SHOWN)
         for block in self.blocks:
-            top.add(block)
-            tally.add(block)
-        return sweep_report(top, tally, document=lambda: json.loads(self.to_json()))
+            digest.add(block)
+        return digest.report(document=lambda: json.loads(self.to_json()))
 
 
 def _spelled(column: Column) -> Array:
@@ -206,48 +219,10 @@ def sweep(
         )
     if summary and not circle:
         raise BusplanError("summary=True: goes with circle=True")
-    axes = {key: axis_values(network, key, given, name="vary") for key, given in vary.items()}
-    asked = checked_sweep(
-        network, axes, timing_models=models, circle=circle, summary=summary, force=force, names=_NAMES
-    )
+    asked = checked_sweep(network, vary, timing_models=models, circle=circle, summary=summary, force=force)
     if asked.grid.points > MOST_POINTS:
         raise BusplanError(
             f"vary: {asked.grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, "
             "or write them with busplan sweep -o FILE.csv"
         )
-    if circle:
-        where = executor or Here()
-        blocks = circle_blocks(asked, where, cost=require_circles(asked, where))
-    else:
-        blocks = analysis.sweep(network, asked.grid, timing_models=asked.timing_models)
-    return SweepAnswer(asked, tuple(blocks))
-
-
-def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
-    """Values of a key: text as on the command line, a range, or several values.
-
-    Parameters
-    ----------
-    profile
-        The network.
-    key
-        Dotted key.
-    given
-        The values.
-    name
-        Name of the argument in messages.
-
-    Raises
-    ------
-    BusplanError
-        Not values of the key.
-    """
-    words = words_of(profile, key)
-    if isinstance(given, str):
-        return parse_values(given, name=f"{name} {key}={given}", words=words)
-    name = f"{name} {key}"
-    return (
-        stepped(given, name=name)
-        if isinstance(given, range)
-        else listed(items(given, name=name), name=name, words=words)
-    )
+    return SweepAnswer(asked, tuple(sweep_blocks(asked, Work(executor or Here()))))

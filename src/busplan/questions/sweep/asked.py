@@ -1,17 +1,18 @@
 """What is asked of a sweep, checked."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
 
 from busplan.buses.figure import Figure, by_key
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 from busplan.questions.circle.figures import CIRCLE_FIGURES
 from busplan.questions.fit.figures import COUNTS
 from busplan.questions.fit.network import bus_of
-from busplan.questions.sweep.blocks import figure_names
+from busplan.questions.sweep.blocks import figure_names, word_figures
 from busplan.questions.sweep.circles import CIRCLE_COLUMNS, require_few
 from busplan.questions.sweep.grid import Grid, Values, checked_grid, grid_models
 from busplan.questions.sweep.seeds_run import SEED, SUMMARY_COLUMNS, SUMMARY_FIGURES, without_seed
+from busplan.questions.sweep.values import axis_values
 from busplan.sections.profile import Profile
 
 
@@ -27,6 +28,14 @@ class Sweep(NamedTuple):
     seeds: Values | None = None
     """Seeds that each row is over; None without a summary."""
     changes: KeyChanges = NO_CHANGES
+    circle: bool = False
+    """If True, the circle test of each point is run."""
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Columns in numbers."""
+        words = {*word_figures(self.profile), *(key for key, axis in self.grid.axes.items() if axis.has_words)}
+        return tuple(name for name in self.columns if name not in words)
 
     @property
     def tests_each(self) -> int:
@@ -44,37 +53,44 @@ class Sweep(NamedTuple):
 
 
 class Names(NamedTuple):
-    """Names of options in messages."""
+    """Names of arguments in messages."""
 
-    vary: str = "--vary"
-    timing: str = "--timing"
-    circle: str = "--circle"
-    summary: str = "--summary"
-    force: str = "--force"
+    vary: str = "vary"
+    timing: str = "timing_model"
+    circle: str = "circle=True"
+    summary: str = "summary=True"
+    force: str = "force=True"
+
+
+ARGUMENTS: Final = Names()
+"""Those of the Python interface."""
 
 
 def checked_sweep(
     profile: Profile,
-    axes: Mapping[str, Values],
+    vary: Mapping[str, str | Iterable[object]],
     *,
     timing_models: Sequence[str] | None,
     circle: bool,
     summary: bool,
     force: bool,
-    names: Names,
+    changes: KeyChanges = NO_CHANGES,
+    names: Names = ARGUMENTS,
 ) -> Sweep:
     """Check what is asked of a sweep.
 
     Parameters
     ----------
     profile
-        The network.
-    axes
-        Values by dotted key.
+        The network, with its changes.
+    vary
+        Values by dotted key, as `sweep` takes them.
     timing_models
         Names of timing models; by default all that can express every value.
     circle, summary, force
         Run circle tests, summarise them over seeds, and run any number of them.
+    changes
+        The changes of the profile, for the answer to name them.
     names
         Names of these in messages.
 
@@ -86,13 +102,14 @@ def checked_sweep(
     Raises
     ------
     BusplanError
-        As `checked_grid`, `without_seed`, `grid_models` and `require_few`.
+        As `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
     """
+    axes = {key: axis_values(profile, key, given, name=names.vary) for key, given in vary.items()}
     grid = checked_grid(profile, axes, with_circle=circle, option=names.vary, circle_option=names.circle)
     grid, seeds = without_seed(grid, option=names.summary) if summary else (grid, None)
     models = grid_models(profile, grid, timing_models, name=names.timing)
     of_circle = (SUMMARY_COLUMNS if summary else CIRCLE_COLUMNS) if circle else ()
-    sweep = Sweep(profile, grid, models, (*grid.axes, *figure_names(profile), *of_circle), seeds)
+    sweep = Sweep(profile, grid, models, (*grid.axes, *figure_names(profile), *of_circle), seeds, changes, circle)
     if circle and not force:
         require_few(grid, seeds=sweep.tests_each, option=names.circle, consent=names.force)
     return sweep

@@ -1,13 +1,13 @@
-"""Run the circle tests of a grid in chunks, on any executor: the same blocks whatever the chunks and their order."""
+"""Run a sweep, its circle tests in chunks on any executor: the same blocks whatever the chunks and their order."""
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor
+from collections.abc import Generator, Iterable, Iterator
 from itertools import groupby, islice
-from typing import Final, Protocol
+from typing import Final
 
+from busplan.progress import Progress
 from busplan.questions.circle.estimate import NOTHING, Estimate, announce
 from busplan.questions.sweep.asked import Sweep
-from busplan.questions.sweep.blocks import SweepBlock, sweep
+from busplan.questions.sweep.blocks import CHUNK_POINTS, SweepBlock, sweep
 from busplan.questions.sweep.circles import (
     MOST_CIRCLES_UNASKED,
     CircleChunk,
@@ -15,11 +15,13 @@ from busplan.questions.sweep.circles import (
     run_chunk,
     with_circles,
 )
-from busplan.questions.sweep.execution import Here, ignored, run_in_order
+from busplan.questions.sweep.execution import Here, Work, run_in_order
 from busplan.questions.sweep.grid import Array
 from busplan.questions.sweep.seeds_run import with_seeds
 from busplan.sections.profile import Profile
 
+_TITLE: Final = "sweep"
+"""Name of the work in its progress."""
 _CHUNK_S: Final = 1.5
 """Estimated time of a chunk: long beside the way to a worker, short enough to be lost."""
 _EACH_S: Final = 0.002
@@ -33,92 +35,74 @@ _BLOCK_TESTS: Final = range(16, 4097)
 """Tests of a block: by the grid alone, so that any executor gives the same row groups."""
 
 
-class Kept(Protocol):
-    """Results of earlier runs, and a place for new ones."""
+def sweep_blocks(asked: Sweep, work: Work, *, chunk_points: int = CHUNK_POINTS) -> Generator[SweepBlock, None, None]:
+    """Compute a sweep; memory does not grow with the grid.
 
-    def __contains__(self, test: int, /) -> bool:
-        """Whether a test is known, by its number."""
+    Parameters
+    ----------
+    asked
+        The sweep.
+    work
+        How it is run.
+    chunk_points
+        Largest number of points of a block; blocks with circle tests have their own.
 
-    def results(self, start: int, count: int) -> Array:
-        """Results of known tests, as from `run_chunk`."""
+    Yields
+    ------
+    SweepBlock
+        In the order of the grid. Close it to end the work early.
 
-    def add(self, start: int, results: Array) -> None:
-        """Keep the results of a chunk."""
+    Raises
+    ------
+    BusplanError
+        The first point whose circle test cannot be run, before any is run.
+    Exception
+        What `work` raises.
+    """
+    if asked.circle:
+        cost = require_circles(asked, work)
+        with work.progress(_TITLE) as report:
+            for block in _circle_blocks(asked, work, report, cost=cost):
+                yield block
+                work.watch()
+        return
+    with work.progress(_TITLE) as report:
+        for block in sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=chunk_points):
+            yield block
+            report(block.chunk.start + block.chunk.points, asked.grid.points)
+            work.watch()
 
 
-def require_circles(
-    asked: Sweep,
-    executor: Executor,
-    *,
-    progress: Callable[[int], None] = ignored,
-    watch: Callable[[], None] = ignored,
-) -> Estimate:
+def require_circles(asked: Sweep, work: Work) -> Estimate:
     """Refuse a grid with a point whose circle test cannot be run, before any is run; say what a long sweep costs.
 
     Parameters
     ----------
     asked
         The sweep.
-    executor
-        Where many points are checked.
-    progress
-        Called with the number of points that are checked, in the order of the grid.
-    watch
-        As in `run_in_order`.
+    work
+        How it is run; few points are checked in this thread.
 
     Raises
     ------
     BusplanError
         The first such point, as from `check_chunk`.
     """
-    cost = NOTHING
-    where = executor if asked.grid.points > MOST_CIRCLES_UNASKED else Here()
+    cost, points = NOTHING, asked.grid.points
+    where = work.executor if points > MOST_CIRCLES_UNASKED else Here()
     chunks = _chunks(asked.profile, enumerate(asked.grid.each_point()), _CHECKED_AT_ONCE)
-    for number, one in enumerate(run_in_order(where, check_chunk, chunks, watch=watch), start=1):
-        cost = cost.then(one)
-        progress(min(number * _CHECKED_AT_ONCE, asked.grid.points))
+    with work.progress("check of the points") as report:
+        for number, one in enumerate(run_in_order(where, check_chunk, chunks, watch=work.watch), start=1):
+            cost = cost.then(one)
+            report(min(number * _CHECKED_AT_ONCE, points), points)
     cost = cost._replace(steps=asked.tests_each * cost.steps, time_s=asked.tests_each * cost.time_s)
     announce(cost)
     return cost
 
 
-def circle_blocks(
-    asked: Sweep,
-    executor: Executor,
-    *,
-    cost: Estimate,
-    kept: Kept | None = None,
-    progress: Callable[[int], None] = ignored,
-    watch: Callable[[], None] = ignored,
-) -> Iterator[SweepBlock]:
-    """Compute a sweep with its circle tests.
-
-    Parameters
-    ----------
-    asked
-        The sweep.
-    executor
-        Where they run; it is not shut down.
-    cost
-        What all of them cost, from `require_circles`.
-    kept
-        What need not be computed, and takes what was.
-    progress
-        Called with the number of tests that are done, in whatever order.
-    watch
-        As in `run_in_order`.
-
-    Yields
-    ------
-    SweepBlock
-        In the order of the grid.
-
-    Raises
-    ------
-    Exception
-        As `run_in_order`.
-    """
-    done = 0
+def _circle_blocks(asked: Sweep, work: Work, report: Progress, *, cost: Estimate) -> Iterator[SweepBlock]:
+    """Compute a sweep with its circle tests, whose cost is known."""
+    done, kept = 0, work.kept
 
     def known(chunk: CircleChunk) -> Array | None:
         if kept is None or chunk.start not in kept:
@@ -134,12 +118,12 @@ def circle_blocks(
     def count(chunk: CircleChunk) -> None:
         nonlocal done
         done += len(chunk.points)
-        progress(done)
+        report(done, asked.tests)
 
     size = chunk_tests(asked.tests, time_s=cost.time_s)
     runs = groupby(enumerate(asked.test_points()), key=lambda test: kept is not None and test[0] in kept)
     chunks = (chunk for _, run in runs for chunk in _chunks(asked.profile, run, size))
-    found = run_in_order(executor, run_chunk, chunks, known=known, finished=finished, watch=watch)
+    found = run_in_order(work.executor, run_chunk, chunks, known=known, finished=finished, watch=work.watch)
     results = (row for chunk in found for row in chunk)
     most = max(1, _within(asked.tests // _BLOCKS, _BLOCK_TESTS) // asked.tests_each)
     for block in sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=most):

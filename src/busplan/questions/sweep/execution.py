@@ -3,8 +3,12 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import AbstractContextManager, contextmanager
 from itertools import islice
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, Protocol, TypeVar
+
+from busplan.progress import Progress
+from busplan.questions.sweep.grid import Array
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -46,6 +50,38 @@ def _same(result: Result) -> Result:
 
 def ignored(*_: object) -> None:
     """Do nothing."""
+
+
+@contextmanager
+def unreported(_title: str) -> Iterator[Progress]:
+    """Report no progress."""
+    yield ignored
+
+
+class Kept(Protocol):
+    """Results of earlier runs, and a place for new ones."""
+
+    def __contains__(self, test: int, /) -> bool:
+        """Whether a test is known, by its number."""
+
+    def results(self, start: int, count: int) -> Array:
+        """Results of known tests, as from `run_chunk`."""
+
+    def add(self, start: int, results: Array) -> None:
+        """Keep the results of a chunk."""
+
+
+class Work(NamedTuple):
+    """How the work of a sweep is run; its answer does not depend on that."""
+
+    executor: Executor = Here()
+    """Where circle tests run; it is not shut down."""
+    progress: Callable[[str], AbstractContextManager[Progress]] = unreported
+    """Opens the progress of a piece of work, by its name."""
+    watch: Callable[[], None] = ignored
+    """Called after each block, with circle tests some times a second; what it raises ends the work."""
+    kept: Kept | None = None
+    """Circle tests that need not be run; it takes those that were."""
 
 
 def run_in_order(

@@ -25,21 +25,8 @@ def _default_figure(profile: Profile) -> str:
     return "margin_corrected_us" if profile.group else "safe_axes"
 
 
-def require_drawable(grid: Grid, *, option: str) -> None:
-    """Refuse a grid that cannot be drawn.
-
-    Parameters
-    ----------
-    grid
-        The grid.
-    option
-        What asks for the picture, for messages.
-
-    Raises
-    ------
-    BusplanError
-        More than two keys vary, or there are too many points.
-    """
+def _require_drawable(grid: Grid, *, option: str) -> None:
+    """Refuse a grid that cannot be drawn."""
     varied = [key for key, axis in grid.axes.items() if axis.size > 1]
     if not grid.axes:
         raise BusplanError(f"{option}: draws figures over one or two keys, and none varies but the seed; vary another")
@@ -58,9 +45,17 @@ class FigureData:
         The sweep; its profile is this design, which the picture marks.
     figure
         Name of the column; by default the safe axes, or of groups the margin.
+    option
+        What asks for the picture, for messages.
+
+    Raises
+    ------
+    BusplanError
+        More than two keys vary, or there are too many points.
     """
 
-    def __init__(self, sweep: Sweep, *, figure: str | None = None) -> None:
+    def __init__(self, sweep: Sweep, *, figure: str | None = None, option: str = "the picture of a sweep") -> None:
+        _require_drawable(sweep.grid, option=option)
         self._profile, self._grid, self._models = sweep.profile, sweep.grid, sweep.timing_models
         self._name = figure or _default_figure(sweep.profile)
         points = self._grid.points, len(self._models)

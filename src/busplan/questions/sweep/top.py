@@ -3,11 +3,12 @@
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isnan
 from types import MappingProxyType
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
 from busplan.buses.figure import CIRCLE_REFUSED_BY, TIMING_MODEL, Figure
+from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Code,
     JsonDocument,
@@ -193,6 +194,10 @@ def _share(flags: Array, points: int) -> int:
     return count * (points // int(flags.size))
 
 
+def _not_kept() -> NoReturn:
+    raise BusplanError("a sweep's document has every row: it is written as the rows come, and not from a few of them")
+
+
 class TopRow(NamedTuple):
     """One of the top rows."""
 
@@ -246,6 +251,50 @@ class TopRows:
         if self._sort_by is None:
             return ""
         return f", {'smallest' if self._sign > 0 else 'largest'} {self._sort_by} first"
+
+
+class Digest:
+    """What is told of a sweep in sentences and top rows, of blocks that pass by and are not kept.
+
+    Parameters
+    ----------
+    sweep
+        The sweep; its columns are those of the rows.
+    top
+        How many rows.
+    sort_by
+        Column in numbers to sort by; None for the order of the grid.
+    ascending
+        Smallest first.
+    """
+
+    def __init__(self, sweep: Sweep, *, top: int, sort_by: str | None = None, ascending: bool = False) -> None:
+        self._tally = Tally(sweep)
+        self._top = TopRows(sweep.columns, sort_by=sort_by, ascending=ascending, top=top)
+
+    def add(self, block: SweepBlock) -> None:
+        """Take one more block; blocks come in the order of the grid."""
+        self._tally.add(block)
+        self._top.add(block)
+
+    @property
+    def points(self) -> int:
+        """Points so far."""
+        return self._tally.points
+
+    def sentences(self) -> Iterator[Sentence]:
+        """How many points there are, and how many fit."""
+        return self._tally.sentences()
+
+    def report(self, document: Callable[[], JsonDocument] = _not_kept) -> Report:
+        """The answer in blocks.
+
+        Parameters
+        ----------
+        document
+            Function that returns the document with all rows; without it the answer has none.
+        """
+        return sweep_report(self._top, self._tally, document=document)
 
 
 def sweep_report(top: TopRows, tally: Tally, *, document: Callable[[], JsonDocument]) -> Report:

@@ -7,7 +7,10 @@ from math import isfinite
 from typing import Final, TypeGuard
 
 from busplan.errors import BusplanError
+from busplan.profile.kinds import words_of
+from busplan.questions.base.inputs import items
 from busplan.questions.sweep.grid import Even, Listed, Steps, Values
+from busplan.sections.profile import Profile
 
 _NUMBER: Final = re.compile(r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,2})?")
 _FORMS: Final = (
@@ -19,6 +22,36 @@ _EXACT: Final = 2**53
 _MAX_DECIMALS: Final = 22
 """Powers of ten up to this are exact as floats."""
 _MOST_LISTED: Final = 10_000
+
+
+def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
+    """Values of a key: text as on the command line, a range, or several values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    key
+        Dotted key.
+    given
+        The values.
+    name
+        Name of the argument in messages.
+
+    Raises
+    ------
+    BusplanError
+        Not values of the key.
+    """
+    words = words_of(profile, key)
+    if isinstance(given, str):
+        return parse_values(given, name=f"{name} {key}={given}", words=words)
+    name = f"{name} {key}"
+    return (
+        stepped(given, name=name)
+        if isinstance(given, range)
+        else listed(items(given, name=name), name=name, words=words)
+    )
 
 
 def parse_values(text: str, *, name: str, words: Collection[str] = ()) -> Values:
