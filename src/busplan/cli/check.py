@@ -1,6 +1,6 @@
 """`busplan check`."""
 
-from functools import partial
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -17,10 +17,10 @@ from busplan.gate.formats import FORMATS, gate_format
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Iterator, Sequence
+    from concurrent.futures import Executor
 
     from busplan.gate.baseline import Baseline
-    from busplan.gate.gate import FileResult
     from busplan.gate.report import CheckReport
     from busplan.profile.collect import ProfileSource
 
@@ -118,32 +118,29 @@ def check_command(
     _require_baseline(baseline, update=update_baseline)
     if update_baseline and changes.each:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
-    from busplan.gate.gate import check_source
-    from busplan.gate.report import CheckReport
+    from busplan.gate.check import check
     from busplan.profile.collect import collect
-    from busplan.questions.circle.check import MOST_STEPS
 
     collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
     _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
-    recorded = _read_baseline(baseline, needed=not update_baseline)
-    before = None
-    if recorded is not None and not update_baseline:
-        before = recorded.profiles if recorded.is_current else None
-        if before is None:
-            say(
-                f"warning: {baseline}: recorded by other timing models, so its figures are not compared; "
-                "record them again with --update-baseline"
-            )
-    one = partial(
-        check_source,
-        recorded=before,
-        with_circle=circle,
-        circle_steps=circle_steps or MOST_STEPS,
-        changes=changes,
-        record=update_baseline,
-    )
-    others = len(collection.skipped) if skip_others else 0
-    report = CheckReport(_check(collection.sources, one, jobs=jobs), changes, others=others)
+    recorded = None if baseline is None else _read_baseline(baseline, needed=not update_baseline)
+    if recorded is not None and not recorded.is_current and not update_baseline:
+        say(
+            f"warning: {baseline}: recorded by other timing models, so its figures are not compared; "
+            "record them again with --update-baseline"
+        )
+    with _executor(min(jobs, len(collection.sources))) as where:
+        answer = check(
+            collection,
+            circle=circle,
+            changes=changes,
+            baseline=None if update_baseline or recorded is None or not recorded.is_current else recorded,
+            record=update_baseline,
+            skip_others=skip_others,
+            executor=where,
+            **({} if circle_steps is None else {"circle_steps": circle_steps}),
+        )
+    report = answer.found
     _write(report, format_=format_, output=output)
     say(*(file.failure for file in report.files if file.failure is not None))
     if verbose:
@@ -153,10 +150,9 @@ def check_command(
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
         from busplan.forms.columns import sentence_text
-        from busplan.gate.answer import summary_sentence
         from busplan.questions.words.documents import changes_sentences
 
-        say(*map(sentence_text, (*changes_sentences(changes), summary_sentence(report))))
+        say(*map(sentence_text, changes_sentences(changes)), answer.headline)
     if report.failed:
         raise typer.Exit(2)
     if not exit_zero and report.has_findings(fail_on):
@@ -180,39 +176,23 @@ def _require_apart(
     require_apart({"--output": output, "--baseline": baseline if updated else None}, inputs=read)
 
 
-def _check(
-    sources: "Sequence[ProfileSource]", one: "Callable[[ProfileSource], FileResult]", *, jobs: int
-) -> "tuple[FileResult, ...]":
-    number = min(jobs, len(sources))
+@contextmanager
+def _executor(number: int) -> "Iterator[Executor | None]":
+    """Worker processes; None for this one."""
     if number <= 1:
-        return tuple(map(one, sources))
+        yield None
+        return
     from busplan.cli.workers import workers
 
-    # Only this process has standard input.
-    own = {source: one(source) for source in sources if str(source.path) == "-"}
-    others = [source for source in sources if source not in own]
     with workers(number) as crew:
-        found = own | dict(zip(others, crew.map(one, others), strict=True))
-    return tuple(found[source] for source in sources)
+        yield crew
 
 
-def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":
-    if path is None or (not needed and not path.exists()):
-        return None
-    if needed and not path.exists():
-        raise BusplanError(f"{path}: no such file; record it with --update-baseline")
-    from busplan.gate.baseline import MAX_BASELINE_BYTES, read_baseline
-    from busplan.profile.toml import read_bytes
+def _read_baseline(path: Path, *, needed: bool) -> "Baseline | None":
+    """What is recorded; None if there is no file yet and none is needed."""
+    from busplan.gate.baseline import load_baseline
 
-    # Absolute, because "-" would mean standard input.
-    content = read_bytes(path.absolute(), name=str(path), limit=MAX_BASELINE_BYTES)
-    if len(content) > MAX_BASELINE_BYTES:
-        raise BusplanError(f"{path}: is larger than {MAX_BASELINE_BYTES:,} bytes, so it is no baseline; give another")
-    try:
-        text = content.decode()
-    except UnicodeDecodeError:
-        raise BusplanError(f"{path}: is not UTF-8, so it is no baseline; give another") from None
-    return read_baseline(text, name=str(path))
+    return load_baseline(path) if needed or path.exists() else None
 
 
 def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:

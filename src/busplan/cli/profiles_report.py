@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from busplan.forms.blocks import Chapter, Code, Record, Report, Sentence, count_value, sentence
 from busplan.forms.numbers import nouns, period_value
-from busplan.questions.fit.network import network_of
 from busplan.questions.words.documents import document
 from busplan.sections.profile import Profile
 
@@ -30,7 +29,7 @@ def _record(profile: Profile) -> Record:
     """Name, main figures and description."""
     return {
         "name": profile.name,
-        "nodes": int(network_of(profile).nodes),
+        "nodes": sum(alike.nodes for alike in profile.alike_nodes),
         "period_us": profile.cycle.period_us,
         "timing_model": profile.bus.timing_model,
         "description": " ".join(profile.description.split()),

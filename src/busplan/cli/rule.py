@@ -6,7 +6,6 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.options import AllOption, FormatOption, OutputOption
-from busplan.errors import BusplanError
 
 
 def complete_code(incomplete: str) -> list[str]:
@@ -34,18 +33,6 @@ def rule_command(
     Example: busplan rule BP110
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.gate.registry import all_rules
-        from busplan.gate.rules_report import rule_report, rules_report
+        from busplan.gate.rules_report import rule_answer
 
-        rules = all_rules()
-        if code is None:
-            give(rules_report(list(rules.values())))
-            return
-        named = {**rules, **{rule.name.upper(): rule for rule in rules.values()}}
-        if code.upper() not in named:
-            from busplan.nearest import did_you_mean
-
-            known = (*rules, *(rule.name for rule in rules.values()))
-            hint = " ".join(filter(None, (did_you_mean(code, known), "`busplan rule` lists them")))
-            raise BusplanError(f"{code}: no such rule; {hint}")
-        give(rule_report(named[code.upper()]))
+        give(rule_answer(code))

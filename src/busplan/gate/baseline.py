@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from math import isfinite
+from pathlib import Path
 from sys import float_info
 from typing import Final, NamedTuple
 
@@ -10,6 +11,7 @@ from busplan.errors import BusplanError
 from busplan.gate.finding import Subject
 from busplan.printable import json_text
 from busplan.profile.keys import flat
+from busplan.profile.toml import read_bytes
 from busplan.sections.profile import Profile
 
 _SCHEMA: Final = 1
@@ -62,6 +64,27 @@ class Baseline(NamedTuple):
     def is_current(self) -> bool:
         """Whether its figures may be compared with those of today."""
         return self.models == MODELS
+
+
+def load_baseline(path: Path) -> Baseline:
+    """Read the file of a baseline.
+
+    Raises
+    ------
+    BusplanError
+        The file does not exist or cannot be read, or is no baseline of this version.
+    """
+    if not path.exists():
+        raise BusplanError(f"{path}: no such file; record it with --update-baseline")
+    # Absolute, because "-" would mean standard input.
+    content = read_bytes(path.absolute(), name=str(path), limit=MAX_BASELINE_BYTES)
+    if len(content) > MAX_BASELINE_BYTES:
+        raise BusplanError(f"{path}: is larger than {MAX_BASELINE_BYTES:,} bytes, so it is no baseline; give another")
+    try:
+        text = content.decode()
+    except UnicodeDecodeError:
+        raise BusplanError(f"{path}: is not UTF-8, so it is no baseline; give another") from None
+    return read_baseline(text, name=str(path))
 
 
 def read_baseline(text: str, *, name: str) -> Baseline:

@@ -1,20 +1,26 @@
 """`busplan.check`."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
+from busplan.errors import BusplanError
 from busplan.forms.blocks import Report
 from busplan.forms.columns import sentence_text
 from busplan.gate.answer import check_report, summary_sentence
+from busplan.gate.baseline import Baseline, Record, load_baseline
 from busplan.gate.gate import FileResult, check_document, check_source
 from busplan.gate.report import CheckReport, Located, Summary
-from busplan.profile.collect import collect
+from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.collect import Collection, collect
 from busplan.profile.document import Document
 from busplan.profile.write import profile_text
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import ProfileLike, argument, items
+from busplan.questions.base.origin import key_changes
 from busplan.questions.circle.check import MOST_STEPS
 from busplan.sections.profile import Profile
 
@@ -27,39 +33,60 @@ class CheckAnswer(Answer):
     ----------
     files
         Each file with its `status`, its `findings` and, if it could not be checked, its `failure`.
+    changes
+        What was changed in every file.
+    others
+        Number of files that were skipped because they are no profiles.
     """
 
     files: tuple[FileResult, ...]
+    changes: KeyChanges = NO_CHANGES
+    others: int = 0
 
     @property
     def findings(self) -> tuple[Located, ...]:
         """All findings by file and place, each with the `path` and the source line."""
-        return self._found.located
+        return self.found.located
 
     @property
     def summary(self) -> Summary:
         """Number of files, errors and warnings."""
-        return self._found.summary
+        return self.found.summary
 
     @property
     def passed(self) -> bool:
         """Whether every file could be checked, and none has an error."""
-        return not self._found.failed and not self._found.has_findings("error")
+        found = self.found
+        return not found.failed and not found.has_findings("error")
 
     def report(self) -> Report:
         """The answer in blocks."""
-        return check_report(self._found)
-
-    def _headline(self) -> str:
-        return sentence_text(summary_sentence(self._found))
+        return check_report(self.found)
 
     @property
-    def _found(self) -> CheckReport:
-        return CheckReport(self.files)
+    def headline(self) -> str:
+        """How many profiles were checked, and how many errors and warnings they have."""
+        return sentence_text(summary_sentence(self.found))
+
+    @property
+    def found(self) -> CheckReport:
+        """All findings and their summary, as `busplan.gate.formats` write them."""
+        return CheckReport(self.files, self.changes, others=self.others)
+
+    def _headline(self) -> str:
+        return self.headline
 
 
 def check(
-    paths: ProfileLike | Iterable[ProfileLike], *, circle: bool = True, circle_steps: int = MOST_STEPS
+    paths: ProfileLike | Iterable[ProfileLike] | Collection,
+    *,
+    circle: bool = True,
+    circle_steps: int = MOST_STEPS,
+    changes: Mapping[str, object] | KeyChanges = NO_CHANGES,
+    baseline: str | os.PathLike[str] | Baseline | None = None,
+    record: bool = False,
+    skip_others: bool = False,
+    executor: Executor | None = None,
 ) -> CheckAnswer:
     """Check whether profiles fit their bus and hold their circle.
 
@@ -67,11 +94,24 @@ def check(
     ----------
     paths
         One or several files, folders (every *.toml below with a `schema_version`), shipped names or a `Profile` each. A
-        `Profile` is checked as the file that `busplan` would write of it, NAME.toml.
+        `Profile` is checked as the file that `busplan` would write of it, NAME.toml. Or what
+        `busplan.profile.collect.collect` found.
     circle
         Run the circle test of profiles that ask for one.
     circle_steps
         Most simulated steps of each axis of a circle: a longer one is not run, and has a warning.
+    changes
+        New values by dotted key, in the key's unit, for every file; each must be valid without them.
+    baseline
+        A file that `busplan check --update-baseline` recorded, or what stands in it: a profile that lost axes or margin
+        against it has an error.
+    record
+        Also give the `figures` and `keys` of each file that a baseline records.
+    skip_others
+        Skip named files without a `schema_version`, and count them.
+    executor
+        Where the files are checked; by default in this thread. Any `concurrent.futures.Executor` gives the same answer,
+        and is not shut down. Worker processes must have this version of busplan.
 
     Returns
     -------
@@ -82,7 +122,9 @@ def check(
     Raises
     ------
     BusplanError
-        No path, or standard input.
+        No path, standard input, an invalid change, or no baseline of these timing models.
+    Exception
+        What `executor` raises.
 
     Examples
     --------
@@ -91,11 +133,47 @@ def check(
     >>> answer.passed, answer.summary
     (True, Summary(files=2, errors=0, warnings=0))
     """
+    changed = changes if isinstance(changes, KeyChanges) else key_changes(changes)
+    recorded = None if baseline is None else _recorded(baseline)
+    collection, profiles = (paths, []) if isinstance(paths, Collection) else _collected(paths, skip_others=skip_others)
+    check_file = partial(
+        check_source, with_circle=circle, circle_steps=circle_steps, changes=changed, recorded=recorded, record=record
+    )
+    if executor is None:
+        found = list(map(check_file, collection.sources))
+    else:
+        # Only this process has standard input.
+        own = {source: check_file(source) for source in collection.sources if str(source.path) == "-"}
+        others = [source for source in collection.sources if source not in own]
+        results = own | dict(zip(others, executor.map(check_file, others), strict=True))
+        found = [results[source] for source in collection.sources]
+    for profile in profiles:
+        document = Document(f"{profile.name}.toml", profile_text(profile))
+        before = None if recorded is None else recorded.get(document.name, Record({}))
+        found.append(
+            check_document(
+                document,
+                with_circle=circle,
+                circle_steps=circle_steps,
+                changes=changed,
+                baseline=before,
+                record=record,
+            )
+        )
+    return CheckAnswer(tuple(found), changed, len(collection.skipped) if skip_others else 0)
+
+
+def _collected(paths: ProfileLike | Iterable[ProfileLike], *, skip_others: bool) -> tuple[Collection, list[Profile]]:
+    """Files of the arguments, and the profiles that are in memory."""
     # A profile is iterable, too: over its sections.
     several = [paths] if isinstance(paths, str | os.PathLike | Profile) else items(paths, name="paths")
-    checks = partial(check_document, with_circle=circle, circle_steps=circle_steps, record=False)
-    written = [Document(f"{one.name}.toml", profile_text(one)) for one in several if isinstance(one, Profile)]
+    profiles = [one for one in several if isinstance(one, Profile)]
     files = [argument(one) for one in several if not isinstance(one, Profile)]
-    sources = collect(files).sources if files else ()
-    found = [check_source(source, with_circle=circle, circle_steps=circle_steps) for source in sources]
-    return CheckAnswer((*found, *map(checks, written)))
+    return collect(files, skip_others=skip_others), profiles
+
+
+def _recorded(baseline: str | os.PathLike[str] | Baseline) -> Mapping[str, Record]:
+    known = baseline if isinstance(baseline, Baseline) else load_baseline(Path(baseline))
+    if not known.is_current:
+        raise BusplanError("baseline: recorded by other timing models; record it again with --update-baseline")
+    return known.profiles

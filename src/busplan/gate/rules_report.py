@@ -5,6 +5,7 @@ from functools import partial
 from typing import Final
 
 from busplan.buses.rule import Rule
+from busplan.errors import BusplanError
 from busplan.forms.blocks import (
     Block,
     Code,
@@ -17,13 +18,38 @@ from busplan.forms.blocks import (
     TableColumn,
     TableRow,
 )
-from busplan.gate.registry import NEVER_SUPPRESSED
+from busplan.gate.registry import NEVER_SUPPRESSED, all_rules
+from busplan.nearest import did_you_mean
 from busplan.questions.words.documents import document
 
 _COLUMNS: Final = (
     *(TableColumn(heading, kind="words") for heading in ("code", "rule", "severity")),
     TableColumn("what is wrong", kind="words", wraps=True),
 )
+
+
+def rule_answer(code: str | None = None) -> Report:
+    """Report of one rule, or of all.
+
+    Parameters
+    ----------
+    code
+        Code or name of a rule, in letters of any case; None for all.
+
+    Raises
+    ------
+    BusplanError
+        No such rule.
+    """
+    rules = all_rules()
+    if code is None:
+        return rules_report(list(rules.values()))
+    named = {**rules, **{rule.name.upper(): rule for rule in rules.values()}}
+    if code.upper() not in named:
+        known = (*rules, *(rule.name for rule in rules.values()))
+        hint = " ".join(filter(None, (did_you_mean(code, known), "`busplan rule` lists them")))
+        raise BusplanError(f"{code}: no such rule; {hint}")
+    return rule_report(named[code.upper()])
 
 
 def rules_report(rules: Sequence[Rule]) -> Report:

@@ -1,10 +1,13 @@
 """How a command names a profile that is in memory."""
 
+from collections.abc import Mapping
+
 from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 from busplan.profile.keys import dotted_keys
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.write import value_text
+from busplan.questions.base.inputs import plain
 from busplan.sections.profile import Profile
 
 
@@ -33,15 +36,33 @@ def origin_of(profile: Profile) -> tuple[str, KeyChanges]:
     return (f"{profile.name}.toml", NO_CHANGES) if changes is None else (profile.name, changes)
 
 
+def key_changes(values: Mapping[str, object]) -> KeyChanges:
+    """Changes of a profile from new values by dotted key, as `--set` options say them.
+
+    Raises
+    ------
+    BusplanError
+        Not new values by key, two of them overlap, or a value that TOML has not.
+    """
+    if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
+        raise BusplanError(f'changes {values!r}: expected new values by key, as {{"bus.nodes": 3}}')
+    return KeyChanges(tuple(_key_change(key, plain(value)) for key, value in values.items()))
+
+
+def _key_change(key: str, value: object) -> KeyChange:
+    try:
+        return KeyChange(key, value, text=f"{key}={value_text(value)}")
+    except (TypeError, ValueError):
+        raise BusplanError(f"changes {key}: {value!r} is no value of a profile") from None
+
+
 def _changes_of_shipped(profile: Profile) -> KeyChanges | None:
     """Changes from the shipped profile of the same name; None if none lead to it."""
     shipped = load(profile.name).profile
     old, new = dotted_keys(shipped), dotted_keys(profile)
     differing = {key: one.value for key, one in new.items() if key not in old or old[key].value != one.value}
     try:
-        changes = KeyChanges(
-            tuple(KeyChange(key, value, text=f"{key}={value_text(value)}") for key, value in differing.items())
-        )
+        changes = key_changes(differing)
         return changes if changes.applied(shipped) == profile else None
     except (BusplanError, TypeError):  # a key that is gone, or a group of its own, is no value that an option sets
         return None
