@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 import busplan
+from busplan.gate.baseline import MODELS, Baseline, Record, write_baseline
+from busplan.profile.changes import KeyChanges, parse_set
 from busplan.profile.shipped import load, shipped_folder
 
 TEXT = (shipped_folder() / "paper-4ms.toml").read_text(encoding="utf-8")
@@ -135,6 +138,22 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         lambda: busplan.timeline("paper-4ms", transaction=("read", 9)),
         "read:9: no such transaction in this cycle",
     ),
+    "no changes for a check": (
+        lambda: busplan.check("paper-4ms", changes=[1]),  # type: ignore[arg-type]
+        "changes [1]: expected new values by key",
+    ),
+    "a change to no value": (
+        lambda: busplan.check("paper-4ms", changes={"cycle.period_us": float("nan")}),
+        "changes cycle.period_us: nan is no value of a profile",
+    ),
+    "no baseline": (
+        lambda: busplan.check("paper-4ms", baseline="nowhere.json"),
+        "nowhere.json: no such file; record it with --update-baseline",
+    ),
+    "a baseline of other models": (
+        lambda: busplan.check("paper-4ms", baseline=Baseline({}, MODELS - 1)),
+        "baseline: recorded by other timing models",
+    ),
     "no paths": (lambda: busplan.check([]), "paths: no values; give at least one"),
     "paths that are none": (lambda: busplan.check(5), "paths 5: expected several values, as a list"),  # type: ignore[arg-type]
     "a path that is none": (lambda: busplan.load_profile(5), "5: expected a path, the name of a shipped"),  # type: ignore[arg-type]
@@ -228,6 +247,47 @@ def test_a_warning_passes_and_a_file_that_is_not_there_does_not(own: Path) -> No
     answer = busplan.check(own, circle=False)
     assert (answer.passed, [one.finding.code for one in answer.findings]) == (True, ["BP110"])
     assert busplan.check("nowhere.toml").passed is False
+
+
+def test_every_file_is_checked_with_changes_which_the_answer_names(own: Path) -> None:
+    for changes in ({"cycle.period_us": np.int64(300)}, KeyChanges(parse_set(["cycle.period_us=300"]))):
+        answer = busplan.check([own, "paper-1ms"], circle=False, changes=changes)
+        assert {one.finding.code for one in answer.findings} >= {"BP101"}
+        assert answer.to_dict()["changes"] == {"cycle.period_us": 300}
+        assert answer.changes.words == "--set cycle.period_us=300"
+    (refused,) = busplan.check("paper-1ms", changes={"bus.nodes": 0}).files
+    assert refused.failure is not None
+    assert "--set bus.nodes=0" in refused.failure
+
+
+def test_a_check_compares_with_a_baseline_and_gives_what_one_records(own: Path, tmp_path: Path) -> None:
+    (now,) = busplan.check(own, circle=False, record=True).files
+    assert now.figures
+    assert busplan.check(own, circle=False).files[0].figures == {}
+    better = {name: value + 1 for name, value in now.figures.items()}
+    file = tmp_path / "baseline.json"
+    file.write_text(write_baseline({now.path: Record(better, now.keys)}), encoding="utf-8")
+    for baseline in (file, str(file), Baseline({now.path: Record(better, now.keys)}, MODELS)):
+        (found,) = busplan.check(own, circle=False, baseline=baseline).findings
+        assert found.finding.code == "BP301"
+    in_memory = {"paper-4ms.toml": Record(better)}
+    fast = busplan.load_profile("paper-4ms")
+    codes = [one.finding.code for one in busplan.check(fast, baseline=Baseline(in_memory, MODELS)).findings]
+    assert "BP301" in codes
+
+
+def test_a_check_on_an_executor_is_the_same(own: Path) -> None:
+    several: list[str | Path | busplan.Profile] = [own, "paper-1ms", "nowhere.toml", busplan.load_profile("paper-dma")]
+    with ThreadPoolExecutor(2) as executor:
+        there = busplan.check(several, circle=False, executor=executor)
+    assert there.files == busplan.check(several, circle=False).files
+
+
+def test_files_that_are_no_profiles_are_skipped_and_counted_on_request(own: Path, tmp_path: Path) -> None:
+    (tmp_path / "other.toml").write_text("a = 1\n", encoding="utf-8")
+    answer = busplan.check([own, tmp_path / "other.toml"], circle=False, skip_others=True)
+    assert (len(answer.files), answer.others, answer.passed) == (1, 1, True)
+    assert answer.headline.endswith("skipped 1 file without a schema_version")
 
 
 def test_a_profile_is_checked_as_the_file_that_would_be_written_of_it() -> None:
