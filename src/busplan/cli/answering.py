@@ -97,6 +97,18 @@ def naming(changes: KeyChanges) -> Iterator[None]:
         raise BusplanError(*(_naming(problem, changes) for problem in error.problems)) from None
 
 
+@contextmanager
+def naming_option(argument: str) -> Iterator[None]:
+    """Name an argument of a public function as the option of that name in its errors: transaction, --transaction."""
+    try:
+        yield
+    except BusplanError as error:
+        named = tuple(re.sub(f"^{argument} ", f"--{argument} ", problem) for problem in error.problems)
+        if named == error.problems:
+            raise
+        raise BusplanError(*named) from None
+
+
 def _naming(problem: str, changes: KeyChanges) -> str:
     keys = (one.sections[-1] for one in changes.by_set)
     is_of_profile = _KEY_AND_VALUE.search(problem) or any(key in problem for key in keys if "_" in key)

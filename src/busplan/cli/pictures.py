@@ -79,6 +79,13 @@ def write_picture(svg: str, form: Picture, output: Path | None) -> None:
 def picture_title(headline: "Sentence", changes: KeyChanges) -> str:
     """Title of a picture that is a file of its own: the headline of its answer, and what was set."""
     from busplan.forms.columns import sentence_text
+
+    return f"{sentence_text(headline)} {picture_note(changes)}".rstrip()
+
+
+def picture_note(changes: KeyChanges) -> str:
+    """What the title of a picture says of --set; empty without it."""
+    from busplan.forms.columns import sentence_text
     from busplan.questions.words.documents import changes_sentences
 
-    return " ".join(map(sentence_text, (headline, *changes_sentences(changes))))
+    return " ".join(map(sentence_text, changes_sentences(changes)))
