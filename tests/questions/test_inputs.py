@@ -247,3 +247,9 @@ def test_a_profile_is_checked_as_the_file_that_would_be_written_of_it() -> None:
     answer = busplan.check([fast, "paper-1ms"], circle=False)
     assert (answer.passed, [one.path for one in answer.files]) == (False, ["paper-1ms.toml", "paper-4ms.toml"])
     assert "BP101" in [one.finding.code for one in busplan.check(fast, circle=False).findings]
+
+
+def test_a_transaction_is_a_pair_or_its_text() -> None:
+    wanted = busplan.timeline("paper-4ms", transaction=("read", 1))
+    assert busplan.timeline("paper-4ms", transaction="read:1") == wanted
+    assert wanted.events[0].node == 1
