@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.cli.answering import answer, naming, naming_option
+from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
-from busplan.cli.destinations import profile_files, require_apart
+from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
     ProfileArgument,
@@ -17,7 +17,7 @@ from busplan.cli.options import (
     time_us,
     timing_model,
 )
-from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_note, write_picture
+from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, show_drawn
 from busplan.errors import BusplanError
 from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -100,7 +100,7 @@ def timeline_command(
     if from_us is not None and to_us is not None and from_us >= to_us:
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
 
-    def found() -> "TimelineAnswer":
+    def find() -> "TimelineAnswer":
         from busplan.questions.timeline import timeline
 
         plan = load_changed(profile, changes)
@@ -113,11 +113,4 @@ def timeline_command(
                 transaction=transaction,
             )
 
-    match chosen:
-        case "svg" | "png":
-            require_apart({"--output": output}, inputs=profile_files(profile))
-            with naming(changes):
-                write_picture(found().svg(note=picture_note(changes)), chosen, output)
-        case _:
-            with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                give(found().report())
+    show_drawn(find, chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_)
