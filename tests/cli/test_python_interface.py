@@ -33,7 +33,10 @@ NO_QUESTION = {
     "manual": "pages of the reference",
     "profiles": "a list of files",
 }
-PYTHON_NAMES = {
+Reasons = Mapping[str | tuple[str, str], str]
+"""By option or parameter of every command, or by command and option or parameter."""
+
+PYTHON_NAMES: Mapping[str, str] = {
     "timing": "timing_model",
     "period": "period_us",
     "payload": "payload_bytes",
@@ -42,15 +45,15 @@ PYTHON_NAMES = {
 }
 """Parameter of an option whose value has its unit, or needs no longer word."""
 
-WITH_THE_PROFILE = {
+WITH_THE_PROFILE: Reasons = {
     "set": "load_profile(profile, changes=...)",
-    "period": "load_profile(profile, changes=...), where the function has no period_us",
+    **{(name, "period"): "the same" for name in ("timeline", "map", "compare", "report")},
 }
-TERMINAL_OR_FILES = {
+TERMINAL_OR_FILES: Reasons = {
     "all": "rows and columns on a terminal",
     "format": "save(path) goes by the ending",
     "output": "save(path)",
-    "force": "replaces an old file",
+    ("plan", "force"): "replaces an old file",
     "plot": "save(path)",
     "figure": "which figure --plot draws",
     "trace": "trace_csv(), and arrays by runs[0].trace()",
@@ -73,18 +76,23 @@ TERMINAL_OR_FILES = {
     "quiet": "what is printed",
     "verbose": "what is printed",
 }
-"""Options that no function needs, with the reason or what Python has instead; a function may have some of them."""
-PYTHON_ALONE = {
+"""Options that no function needs, of every command or of one, with the reason or what Python has instead."""
+PYTHON_ALONE: Reasons = {
     "progress": "a terminal draws it",
     "executor": "--jobs and --cluster",
     ("calibrate", "source"): "a file has its name",
+    ("check", "changes"): "--set",
+    ("check", "record"): "--update-baseline",
+    ("diff", "arguments"): "the profiles as typed",
     ("evidence", "paper"): "a command of its own",
     ("paper", "paper"): "the command is its value",
     ("paper", "kind"): "the paper is of one kind",
     ("plan", "gap_count"): "--set bus.gap_count",
     ("plan", "reserve"): "--set limits.reserve",
+    ("plan", "wanted"): "--set",
+    ("report", "origins"): "the profiles as typed",
 }
-"""Parameters without an option, of every function or of that of one command."""
+"""Parameters without an option of that name, of every function or of that of one command."""
 
 
 def options(command: str) -> set[str]:
@@ -106,31 +114,21 @@ def test_every_command_has_a_function_or_a_reason_for_none() -> None:
 
 @pytest.mark.parametrize("command", FUNCTIONS)
 def test_what_a_command_takes_its_function_takes(command: str) -> None:
+    taken = {name for name in options(command) if {name, PYTHON_NAMES.get(name, name)} & parameters(command)}
     elsewhere = {*WITH_THE_PROFILE, *TERMINAL_OR_FILES}
-    missing = {
-        name
-        for name in options(command)
-        if not {name, PYTHON_NAMES.get(name, name)} & parameters(command) and name not in elsewhere
-    }
-    assert missing == set()
+    assert {name for name in options(command) - taken if not {name, (command, name)} & elsewhere} == set()
 
 
 @pytest.mark.parametrize("command", FUNCTIONS)
 def test_what_a_function_takes_its_command_takes(command: str) -> None:
     taken = {spelled for name in options(command) for spelled in (name, PYTHON_NAMES.get(name, name))}
-    missing = {name for name in parameters(command) - taken if not {name, (command, name)} & PYTHON_ALONE.keys()}
-    assert missing == set()
+    assert {name for name in parameters(command) - taken if not {name, (command, name)} & PYTHON_ALONE.keys()} == set()
 
 
 def test_no_reason_is_left_of_what_is_gone() -> None:
-    taken = {name for command in FUNCTIONS for name in options(command)}
+    taken = {one for command in FUNCTIONS for name in options(command) for one in (name, (command, name))}
     assert {*PYTHON_NAMES, *WITH_THE_PROFILE, *TERMINAL_OR_FILES} <= taken
-    for one in PYTHON_ALONE:
-        if isinstance(one, tuple):
-            command, name = one
-            assert name in parameters(command) - options(command)
-        else:
-            assert any(one in parameters(command) for command in FUNCTIONS)
+    assert not taken & {one for one in PYTHON_ALONE if isinstance(one, tuple)}
 
 
 @pytest.mark.parametrize("command", FUNCTIONS)
