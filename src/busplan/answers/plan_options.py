@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from busplan.analysis.capacity.certainty import FITS
+from busplan.analysis.capacity.cycle import TIME
 from busplan.analysis.network import bus_of
 from busplan.analysis.planning.option import Option
 from busplan.analysis.planning.plan import Plan
@@ -71,7 +71,8 @@ def option_margin(option: Option, *, at: str) -> tuple[ShownValue, ShownValue]:
         JSON pointer to the option.
     """
     margin, doubt = (attribute_value(one, option.deciding, at=at) for one in (MARGIN_CORRECTED, UNCERTAINTY))
-    return margin._replace(state="neutral" if option.deciding.verdict == FITS else "fails"), doubt
+    is_short = TIME in (*option.deciding.exceeded, *(option.deciding.not_shown or ()))
+    return margin._replace(state="fails" if is_short else "neutral"), doubt
 
 
 _SHORT: Final = {
