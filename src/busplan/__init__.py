@@ -12,7 +12,6 @@ Examples
 
 from importlib import import_module
 from typing import TYPE_CHECKING
-from warnings import warn
 
 __version__ = "0.1.0"
 
@@ -52,24 +51,22 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from busplan.api.calibrate import CalibrateAnswer, calibrate
-    from busplan.api.capacity import CapacityAnswer, capacity
-    from busplan.api.check import CheckAnswer, check
-    from busplan.api.circle import CircleTestAnswer, circle_test
-    from busplan.api.compare import CompareAnswer, compare
-    from busplan.api.diff import DiffAnswer, diff
-    from busplan.api.evidence import EvidenceAnswer, evidence
-    from busplan.api.explain import ExplainAnswer, explain
-    from busplan.api.inputs import load_profile
-    from busplan.api.latency import LatencyAnswer, latency
-    from busplan.api.map import MapAnswer, map_
-    from busplan.api.map import TradeOffAnswer as TradeOffAnswer
-    from busplan.api.map import trade_off as trade_off
-    from busplan.api.plan import PlanAnswer, plan
-    from busplan.api.report import ReportAnswer, report
-    from busplan.api.sweep import SweepAnswer, sweep
-    from busplan.api.timeline import TimelineAnswer, timeline
     from busplan.errors import BusplanError
+    from busplan.gate.check import CheckAnswer, check
+    from busplan.questions.base.inputs import load_profile
+    from busplan.questions.calibrate import CalibrateAnswer, calibrate
+    from busplan.questions.capacity import CapacityAnswer, capacity
+    from busplan.questions.circle import CircleTestAnswer, circle_test
+    from busplan.questions.compare import CompareAnswer, compare
+    from busplan.questions.diff import DiffAnswer, diff
+    from busplan.questions.evidence import EvidenceAnswer, evidence
+    from busplan.questions.explain import ExplainAnswer, explain
+    from busplan.questions.latency import LatencyAnswer, latency
+    from busplan.questions.map import MapAnswer, map_
+    from busplan.questions.plan import PlanAnswer, plan
+    from busplan.questions.report import ReportAnswer, report
+    from busplan.questions.sweep import SweepAnswer, sweep
+    from busplan.questions.timeline import TimelineAnswer, timeline
     from busplan.sections.profile import Profile
 else:
     # Loaded at first use, because the command line imports this package, too. Hidden from type checkers, so that they
@@ -77,50 +74,19 @@ else:
     _HOMES = {
         "BusplanError": "busplan.errors",
         "Profile": "busplan.sections.profile",
-        "load_profile": "busplan.api.inputs",
-        "CalibrateAnswer": "busplan.api.calibrate",
-        "calibrate": "busplan.api.calibrate",
-        "CapacityAnswer": "busplan.api.capacity",
-        "capacity": "busplan.api.capacity",
-        "CheckAnswer": "busplan.api.check",
-        "check": "busplan.api.check",
-        "CircleTestAnswer": "busplan.api.circle",
-        "circle_test": "busplan.api.circle",
-        "CompareAnswer": "busplan.api.compare",
-        "compare": "busplan.api.compare",
-        "DiffAnswer": "busplan.api.diff",
-        "diff": "busplan.api.diff",
-        "EvidenceAnswer": "busplan.api.evidence",
-        "evidence": "busplan.api.evidence",
-        "ExplainAnswer": "busplan.api.explain",
-        "explain": "busplan.api.explain",
-        "LatencyAnswer": "busplan.api.latency",
-        "latency": "busplan.api.latency",
-        "MapAnswer": "busplan.api.map",
-        "map_": "busplan.api.map",
-        "PlanAnswer": "busplan.api.plan",
-        "plan": "busplan.api.plan",
-        "ReportAnswer": "busplan.api.report",
-        "report": "busplan.api.report",
-        "SweepAnswer": "busplan.api.sweep",
-        "sweep": "busplan.api.sweep",
-        "TimelineAnswer": "busplan.api.timeline",
-        "timeline": "busplan.api.timeline",
+        "load_profile": "busplan.questions.base.inputs",
+        "check": "busplan.gate.check",
+        "CheckAnswer": "busplan.gate.check",
     }
-    _RENAMED = {"trade_off": "map_", "TradeOffAnswer": "MapAnswer"}
-    """New name by old name, for one release."""
+    """Where a name is that is no question and no answer of one."""
 
     def __getattr__(name: str) -> object:
-        if name in _RENAMED:
-            warn(
-                f"busplan.{name} is now called busplan.{_RENAMED[name]}; the old name goes with the next release",
-                DeprecationWarning,
-                stacklevel=2,
-            )
-            name = _RENAMED[name]
-        if name not in _HOMES:
+        if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        globals()[name] = value = getattr(import_module(_HOMES[name]), name)
+        # `circle_test` and `CircleTestAnswer` are in module `circle`, `map_` and `MapAnswer` in `map`.
+        question = name.removesuffix("Answer").lower().replace("_", "").removesuffix("test")
+        home = _HOMES.get(name, f"busplan.questions.{question}")
+        globals()[name] = value = getattr(import_module(home), name)
         return value
 
 

@@ -32,7 +32,6 @@ from unittest import mock
 import tomli_w
 
 import busplan
-from busplan.analysis.circle.move import path_steps
 from busplan.buses import kind_names
 from busplan.cli import run
 from busplan.cli.lazy import LazyCommands
@@ -40,6 +39,7 @@ from busplan.errors import BusplanError
 from busplan.profile.schema import profile_schema
 from busplan.profile.starter import Machine, machine_text
 from busplan.profile.toml import decode, validate
+from busplan.questions.fit.circle_move import path_steps
 from busplan.sections.profile import Profile
 
 Data = dict[str, Any]

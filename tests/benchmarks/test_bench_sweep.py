@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from busplan.analysis.capacity.figures import figures
-from busplan.analysis.sweep.asked import Sweep
-from busplan.analysis.sweep.blocks import CHUNK_POINTS, figure_names, sweep
-from busplan.analysis.sweep.grid import Chunk, Grid, Steps, checked_grid
-from busplan.answers.sweep.rows import TEXT_POINTS, TextForm
-from busplan.answers.sweep.writers import rows_writer
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.ieee1394.table_1 import residual
 from busplan.forms import RowsForm
 from busplan.profile.toml import override
+from busplan.questions.fit.figures import figures
+from busplan.questions.sweep.asked import Sweep
+from busplan.questions.sweep.blocks import CHUNK_POINTS, figure_names, sweep
+from busplan.questions.sweep.grid import Chunk, Grid, Steps, checked_grid
+from busplan.questions.sweep.rows import TEXT_POINTS, TextForm
+from busplan.questions.sweep.writers import rows_writer
 
 MODELS = ("paper", "standard")
 GRIDS = {

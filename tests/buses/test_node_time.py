@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.analysis.comparison.kinds import compare
-from busplan.analysis.network import bus_of, network_of
 from busplan.buses.node_time import NODE_LIMIT
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.compare.kinds import compare
+from busplan.questions.fit.network import bus_of, network_of
 from busplan.sections.profile import Profile
 
 KINDS = ("ethercat", "sercos3", "sercos2")

@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.analysis.all_answers import all_answers
-from busplan.analysis.capacity.figures import figures
-from busplan.analysis.capacity.node_steps import node_steps
-from busplan.analysis.map.ranges import default_direction
-from busplan.analysis.network import model_names, network_of
 from busplan.buses import kind_named
 from busplan.buses.periods import ANY_PERIOD, Periods
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.fit.figures import figures
+from busplan.questions.fit.network import model_names, network_of
+from busplan.questions.fit.node_steps import node_steps
+from busplan.questions.map.ranges import default_direction
+from busplan.questions.report.all_answers import all_answers
 
 Run = Callable[..., Any]
 SOME = settings(max_examples=60, deadline=None)
@@ -212,6 +212,6 @@ def test_constants_have_sources(kind: str) -> None:
 def test_a_margin_without_doubts_says_that_no_uncertainty_is_known(
     run: Run, name: str, nodes: int, has_doubts: bool
 ) -> None:
-    said = run("capacity", name, "--nodes", str(nodes)).stdout.splitlines()[0]
+    said = run("capacity", name, "--set", f"bus.nodes={nodes}").stdout.splitlines()[1]
     assert ("so no bias and no uncertainty are in it" in said) == (not has_doubts)
     assert ("+/-" in said) == has_doubts

@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 from busplan.cli.workers import workers
 
 ROOT = Path(__file__).resolve().parents[2]
-CLEAN = (ROOT / "tests/rules/examples/BP001/valid.toml").read_text(encoding="utf-8")
+CLEAN = (ROOT / "tests/gate/examples/BP001/valid.toml").read_text(encoding="utf-8")
 WARNS = CLEAN.replace('"optimal"', "63")
 FAILS = CLEAN.replace("period_us = 4000", "period_us = 300")
 BROKEN = CLEAN.replace("nodes = 2", "nodes = ")
@@ -236,7 +236,7 @@ def test_the_environment_sets_the_default_format(busplan: Busplan, folder: Path)
 ADDED = """
 import sys
 from types import ModuleType
-from busplan.answers.gate import FORMATS, GateFormat, Registered
+from busplan.gate.formats import FORMATS, GateFormat, Registered
 
 class Shout(GateFormat):
     def write(self, report):
@@ -245,7 +245,7 @@ class Shout(GateFormat):
     def log(self, report):
         return ["shouted"]
 
-module = ModuleType("busplan.answers.gate.shout")
+module = ModuleType("busplan.gate.formats.shout")
 module.Shout = Shout
 sys.modules[module.__name__] = module
 FORMATS["shout"] = Registered("shout", "Shout", "builds")

@@ -185,12 +185,12 @@ def test_the_same_test_draws_the_same_svg(circle_test: Run, profile: Path) -> No
         (["--trace", "."], "cannot be written"),
         (["--every", "5"], "goes with --trace"),
         (["--every", "0", "--trace", "t.csv"], "must be 1 or more"),
-        (["--radius", "0"], "--radius 0.0: must be 0.001 or more"),
-        (["--radius", "nan"], "--radius nan: "),
-        (["--feed", "inf"], "--feed inf: "),
-        (["--feed", "1e6"], "feed_mm_per_min"),
-        (["--feed", "-1"], "--feed -1.0: must be 0.001 or more"),
-        (["--seed", "-1"], "--seed -1: must be 0 or more"),
+        (["--set", "circle.radius_mm=0"], "--set circle.radius_mm=0: must be 0.001 or more"),
+        (["--set", "circle.radius_mm=nan"], "--set circle.radius_mm=nan: "),
+        (["--set", "circle.feed_mm_per_min=inf"], "--set circle.feed_mm_per_min=inf: "),
+        (["--set", "circle.feed_mm_per_min=1e6"], "feed_mm_per_min"),
+        (["--set", "circle.feed_mm_per_min=-1"], "--set circle.feed_mm_per_min=-1: must be 0.001 or more"),
+        (["--set", "delivery.seed=-1"], "--set delivery.seed=-1: must be 0 or more"),
         (["--period", "50us"], "step_us = 100"),
         (["--period", "2050us"], "step_us = 100"),
     ],
@@ -249,7 +249,7 @@ def test_a_report_that_cannot_be_written_is_said_before_the_simulation(
     def simulated(*_: object, **__: object) -> None:
         pytest.fail("a simulation")
 
-    monkeypatch.setattr("busplan.analysis.circle.roundness.circle_test", simulated)
+    monkeypatch.setattr("busplan.questions.circle.roundness.circle_test", simulated)
     run = circle_test(profile, "-o", "no/where.md", cwd=profile.parent)
     assert run.returncode == 2
     assert "no folder" in run.stderr
@@ -340,7 +340,16 @@ def test_a_folder_that_cannot_be_written_is_said_before_the_simulation(circle_te
 
 
 def test_options_override_the_profile(circle_test: Run, profile: Path) -> None:
-    run = circle_test(profile, "--feed", "1500", "--radius", "50", "--format", "json", cwd=profile.parent)
+    run = circle_test(
+        profile,
+        "--set",
+        "circle.feed_mm_per_min=1500",
+        "--set",
+        "circle.radius_mm=50",
+        "--format",
+        "json",
+        cwd=profile.parent,
+    )
     (result,) = json.loads(run.stdout)["results"]
     assert (result["feed_mm_per_min"], result["radius_mm"]) == (1500, 50)
 

@@ -69,14 +69,14 @@ def test_the_circle_says_its_step(run: Run) -> None:
 
 
 def test_options_change_the_profile_before_it_is_put_on_other_kinds(run: Run) -> None:
-    options = ("--nodes", "3", "--period", "2ms", "--set", "bus.speed=S200", "--set", "node.axes=2")
+    options = ("--set", "bus.nodes=3", "--period", "2ms", "--set", "bus.speed=S200", "--set", "node.axes=2")
     done = run("compare", "paper-1ms", "--buses", "can", *options, "--format", "json")
     document = json.loads(done.stdout)
-    assert document["changes"] == {"bus.speed": "S200", "node.axes": 2}
+    assert document["changes"] == {"bus.nodes": 3, "bus.speed": "S200", "node.axes": 2}
     assert (document["period_us"], document["nodes"], document["axes"]) == (2000, 3, 6)
     assert "bus.speed" in document["buses"][0]["left_out"]
     said = run("compare", "paper-1ms", *options).stdout.splitlines()
-    assert said[0] == "With --set bus.speed=S200 and --set node.axes=2."
+    assert said[0] == "With --set bus.nodes=3 and --set bus.speed=S200 and --set node.axes=2."
     assert said[1].startswith("paper-1ms at 2 ms: ")
 
 

@@ -187,8 +187,10 @@ def cell(value: Any) -> str:
 
 
 def test_usage(refused: Refused) -> None:
-    assert refused("diff", "paper-1ms").startswith("B: missing; ")
-    assert "--format: 'text' is not one of 'table'" in refused("diff", "paper-1ms", "paper-4ms", "--format", "text")
+    assert refused("diff", "paper-1ms").startswith("busplan diff: missing argument 'B'; ")
+    assert "invalid value for '--format': 'text' is not one of 'table'" in refused(
+        "diff", "paper-1ms", "paper-4ms", "--format", "text"
+    )
 
 
 def test_without_a_circle_numpy_is_not_loaded(run: Run) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from markdown_it import MarkdownIt
 
-from busplan.analysis.register import figure_named
 from busplan.buses import kind_named
+from busplan.questions.explain.register import figure_named
 
 Run = Callable[..., Any]
 Refused = Callable[..., str]
@@ -56,7 +56,7 @@ def test_every_key_of_a_commands_json_is_explained_with_its_value(run: Run, comm
     of_broadcasts = {"query_us", "boards_us", "hub_wait_us"} if command == "latency" else set()
     assert set(row) == set(keys) - of_broadcasts
     keys = [key for key in keys if key not in of_broadcasts]
-    # The others are compared without a process each, in tests/analysis/test_explain.py.
+    # The others are compared without a process each, in tests/questions/explain/test_explain.py.
     for key in (keys[0], keys[-1], *keys[5:9]):
         said = json.loads(run("explain", "paper-1ms", f"{command}.{key}", "--format", "json").stdout)
         (value, *_) = (one["value"] for one in said["derivations"])
@@ -92,7 +92,18 @@ def test_keys_inside_a_figure_mean_the_figure(run: Run, tmp_path: Path) -> None:
 
 
 def test_options_multiply_as_in_the_commands(run: Run) -> None:
-    arguments = ("--period", "1ms", "--period", "600us", "--nodes", "3", "--gap-count", "optimal", "--timing", "both")
+    arguments = (
+        "--period",
+        "1ms",
+        "--period",
+        "600us",
+        "--set",
+        "bus.nodes=3",
+        "--set",
+        "bus.gap_count=optimal",
+        "--timing",
+        "both",
+    )
     said = json.loads(run("explain", "paper-4ms", "required_us", *arguments, "--format", "json").stdout)
     given = json.loads(run("capacity", "paper-4ms", *arguments, "--format", "json").stdout)
     assert [one["value"] for one in said["derivations"]] == [row["required_us"] for row in given["results"]]

@@ -13,11 +13,11 @@ from unittest import mock
 import pytest
 from typer.main import get_command
 
-from busplan.analysis.planning.search import MAX_CIRCLES
 from busplan.cli import app
 from busplan.cli.help import FAILURES
 from busplan.cli.lazy import COMMANDS
 from busplan.profile.shipped import shipped_folder
+from busplan.questions.plan.search import MAX_CIRCLES
 
 Run = Callable[..., CompletedProcess[str]]
 

@@ -76,7 +76,7 @@ def calls() -> Iterator[tuple[str, ...]]:
     yield ("explain", PROFILE, EVIL)
     yield ("plan", PROFILE, "--no-circle", "-o", f"new-{EVIL}")
     yield from ((EVIL,), (f"--{EVIL}",), ("capacity", PROFILE, f"--{EVIL}"), ("schema", EVIL), ("rule", EVIL))
-    yield from (("capacity", PROFILE, option, EVIL) for option in ("--format", "--nodes", "--period", "--gap-count"))
+    yield from (("capacity", PROFILE, option, EVIL) for option in ("--format", "--period", "--timing"))
 
 
 def _shown(arguments: tuple[str, ...]) -> str:
@@ -126,7 +126,7 @@ def test_markdown_shows_what_the_name_holds(run: Run, folder: Path) -> None:
         ("capacity",),
         ("latency",),
         ("plan", "--no-circle"),
-        ("circle-test", "--contributions", "--radius", "40"),
+        ("circle-test", "--contributions", "--set", "circle.radius_mm=40"),
         ("calibrate", str(SHIPPED / "table-1.csv")),
     ],
     ids=lambda command: command[0],

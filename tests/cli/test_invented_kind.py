@@ -18,8 +18,6 @@ from jsonschema import Draft202012Validator
 from pydantic import Field
 
 import busplan
-from busplan.analysis.capacity.cycle import cycle_of, fits_in
-from busplan.analysis.capacity.node_limit import largest_nodes
 from busplan.buses import kind_names, registered
 from busplan.buses.bus import Bus
 from busplan.buses.cycle import BusCycle, BusEvent, Doubt, LeftOut, Term
@@ -30,6 +28,8 @@ from busplan.buses.rule import Rule, RuleProblem, RuleSubject
 from busplan.elementwise import Number, plain, rounded_up, total
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.node_limit import largest_nodes
 from busplan.sections.base import Section
 from busplan.sections.cycle import BusSection
 from busplan.sections.machine import DeliverySection

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.cli.changes import GAP_COUNT, periods_us
+from busplan.cli.changes import periods_us
 from busplan.cli.options import complete_profile, parse_sizes, time_us, timing_models
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
@@ -190,15 +190,6 @@ def test_what_are_no_sizes_is_refused_with_an_example(text: str) -> None:
     assert (
         str(caught.value) == f"--payload {text}: expected payloads of 1 to 1,000,000 bytes between commas, as 4,16,32"
     )
-
-
-@pytest.mark.parametrize(
-    ("gap_count", "value"), [("5", 5), ("+5", 5), ("-5", -5), ("optimal", "optimal"), ("5.0", "5.0"), ("", "")]
-)
-def test_a_gap_count_that_is_no_number_goes_on_as_text(gap_count: str, value: object) -> None:
-    change = GAP_COUNT.change(gap_count)
-    assert (change.key, change.value, change.typed) == ("bus.gap_count", value, f"--gap-count {gap_count}")
-    assert type(change.value) is type(value)
 
 
 def test_both_models_are_paper_first() -> None:

@@ -116,7 +116,7 @@ def test_a_reports_name_takes_the_report(busplan: Run, profile: Path, name: str,
 
 
 def test_a_report_is_written_without_a_plan_too(busplan: Run, profile: Path) -> None:
-    run = busplan("mine.toml", "--gap-count", 3, "-o", "report.md", cwd=profile.parent)
+    run = busplan("mine.toml", "--set", "bus.gap_count=3", "-o", "report.md", cwd=profile.parent)
     assert (run.returncode, run.stdout, run.stderr) == (1, "", "wrote report.md\n")
     assert "NO PLAN" in (profile.parent / "report.md").read_text(encoding="utf-8")
 
@@ -140,7 +140,7 @@ def test_the_form_beside_a_new_profile_is_that_of_standard_output(busplan: Run, 
 @pytest.mark.parametrize("option", [["--apply"], ["-o", "new.toml", "--force"], ["-o", "new.toml"]])
 def test_without_a_plan_nothing_is_written(busplan: Run, profile: Path, option: list[str]) -> None:
     before = sorted(profile.parent.iterdir())
-    run = busplan(profile.name, "--gap-count", 3, *option, cwd=profile.parent)
+    run = busplan(profile.name, "--set", "bus.gap_count=3", *option, cwd=profile.parent)
     assert run.returncode == 1
     assert "NO PLAN" in run.stdout
     assert "not written" in run.stderr
@@ -179,7 +179,7 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
         (["mine.toml", "-o", "mine.toml", "--force"], "would overwrite mine.toml, which is read"),
         (["mine.toml", "--nodes", "0"], "--nodes 0"),
         (["mine.toml", "--axes", "0"], "--axes"),
-        (["mine.toml", "--gap-count", "64"], "--gap-count 64"),
+        (["mine.toml", "--set", "bus.gap_count=64"], "--set bus.gap_count=64"),
         (["mine.toml", "--period", "1"], "--period 1"),
         (["mine.toml", "-o", "no/such/folder.toml"], "no folder"),
         (["none.toml"], "no such file"),
@@ -189,9 +189,7 @@ def test_a_process_killed_while_writing_leaves_the_original_whole(profile: Path,
         ),
         (["mine.toml", "--free", ""], "there are gap_count, slice_ratio, responses, schedule, payload, period, nodes"),
         (["mine.toml", "--free", "period", "--period", "1ms"], "--free period: cycle.period_us was given a value"),
-        (["mine.toml", "--reserve", "20"], "--reserve 20, as a share 20.0: must be 0.99 or less"),
-        (["mine.toml", "--reserve", "-1%"], "--reserve -1%: expected a number"),
-        (["mine.toml", "--reserve", "20%", "--set", "limits.reserve=0.1"], "both set limits.reserve"),
+        (["mine.toml", "--set", "limits.reserve=20"], "--set limits.reserve=20: must be 0.99 or less"),
     ],
 )
 def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: list[str], words: str) -> None:
@@ -204,7 +202,9 @@ def test_what_cannot_be_done_is_said(busplan: Run, profile: Path, arguments: lis
 
 
 def test_a_reserve_is_kept_and_written_and_the_gate_passes(busplan: Run, run: Run, profile: Path) -> None:
-    done = busplan("mine.toml", "--axes", 16, "--reserve", "20%", "--apply", "--format", "json", cwd=profile.parent)
+    done = busplan(
+        "mine.toml", "--axes", 16, "--set", "limits.reserve=0.2", "--apply", "--format", "json", cwd=profile.parent
+    )
     assert done.returncode == 0
     assert tomllib.loads(profile.read_text(encoding="utf-8"))["limits"] == {"reserve": 0.2}
     assert json.loads(done.stdout)["recommended_changes"]["limits.reserve"] == 0.2

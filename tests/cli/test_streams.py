@@ -271,8 +271,8 @@ sys.stderr.write(" ".join(sys.modules))
 """
 
 
-WORK = ("busplan.profile", "busplan.analysis", "busplan.answers", "busplan.drawings")
-LIGHT = {"busplan.answers", "busplan.answers.gate", "busplan.profile", "busplan.profile.changes"}
+WORK = ("busplan.profile", "busplan.questions", "busplan.gate")
+LIGHT = {"busplan.gate", "busplan.gate.formats", "busplan.profile", "busplan.profile.changes"}
 """The register of the gate's formats, where the choices of `check --format` are read; and what --set makes."""
 
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from busplan.analysis.sweep import circle_run
-from busplan.analysis.sweep.circles import CIRCLE_COLUMNS, CircleChunk, run_chunk
+from busplan.questions.sweep import circle_run
+from busplan.questions.sweep.circles import CIRCLE_COLUMNS, CircleChunk, run_chunk
 
 Run = Callable[..., "subprocess.CompletedProcess[str]"]
 

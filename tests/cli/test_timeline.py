@@ -20,7 +20,7 @@ Run = Callable[..., "subprocess.CompletedProcess[str]"]
 
 
 def test_json_holds_the_contract_and_agrees_with_capacity(busplan: Run, tmp_path: Path) -> None:
-    options = ("--nodes", 7, "--gap-count", "optimal", "--period", "2ms")
+    options = ("--set", "bus.nodes=7", "--set", "bus.gap_count=optimal", "--period", "2ms")
     run = busplan("timeline", "paper-1ms", *options, "--timing", "standard", "--format", "json", cwd=tmp_path)
     assert (run.returncode, run.stderr) == (0, "")
     document = json.loads(run.stdout)
@@ -87,7 +87,7 @@ def test_an_overrun_is_a_report_and_exits_0(busplan: Run, tmp_path: Path) -> Non
         (["--transaction", "ping:1"], "--transaction ping:1: expected read or write"),
         (["--transaction", "read:1", "--from", "1ms"], "shows nothing: the read of node 1 runs from 0.4 to 52.07"),
         (["--period", "0s"], "--period 0s"),
-        (["--nodes", "1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
+        (["--set", "bus.nodes=1000000"], "a timeline shows up to 1000 nodes; one bus carries 62"),
         (["-o", "cycle.doc"], "cycle.doc: expected a name ending in .txt, .md, .html, .csv, .json, .svg, .png"),
         (["-o", "no/such/cycle.svg"], "there is no folder"),
         (["--timing", "both"], "both"),

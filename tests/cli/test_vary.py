@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from busplan.analysis.sweep.grid import Listed
 from busplan.cli.vary import parse_axes
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
+from busplan.questions.sweep.grid import Listed
 
 PROFILE = load("paper-1ms").profile
 

@@ -35,8 +35,6 @@ from busplan.forms.blocks import (
     TableRow,
     Words,
     sentence,
-    values_in,
-    with_values,
 )
 from busplan.forms.csv_rows import csv_cell, to_csv
 from busplan.forms.json_document import to_json
@@ -45,7 +43,7 @@ from busplan.forms.numbers import decimals_of, period, with_unit
 from busplan.forms.picture import first_picture
 from busplan.forms.terminal import block_lines
 
-MARGIN = ShownValue(3.96912, "margin_us", "us", 3, at="/margin_us")
+MARGIN = ShownValue(3.96912, "margin_us", "us", 3)
 FAILED = ShownValue(False, "fits", state="fails")
 HOSTILE = "<b>*x*</b> | `y` [z](javascript:alert(1)) \x1b[2J"
 
@@ -80,7 +78,7 @@ def one_of_each(text: str = "text") -> Sequence[Block]:
             TableRow((Code(text), MARGIN, ShownValue(True, "fits"), Bar(MARGIN, -1.0, 5.0))),
             TableRow((SectionLink(text, "s", "x.toml"), ShownValue(None), FAILED, ""), level=1),
             TableRow((Swatch("work", "E", text), MARGIN, Words("worse", "fails"), ""), highlighted=True),
-            TableRow((Command("busplan capacity p", "what", "c"), sentence("{} of {}", MARGIN, Code(text)), "-", "")),
+            TableRow((Command("busplan capacity p", "what"), sentence("{} of {}", MARGIN, Code(text)), "-", "")),
         ),
         sentence("A table of {}", Code(text)),
     )
@@ -114,15 +112,6 @@ def test_every_form_writes_every_block_and_the_same_each_time(form: Form) -> Non
 
 def test_every_form_has_one_ending() -> None:
     assert sorted(ENDINGS.values()) == sorted(get_args(Form))
-
-
-def test_figures_are_found_and_changed_wherever_they_stand() -> None:
-    blocks = tuple(one_of_each())
-    found = list(values_in(blocks))
-    assert found.count(MARGIN) == 8
-    moved = with_values(blocks, lambda value: value._replace(at=f"/x{value.at}"))
-    assert [one.at for one in values_in(moved)] == [f"/x{one.at}" for one in found]
-    assert with_values(moved, lambda value: value._replace(at=value.at.removeprefix("/x"))) == blocks
 
 
 # --- terminal ---------------------------------------------------------------------------------------------------
@@ -228,10 +217,9 @@ def test_foreign_text_is_text_in_html() -> None:
     assert "<b>*x*</b>" in hostile.text
 
 
-def test_html_keeps_the_exact_value_its_place_and_its_state() -> None:
+def test_html_keeps_the_exact_value_and_its_state() -> None:
     found = Tags(render(answer(*one_of_each()), "html")).values
     assert {json.loads(one["value"] or "") for one in found} == {3.96912, True, False, None}
-    assert all(one["data-at"] == "/margin_us" for one in found if one["value"] == "3.96912")
     assert [one["class"] for one in found if one["value"] == "false"] == ["fails"]
 
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from busplan.analysis.derivation.inputs import given
 from busplan.profile.document import Document
 from busplan.profile.graded import comment_grade
 from busplan.profile.shipped import load
 from busplan.profile.toml import override, validate
+from busplan.questions.fit.inputs import given
 
 TEXT = """\
 schema_version = 1

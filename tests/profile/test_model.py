@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
-from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.constants import MAX_PAYLOAD_BYTES
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.section import (
@@ -25,6 +24,7 @@ from busplan.buses.ieee1394.section import (
     Sync,
 )
 from busplan.buses.ieee1394.transactions import gap_count_of, hops_of, link_of
+from busplan.questions.fit.network import network_of
 from busplan.sections.execution import LinearExecution, TableExecution
 from busplan.sections.limits import Limits
 from busplan.servo.parameters import Axis, Delivery, LoopTiming, Mechanics

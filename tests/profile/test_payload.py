@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity.figures import capacity, figures
-from busplan.analysis.derivation.explain import explain
-from busplan.analysis.latency import latency
-from busplan.analysis.network import network_of
-from busplan.analysis.planning.plan import plan
-from busplan.analysis.sweep.blocks import sweep
-from busplan.analysis.sweep.grid import Steps, checked_grid
 from busplan.errors import PlacedError
 from busplan.profile.shipped import load
 from busplan.profile.toml import decode, override, validate
+from busplan.questions.explain.derivation import explain
+from busplan.questions.fit.figures import capacity, figures
+from busplan.questions.fit.network import network_of
+from busplan.questions.latency.figures import latency
+from busplan.questions.plan.planning import plan
+from busplan.questions.sweep.blocks import sweep
+from busplan.questions.sweep.grid import Steps, checked_grid
 from busplan.sections.profile import Profile
 
 TEXT = """schema_version = 1

@@ -14,8 +14,6 @@ from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 from typer.testing import CliRunner
 
-from busplan.analysis.register import figures_of
-from busplan.answers.assumptions import constant_rows, equation_rows
 from busplan.buses import kind_named, kind_names
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.cli import app
@@ -25,6 +23,8 @@ from busplan.manual import FOLDER, topics
 from busplan.profile.kinds import models_of
 from busplan.profile.shipped import load, shipped_names
 from busplan.profile.toml import decode, validate
+from busplan.questions.explain.assumptions import constant_rows, equation_rows
+from busplan.questions.explain.register import figures_of
 from busplan.sections.machine import AxisOverride
 from busplan.sourced import short
 
@@ -228,7 +228,7 @@ def test_the_example_profile_is_the_shipped_one() -> None:
 DOCUMENTS = {
     "latency": "paper-4ms",
     "capacity": "paper-1ms --period 600us --sensitivity",
-    "circle-test": "paper-4ms --period 4ms --period 100us --radius 20 --contributions",
+    "circle-test": "paper-4ms --period 4ms --period 100us --contributions",
     "explain": "paper-4ms required_us",
     "report": "paper-4ms --no-circle",
     "check": "paper-optimal-gap nowhere.toml --no-circle",

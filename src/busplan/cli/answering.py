@@ -81,7 +81,7 @@ def report_with(changes: KeyChanges, report: "Report") -> "Report":
     """Name the --set options in an answer: in a sentence at its top, and in its JSON document."""
     if not changes.by_set:
         return report
-    from busplan.answers.documents import changed_report
+    from busplan.questions.words.documents import changed_report
 
     return changed_report(report, changes)
 

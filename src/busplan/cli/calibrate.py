@@ -10,7 +10,7 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.changes import GAP_COUNT, NODES, takes_changes
+from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
@@ -24,7 +24,7 @@ from busplan.errors import BusplanError
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 
-@takes_changes(NODES, GAP_COUNT, words="--apply writes it, too.")
+@takes_changes("Of the bench, where it was not as the profile: --apply does not write it.")
 def calibrate_command(
     profile: ProfileArgument,
     measurements: Annotated[
@@ -61,22 +61,6 @@ def calibrate_command(
             show_default=False,
         ),
     ] = None,
-    robust: Annotated[
-        bool,
-        typer.Option(
-            "--robust",
-            help="Let no single measurement pull: the median at each payload instead of the mean; the line of Theil "
-            "and Sen through these medians instead of least squares.",
-        ),
-    ] = False,
-    keep_outliers: Annotated[
-        bool,
-        typer.Option(
-            "--keep-outliers",
-            help="Fit the outliers, too, with the grade assumed. Otherwise slow ones are in worst_extra_us, and fast "
-            "ones are left out, each named by its line.",
-        ),
-    ] = False,
     changes: KeyChanges = NO_CHANGES,
     apply: Annotated[
         bool,
@@ -96,10 +80,10 @@ def calibrate_command(
     acknowledge, in us), a line for each measurement; repetitions are welcome, lines that begin with # are comments. A
     column transaction says read or write (write without it).
 
-    T_exec is the latency less what its packets take by the timing model, equation (3). Give --nodes and --gap-count
-    where the bench was not as the profile; --apply does not write these two. With a column request_and_acknowledge_us,
-    the measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements
-    far from the others are named by their line and are not in the fit: slow ones are in worst_extra_us, and the others
+    T_exec is the latency less what its packets take by the timing model, equation (3). Give --set bus.nodes=2 and
+    --set bus.gap_count=63 where the bench was not as the profile. With a column request_and_acknowledge_us, the
+    measured T1+T2, both halves come from it, and the report shows how far the timing model is from it. Measurements far
+    from the others are named by their line and are not in the fit: slow ones are in worst_extra_us, and the others
     contradict fast ones. Times are in us. A report: it exits 0 whatever the figures are.
 
     Example: busplan calibrate paper-two-node table-1.csv --form linear
@@ -110,11 +94,11 @@ def calibrate_command(
         require_own_file(profile)
     files = chain(profile_files(profile), _measurements_file(measurements))
     with answer(format_, output, inputs=files, changes=changes, is_whole=all_) as give:
-        from busplan.analysis.calibration.calibrate import calibrate
-        from busplan.answers import calibration as said
         from busplan.profile.measurements import MAX_MEASUREMENTS_BYTES, parse_measurements
         from busplan.profile.shipped import load, locate_measurements
         from busplan.profile.toml import read_bytes
+        from busplan.questions.calibrate import report as said
+        from busplan.questions.calibrate.calibration import calibrate
 
         loaded = load(profile)
         bench = changes.applied(loaded.profile)
@@ -126,8 +110,6 @@ def calibrate_command(
             group=group,
             timing_model=None if timing is None else timing_model(timing, bench),
             form=form,
-            robust=robust,
-            keep_outliers=keep_outliers,
             # The shipped example has published figures, so the result is derived.
             grade="derived" if shipped else "measured",
         )
@@ -137,10 +119,9 @@ def calibrate_command(
             for one in changes.by_set:
                 for key in found:
                     require_separate(one, key, typed="--apply")
-            asked = {one.key: one.value for one in changes.by_set}
-            apply_changes(loaded.document, {**asked, **found}, notes={said.section(result): note})
-            wrote = ", ".join((f"[{said.section(result)}]", *asked))
-            say(f"wrote {wrote} of {profile}; your comments are kept: see whether they hold of the new values")
+            apply_changes(loaded.document, found, notes={said.section(result): note})
+            kept = "your comments are kept: see whether they hold of the new values"
+            say(f"wrote [{said.section(result)}] of {profile}; {kept}")
         give(said.calibration_report(result, source=name, applied_to=profile if apply else None))
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
+from busplan.cli.changes import PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
@@ -18,7 +18,7 @@ from busplan.cli.options import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 
-@takes_changes(NODES, GAP_COUNT)
+@takes_changes()
 def capacity_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
@@ -46,17 +46,17 @@ def capacity_command(
     Example: busplan capacity paper-4ms --period 4ms --period 500us
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.capacity.figures import capacity
-        from busplan.analysis.capacity.verdict import verdicts
+        from busplan.questions.capacity.verdict import verdicts
+        from busplan.questions.fit.figures import capacity
 
         plan = load_changed(profile, changes)
         result = capacity(plan, periods_us=periods_us(period, plan), timing_models=timing_models(timing, plan))
         if sensitivity:
-            from busplan.analysis.capacity.sensitivity import sensitivities
-            from busplan.answers.sensitivity import sensitivity_report
+            from busplan.questions.capacity.sensitivity import sensitivities
+            from busplan.questions.capacity.sensitivity_report import sensitivity_report
 
             give(sensitivity_report(result, verdicts(result), sensitivities(result)))
         else:
-            from busplan.answers.capacity import capacity_report
+            from busplan.questions.capacity.report import capacity_report
 
             give(capacity_report(result, verdicts(result)))

@@ -1,11 +1,9 @@
-"""Options that change the profile of a command: --set and its short forms."""
+"""Options that change the profile of a command: --set, and --period with its unit."""
 
-import re
 from collections.abc import Callable
-from decimal import Decimal
 from functools import wraps
 from inspect import Parameter, signature
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -27,92 +25,16 @@ PeriodsOption = Annotated[
         show_default=False,
     ),
 ]
-NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        help="Number of distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
-        show_default=False,
-    ),
-]
-GapCountOption = Annotated[
-    str | None,
-    typer.Option(
-        "--gap-count",
-        metavar="0..63|optimal",
-        help="Gap count of all nodes of an IEEE 1394 bus; optimal is the smallest safe one for the hops.  "
-        "[default: the profile's bus.gap_count]",
-        show_default=False,
-    ),
-]
-ReserveOption = Annotated[
-    str | None,
-    typer.Option(
-        "--reserve",
-        metavar="SHARE",
-        help="Share of the slice that must stay free, as 20% or 0.2.  [default: the profile's limits.reserve]",
-        show_default=False,
-    ),
-]
 
 
-class ShortForm(NamedTuple):
-    """An option that sets one key of a profile."""
-
-    option: str
-    key: str
-    annotation: Any
-    """Its parameter for typer."""
-    parse: Callable[[Any], tuple[object, str]] = lambda value: (value, "")
-    """Function from what typer gives to the key's value and `KeyChange.note`."""
-
-    @property
-    def parameter(self) -> str:
-        """Name of the parameter."""
-        return self.option.removeprefix("--").replace("-", "_")
-
-    def change(self, given: object) -> KeyChange:
-        """The change that the option makes."""
-        value, note = self.parse(given)
-        return KeyChange(self.key, value, self.option, str(given), note)
+def _period_option(words: str) -> Any:
+    option = typer.Option("--period", metavar="TIME", help=f"Communication period{words}", show_default=False)
+    return Annotated[str | None, option]
 
 
-def _gap_count(text: str) -> tuple[object, str]:
-    # Other text is passed on: the profile's schema accepts or refuses it.
-    return int(text) if re.fullmatch(r"[+-]?[0-9]{1,9}", text) else text, ""
-
-
-def _period(text: str) -> tuple[float, str]:
+def _period_change(text: str) -> KeyChange:
     period_us = time_us(text, option="--period")
-    return period_us, f", in us {period_us}"
-
-
-def period_form(words: str) -> ShortForm:
-    """Make the option --period of a command that takes one.
-
-    Parameters
-    ----------
-    words
-        End of the help, with the default.
-    """
-    help_ = f"Communication period{words}"
-    option = typer.Option("--period", metavar="TIME", help=help_, show_default=False)
-    return ShortForm("--period", _PERIOD, Annotated[str | None, option], _period)
-
-
-def _share(text: str) -> tuple[object, str]:
-    """Read 20% or 0.2. Other text is passed on: the profile's schema refuses it."""
-    match = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)(%?)", text.strip())
-    if match is None:
-        return text, ""
-    share = float(Decimal(match[1]) / (100 if match[2] else 1))
-    return share, f", as a share {share}"
-
-
-NODES: Final = ShortForm("--nodes", "bus.nodes", NodesOption)
-GAP_COUNT: Final = ShortForm("--gap-count", "bus.gap_count", GapCountOption, _gap_count)
-RESERVE: Final = ShortForm("--reserve", "limits.reserve", ReserveOption, _share)
+    return KeyChange(_PERIOD, period_us, "--period", text, f", in us {period_us}")
 
 
 def _set_option(words: str) -> Any:
@@ -126,17 +48,17 @@ def _set_option(words: str) -> Any:
     return Annotated[list[str] | None, option]
 
 
-def takes_changes(*short_forms: ShortForm, words: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Replace the parameter `changes` of a command by --set and its short forms, whose values it gets.
+def takes_changes(words: str = "", *, period: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Replace the parameter `changes` of a command by --set, and by --period where that sets the profile's period.
 
     Parameters
     ----------
-    short_forms
-        The short forms that the command has.
     words
         End of the help of --set: what is special here.
+    period
+        End of the help of --period, with the default; empty where the command has none, or its own.
     """
-    options = {**{one.parameter: one.annotation for one in short_forms}, "set_": _set_option(words)}
+    options = {**({"period": _period_option(period)} if period else {}), "set_": _set_option(words)}
 
     def replaced(command: Callable[..., None]) -> Callable[..., None]:
         own = signature(command)
@@ -150,11 +72,11 @@ def takes_changes(*short_forms: ShortForm, words: str = "") -> Callable[[Callabl
 
         @wraps(command)
         def with_changes(*arguments: Any, set_: list[str] | None, **others: Any) -> None:
-            given = ((one, others.pop(one.parameter)) for one in short_forms)
-            made = [one.change(value) for one, value in given if value is not None]
+            text = others.pop("period") if period else None
+            made = () if text is None else (_period_change(text),)
             changes = KeyChanges((*made, *parse_set(set_ or ())))
-            for text in others.get("period") or ():
-                _require_no_period(changes, text)
+            for computed in others.get("period") or ():
+                _require_no_period(changes, computed)
             command(*arguments, changes=changes, **others)
 
         with_changes.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
@@ -195,18 +117,17 @@ def periods_us(texts: list[str] | None, profile: "Profile") -> list[float] | Non
     """
     if not texts:
         return None
-    found = []
-    for text, (period_us, note) in (one for several in texts for one in _periods(several)):
-        KeyChanges((KeyChange(_PERIOD, period_us, "--period", text, note),)).applied(profile)
-        found.append(period_us)
-    return found
+    made = [change for text in texts for change in _period_changes(text)]
+    for change in made:
+        KeyChanges((change,)).applied(profile)
+    return [time_us(change.text, option="--period") for change in made]
 
 
-def _periods(text: str) -> list[tuple[str, tuple[float, str]]]:
-    """Each period between commas, as typed and as a value."""
+def _period_changes(text: str) -> list[KeyChange]:
+    """A change for each period between commas."""
     parts = text.split(",")
     try:
-        return [(part, _period(part)) for part in parts]
+        return [_period_change(part) for part in parts]
     except BusplanError:
         if len(parts) == 1:
             raise

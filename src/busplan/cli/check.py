@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import typer
 
-from busplan.answers.gate import FORMATS, gate_format
 from busplan.cli.answering import columns
 from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import require_apart
@@ -14,15 +13,16 @@ from busplan.cli.options import complete_profile, output_option
 from busplan.cli.output import PlanFailsError, emit_text, is_styled, is_terminal, say, write_document
 from busplan.cli.rewrite import changing, require_changeable, rewrite
 from busplan.errors import BusplanError
+from busplan.gate.formats import FORMATS, gate_format
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from busplan.gate.baseline import Baseline
+    from busplan.gate.gate import FileResult
+    from busplan.gate.report import CheckReport
     from busplan.profile.collect import ProfileSource
-    from busplan.rules.baseline import Baseline
-    from busplan.rules.gate import FileResult
-    from busplan.rules.report import CheckReport
 
     FormatName = str
 else:
@@ -118,10 +118,10 @@ def check_command(
     _require_baseline(baseline, update=update_baseline)
     if update_baseline and changes.each:
         raise BusplanError(f"--update-baseline: goes without {changes.words}: it records the files as they are")
-    from busplan.analysis.circle.check import MOST_STEPS
+    from busplan.gate.gate import check_source
+    from busplan.gate.report import CheckReport
     from busplan.profile.collect import collect
-    from busplan.rules.gate import check_source
-    from busplan.rules.report import CheckReport
+    from busplan.questions.circle.check import MOST_STEPS
 
     collection = collect(paths, stdin_name=stdin_filename, skip_others=skip_others)
     _require_apart(collection.sources, output=output, baseline=baseline, updated=update_baseline)
@@ -152,9 +152,9 @@ def check_command(
     if update_baseline and baseline is not None:
         _update_baseline(baseline, report, quiet=quiet)
     if not quiet:
-        from busplan.answers.check import summary_sentence
-        from busplan.answers.documents import changes_sentences
         from busplan.forms.columns import sentence_text
+        from busplan.gate.answer import summary_sentence
+        from busplan.questions.words.documents import changes_sentences
 
         say(*map(sentence_text, (*changes_sentences(changes), summary_sentence(report))))
     if report.failed:
@@ -201,8 +201,8 @@ def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":
         return None
     if needed and not path.exists():
         raise BusplanError(f"{path}: no such file; record it with --update-baseline")
+    from busplan.gate.baseline import MAX_BASELINE_BYTES, read_baseline
     from busplan.profile.toml import read_bytes
-    from busplan.rules.baseline import MAX_BASELINE_BYTES, read_baseline
 
     # Absolute, because "-" would mean standard input.
     content = read_bytes(path.absolute(), name=str(path), limit=MAX_BASELINE_BYTES)
@@ -217,7 +217,7 @@ def _read_baseline(path: Path | None, *, needed: bool) -> "Baseline | None":
 
 def _update_baseline(path: Path, report: "CheckReport", *, quiet: bool) -> None:
     """Record the checked profiles; others keep their record."""
-    from busplan.rules.baseline import Record, write_baseline
+    from busplan.gate.baseline import Record, write_baseline
 
     now = {file.path: Record(file.figures, file.keys) for file in report.files if file.figures}
     with changing(path):

@@ -8,10 +8,7 @@ import typer
 
 from busplan.cli.answering import answer
 from busplan.cli.changes import (
-    GAP_COUNT,
-    NODES,
     PeriodsOption,
-    ShortForm,
     load_changed,
     periods_us,
     takes_changes,
@@ -27,39 +24,10 @@ from busplan.forms import Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.circle.roundness import CircleTest
-
-_FeedOption = Annotated[
-    float | None,
-    typer.Option(
-        "--feed",
-        metavar="MM_PER_MIN",
-        help="Speed along the circle [mm/min].  [default: the profile's circle.feed_mm_per_min]",
-    ),
-]
-_RadiusOption = Annotated[
-    float | None,
-    typer.Option(
-        "--radius", metavar="MM", help="Radius of the circle [mm].  [default: the profile's circle.radius_mm]"
-    ),
-]
-_SeedOption = Annotated[
-    int | None,
-    typer.Option(
-        "--seed",
-        metavar="N",
-        help="Seed of jitter and lost set-points: the same seed, the same run.  [default: the profile's delivery.seed]",
-    ),
-]
+    from busplan.questions.circle.record import CircleTest
 
 
-@takes_changes(
-    NODES,
-    GAP_COUNT,
-    ShortForm("--feed", "circle.feed_mm_per_min", _FeedOption),
-    ShortForm("--radius", "circle.radius_mm", _RadiusOption),
-    ShortForm("--seed", "delivery.seed", _SeedOption),
-)
+@takes_changes()
 def circle_test_command(
     profile: ProfileArgument,
     period: PeriodsOption = None,
@@ -111,8 +79,8 @@ def circle_test_command(
     require_apart({"--output": output, "--trace": trace, "--plot": plot}, inputs=profile_files(profile))
     form = None if plot is None else plot_form(plot)
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.circle.roundness import circle_test
-        from busplan.answers.circle import circle_report
+        from busplan.questions.circle.report import circle_report
+        from busplan.questions.circle.roundness import circle_test
 
         plan = load_changed(profile, changes)
         with ExitStack() as files:
@@ -131,7 +99,7 @@ def circle_test_command(
             if plot_file is not None and form is not None:
                 _draw(test, plot_file, changes, form)
         _say_written(trace, plot, drawn=any(run is not None for run in test.runs))
-        give(circle_report(test, with_contributions=contributions))
+        give(circle_report(test))
     if test.passed is False:
         raise PlanFailsError
 
@@ -141,8 +109,8 @@ def _draw(test: "CircleTest", file: NewFile, changes: KeyChanges, form: Picture)
     if all(run is None for run in test.runs):
         file.abandon()
         return
-    from busplan.drawings.circle_plot import circle_svg
     from busplan.forms.raster import picture
+    from busplan.questions.circle.plot import circle_svg
 
     file.write(document_bytes(picture(circle_svg(test, note=changes.words), form)))
 
@@ -155,7 +123,7 @@ def _say_written(trace: Path | None, plot: Path | None, *, drawn: bool) -> None:
 
 
 def _write_trace(test: "CircleTest", file: BinaryIO, *, every: int) -> None:
-    from busplan.answers.circle_trace import TRACE_COLUMNS, trace_records
     from busplan.forms.csv_rows import csv_blocks
+    from busplan.questions.circle.trace import TRACE_COLUMNS, trace_records
 
     file.writelines(block.encode() for block in csv_blocks(trace_records(test, every=every), columns=TRACE_COLUMNS))

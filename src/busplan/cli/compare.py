@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
@@ -16,7 +16,7 @@ from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.comparison.kinds import KindComparison
+    from busplan.questions.compare.kinds import KindComparison
 
 CompareForm = Literal[Form, Picture]
 
@@ -32,8 +32,7 @@ def _complete_kinds(incomplete: str) -> list[str]:
 
 
 @takes_changes(
-    period_form(" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"),
-    NODES,
+    period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
     words="Of the profile, before it is put on other kinds.",
 )
 def compare_command(
@@ -86,14 +85,14 @@ def compare_command(
                 write_picture(_svg(found, changes), chosen, output)
         case _:
             with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                from busplan.answers.compare import compare_report
+                from busplan.questions.compare.report import compare_report
 
                 give(compare_report(_found(profile, buses, changes, with_circle=circle)))
 
 
 def _found(profile: str, buses: str | None, changes: KeyChanges, *, with_circle: bool) -> "KindComparison":
-    from busplan.analysis.comparison.kinds import checked_kinds, compare
     from busplan.cli.progress import progress_bar
+    from busplan.questions.compare.kinds import checked_kinds, compare
 
     kinds = None if buses is None else checked_kinds([one.strip() for one in buses.split(",")], option="--buses")
     with progress_bar("circle tests") as progress:
@@ -102,8 +101,8 @@ def _found(profile: str, buses: str | None, changes: KeyChanges, *, with_circle:
 
 def _svg(found: "KindComparison", changes: KeyChanges) -> str:
     """The drawing as a file of its own."""
-    from busplan.answers.compare import headline, require_drawn
-    from busplan.drawings.compare.svg import compare_svg
+    from busplan.questions.compare.report import headline, require_drawn
+    from busplan.questions.compare.svg import compare_svg
 
     require_drawn(found)
     return compare_svg(found, title=picture_title(headline(found), changes))

@@ -80,11 +80,11 @@ def diff_command(
     """
     allowed = _tolerance(tolerance, wanted=fail_on_regression)
     with answer(format_, output, inputs=profile_files(a, b), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.comparison.circle_tests import circle_tests
-        from busplan.analysis.comparison.difference import difference
-        from busplan.answers.diff import diff_report
-        from busplan.answers.diff_headline import regression_words
         from busplan.profile.revision import load_revision
+        from busplan.questions.circle.circle_tests import circle_tests
+        from busplan.questions.diff.difference import difference
+        from busplan.questions.diff.headline import regression_words
+        from busplan.questions.diff.report import diff_report
 
         one, other = load_each((a, b), lambda argument: changes.applied(load_revision(argument).profile))
         with progress_bar("circle tests") as progress:

@@ -11,7 +11,7 @@ from busplan.cli.progress import progress_bar
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from busplan.analysis.circle.roundness import CircleFigures
+    from busplan.questions.circle.record import CircleFigures
 
 
 def complete_kind(incomplete: str) -> list[str]:
@@ -39,15 +39,15 @@ def evidence_command(
     Example: busplan evidence ieee1394
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.analysis.evidence import kind_evidence, known_kinds
-        from busplan.answers.evidence import evidence_report
+        from busplan.questions.evidence.figures import kind_evidence, known_kinds
+        from busplan.questions.evidence.report import evidence_report
 
         give(evidence_report([kind_evidence(name, circles=shown_circles) for name in known_kinds(kind)]))
 
 
 def shown_circles() -> "Sequence[CircleFigures]":
     """Run the circle tests of the paper with a progress bar."""
-    from busplan.analysis.evidence import paper_circles
+    from busplan.questions.evidence.figures import paper_circles
 
     with progress_bar("circle tests") as progress:
         return paper_circles(progress=progress)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, PeriodsOption, load_changed, periods_us, takes_changes
+from busplan.cli.changes import PeriodsOption, load_changed, periods_us, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     ALL_MODELS,
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 def complete_figure(incomplete: str) -> list[str]:
     """Complete the name of a figure for the shell."""
-    from busplan.analysis.register import figures_of
     from busplan.buses import kind_named, kind_names
+    from busplan.questions.explain.register import figures_of
 
     registers = (figures_of(kind_named(kind)) for kind in kind_names())
     names = (
@@ -37,7 +37,7 @@ def complete_figure(incomplete: str) -> list[str]:
     return [name for name in dict.fromkeys(names) if name.startswith(incomplete)]
 
 
-@takes_changes(NODES, GAP_COUNT)
+@takes_changes()
 def explain_command(
     profile: ProfileArgument,
     figure: Annotated[
@@ -90,9 +90,9 @@ def explain_command(
         if figure is None:
             give(_list(plan))
             return
-        from busplan.analysis.derivation.explain import explain
-        from busplan.answers.explain import explain_report
         from busplan.cli.progress import progress_bar
+        from busplan.questions.explain.derivation import explain
+        from busplan.questions.explain.report import explain_report
 
         with progress_bar("circle test") as progress:
             found = explain(
@@ -109,7 +109,7 @@ def explain_command(
 def _transactions(asked: str | None, profile: "Profile") -> "Sequence[str] | None":
     if asked is None:
         return None
-    from busplan.analysis.derivation.latency import latency_names
+    from busplan.questions.explain.latency import latency_names
 
     known = latency_names(profile)
     if asked not in (*known, ALL_MODELS):
@@ -125,7 +125,7 @@ def _refuse_without_figure(options: "dict[str, object]") -> None:
 
 
 def _list(plan: "Profile") -> "Report":
-    from busplan.analysis.derivation.explain import assumptions
-    from busplan.answers.assumptions import assumptions_report
+    from busplan.questions.explain.assumptions import assumptions_report
+    from busplan.questions.explain.derivation import assumptions
 
     return assumptions_report(plan, assumptions(plan))

@@ -1,11 +1,13 @@
 """Layout of --help: plain argument names, whole sentences for commands, and the exit codes."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any, Final
 
 from typer.core import TyperCommand, TyperGroup
 from typer.exceptions import TyperException
+
+from busplan.errors import BusplanError
 
 FAILURES: Final = (
     "Exits 2 when it could not do its job and says why on standard error, 130 when interrupted, 143 when terminated, "
@@ -20,6 +22,16 @@ _COMPLETION: Final = {
 }
 
 
+@contextmanager
+def _usage_in_our_form(command: str) -> Iterator[None]:
+    """Raise errors of the option parser as the program's own, on one line."""
+    try:
+        yield
+    except TyperException as error:
+        words = error.format_message().rstrip(".").replace("Value error, ", "").replace("Input should", "must")
+        raise BusplanError(f"{command}: {words[:1].lower()}{words[1:]}; `{command} --help` says more") from None
+
+
 class PlainCommand(TyperCommand):
     """A command whose help has no Python types."""
 
@@ -27,6 +39,11 @@ class PlainCommand(TyperCommand):
         super().__init__(name, **settings)
         for param in _of_kind(self.params, "argument"):
             param.metavar = param.metavar or param.name.upper()
+
+    def make_context(self, info_name: str | None, *arguments: Any, **settings: Any) -> Any:
+        """Parse the command line of the command."""
+        with _usage_in_our_form(f"busplan {info_name}"):
+            return super().make_context(info_name, *arguments, **settings)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
         """Pieces of the usage line, without typer's braces around required arguments."""
@@ -44,14 +61,14 @@ class PlainCommand(TyperCommand):
 class PlainGroup(TyperGroup):
     """The program; its help lists the commands first."""
 
-    def make_context(self, *arguments: Any, **settings: Any) -> Any:
-        """Parse the options before the command."""
-        with _usage_in_our_words():
-            return super().make_context(*arguments, **settings)
+    def make_context(self, info_name: str | None, args: list[str], *arguments: Any, **settings: Any) -> Any:
+        """Parse the options before the command; without any word typer shows the help."""
+        with _usage_in_our_form("busplan") if args else nullcontext():
+            return super().make_context(info_name, args, *arguments, **settings)
 
     def invoke(self, ctx: Any) -> Any:
         """Parse the command line of a command and run it."""
-        with _usage_in_our_words():
+        with _usage_in_our_form("busplan"):
             return super().invoke(ctx)
 
     def get_params(self, ctx: Any) -> list[Any]:
@@ -80,20 +97,6 @@ class PlainGroup(TyperGroup):
         """Write commands and options."""
         self.format_commands(ctx, formatter)
         _write_parameters(self, ctx, formatter)
-
-
-@contextmanager
-def _usage_in_our_words() -> Iterator[None]:
-    """Raise errors of the option parser as the program's own."""
-    try:
-        yield
-    except TyperException as error:
-        from busplan.cli.usage import usage_error
-
-        ours = usage_error(error)
-        if ours is None:
-            raise
-        raise ours from None
 
 
 def _write_parameters(command: TyperCommand | TyperGroup, ctx: Any, formatter: Any) -> None:

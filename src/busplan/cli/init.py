@@ -126,10 +126,10 @@ def init_command(
 
 def _with_settings(text: str, *, name: str) -> str:
     """The same profile with a setting of the bus that its machine needs."""
-    from busplan.analysis.planning.settings import needed_settings
     from busplan.profile.edit import edited_file
     from busplan.profile.toml import decode, validate
     from busplan.profile.write import value_text
+    from busplan.questions.plan.settings import needed_settings
 
     needed = needed_settings(validate(decode(text.encode(), name=name)))
     if not needed:
@@ -209,11 +209,11 @@ def _asked(words: str, default: _Answer) -> _Answer:
 
 def _verdict(text: str) -> list[str]:
     """The verdict of a new profile, in sentences."""
-    from busplan.analysis.capacity.figures import capacity
-    from busplan.analysis.capacity.verdict import verdicts
-    from busplan.answers.verdict import verdict_sentences
     from busplan.forms.columns import sentence_text
     from busplan.profile.toml import decode, validate
+    from busplan.questions.capacity.sentences import verdict_sentences
+    from busplan.questions.capacity.verdict import verdicts
+    from busplan.questions.fit.figures import capacity
 
     profile = validate(decode(text.encode(), name="profile"))
     headline, *_ = verdict_sentences(verdicts(capacity(profile))[0], profile)

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import (
     AllOption,
@@ -19,7 +19,7 @@ from busplan.cli.options import (
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 
-@takes_changes(NODES, GAP_COUNT)
+@takes_changes()
 def latency_command(
     profile: ProfileArgument,
     payload: Annotated[
@@ -48,8 +48,8 @@ def latency_command(
     Example: busplan latency paper-two-node --payload 4,16,1024
     """
     with answer(format_, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.latency import latency
-        from busplan.answers.latency import latency_report
+        from busplan.questions.latency.figures import latency
+        from busplan.questions.latency.report import latency_report
 
         plan = load_changed(profile, changes)
         result = latency(
@@ -57,4 +57,4 @@ def latency_command(
             payloads_bytes=None if payload is None else parse_sizes(payload, option="--payload"),
             timing_models=timing_models(timing, plan),
         )
-        give(latency_report(result, plan))
+        give(latency_report(result))

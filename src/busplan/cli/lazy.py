@@ -70,7 +70,9 @@ class LazyGroup(PlainGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command of a command line."""
         if args and args[0] not in COMMANDS and not args[0].startswith("-") and not ctx.resilient_parsing:
-            from busplan.cli.usage import unknown_command
+            from busplan.errors import BusplanError
+            from busplan.nearest import did_you_mean
 
-            raise unknown_command(args[0], list(COMMANDS))
+            near = did_you_mean(args[0], list(COMMANDS)) or "`busplan --help` lists them"
+            raise BusplanError(f"{args[0]}: no such command; {near}")
         return super().resolve_command(ctx, args)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import AllOption, ProfileArgument, output_option
 from busplan.cli.pictures import PICTURE_FORMAT_HELP, picture_form, picture_title, write_picture
@@ -18,8 +18,8 @@ from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.map.direction import Direction
-    from busplan.analysis.map.trade_off import TradeOff
+    from busplan.questions.map.direction import Direction
+    from busplan.questions.map.trade_off import TradeOff
     from busplan.sections.profile import Profile
 
 MapForm = Literal[Form, Picture]
@@ -38,9 +38,7 @@ def _along(option: str, *, default: str) -> typer.models.OptionInfo:
 
 
 @takes_changes(
-    period_form(" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"),
-    NODES,
-    GAP_COUNT,
+    period=" of this design with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
     words="Of this design; along a key that varies, it moves the mark.",
 )
 def map_command(
@@ -93,15 +91,15 @@ def map_command(
                 write_picture(_svg(found, changes), chosen, output)
         case _:
             with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                from busplan.answers.map import map_report
+                from busplan.questions.map.report import map_report
 
                 give(map_report(_found(load_changed(profile, changes), x, y, jobs=jobs, with_circle=circle)))
 
 
 def _found(plan: "Profile", x: str | None, y: str | None, *, jobs: int | None, with_circle: bool) -> "TradeOff":
-    from busplan.analysis.map.trade_off import trade_off
     from busplan.cli.progress import progress_bar
     from busplan.cli.workers import available_processors, executor
+    from busplan.questions.map.trade_off import trade_off
 
     across = _direction(x, plan, option="--x", with_circle=with_circle)
     up = _direction(y, plan, option="--y", with_circle=with_circle)
@@ -110,7 +108,7 @@ def _found(plan: "Profile", x: str | None, y: str | None, *, jobs: int | None, w
 
 
 def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: bool) -> "Direction | None":
-    from busplan.analysis.map.direction import checked_direction
+    from busplan.questions.map.direction import checked_direction
 
     if text is None:
         return None
@@ -121,7 +119,7 @@ def _direction(text: str | None, plan: "Profile", *, option: str, with_circle: b
 
 def _svg(found: "TradeOff", changes: KeyChanges) -> str:
     """The drawing as a file of its own."""
-    from busplan.answers.map import headline
-    from busplan.drawings.map.svg import map_svg
+    from busplan.questions.map.report import headline
+    from busplan.questions.map.svg import map_svg
 
     return map_svg(found, title=picture_title(headline(found), changes))

@@ -109,14 +109,14 @@ def timing_model(timing: str, profile: "Profile") -> str:
     BusplanError
         The profile's kind of bus has no such model, or the model cannot express the profile.
     """
-    from busplan.analysis.network import known_model
+    from busplan.questions.fit.network import known_model
 
     return known_model(profile, timing, name="--timing")
 
 
 def known_models(profile: "Profile") -> tuple[str, ...]:
     """Names of the timing models of a profile's kind of bus."""
-    from busplan.analysis.network import model_names
+    from busplan.questions.fit.network import model_names
 
     return model_names(profile)
 

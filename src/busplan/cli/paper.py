@@ -17,7 +17,7 @@ def paper_command(all_: AllOption = False, format_: FormatOption = None, output:
     Example: busplan paper --format csv
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.analysis.evidence import paper_evidence
-        from busplan.answers.evidence import paper_report
+        from busplan.questions.evidence.figures import paper_evidence
+        from busplan.questions.evidence.report import paper_report
 
         give(paper_report(paper_evidence(circles=shown_circles)))

@@ -78,7 +78,7 @@ def write_picture(svg: str, form: Picture, output: Path | None) -> None:
 
 def picture_title(headline: "Sentence", changes: KeyChanges) -> str:
     """Title of a picture that is a file of its own: the headline of its answer, and what was set."""
-    from busplan.answers.documents import changes_sentences
     from busplan.forms.columns import sentence_text
+    from busplan.questions.words.documents import changes_sentences
 
     return " ".join(map(sentence_text, (headline, *changes_sentences(changes))))

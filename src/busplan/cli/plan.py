@@ -9,7 +9,7 @@ import typer
 
 from busplan.cli.answering import answer, report_with
 from busplan.cli.apply import apply_changes, require_own_file
-from busplan.cli.changes import GAP_COUNT, NODES, RESERVE, period_form, takes_changes
+from busplan.cli.changes import takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import STANDARD_OUTPUT, AllOption, FormatOption, ProfileArgument
 from busplan.cli.output import PlanFailsError, emit_document, say
@@ -20,37 +20,30 @@ from busplan.forms import ENDINGS, Form
 from busplan.profile.changes import NO_CHANGES, KeyChange, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.planning.plan import Plan
     from busplan.forms.blocks import Report
     from busplan.profile.toml import LoadedProfile
+    from busplan.questions.plan.planning import Plan
     from busplan.sections.profile import Profile
 
 _PROFILE_ENDINGS = ("", ".toml")
 _MAX_AXES = 1_000_000
 
 
-_NodesOption = Annotated[
-    int | None,
-    typer.Option(
-        "--nodes",
-        metavar="N",
-        help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
-    ),
-]
-
-
 @takes_changes(
-    NODES._replace(annotation=_NodesOption),
-    period_form(
-        " with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
-        "[default: the profile's cycle.period_us, which may be changed]"
-    ),
-    GAP_COUNT,
-    RESERVE,
-    words="Part of the goal: it is kept, and --apply and -o write it.",
+    "Part of the goal: it is kept, and --apply and -o write it.",
+    period=" with its unit, as 4ms, 250us or 0.001s; it is then kept.  "
+    "[default: the profile's cycle.period_us, which may be changed]",
 )
 def plan_command(
     profile: ProfileArgument,
+    nodes: Annotated[
+        int | None,
+        typer.Option(
+            "--nodes",
+            metavar="N",
+            help="Goal: so many distributed nodes, the host not counted.  [default: the profile's bus.nodes]",
+        ),
+    ] = None,
     changes: KeyChanges = NO_CHANGES,
     axes: Annotated[
         int | None,
@@ -130,6 +123,8 @@ def plan_command(
 
     Example: busplan plan paper-1ms --axes 16
     """
+    if nodes is not None:
+        changes = KeyChanges((KeyChange("bus.nodes", nodes, "--nodes", str(nodes)), *changes.each))
     report_file = output if output is not None and output.suffix.lower() in ENDINGS else None
     if report_file is None and output is not None and output.suffix.lower() not in _PROFILE_ENDINGS:
         raise BusplanError(
@@ -141,12 +136,12 @@ def plan_command(
     piped = new == STANDARD_OUTPUT
     require_apart({"--output": None if piped else new}, inputs=profile_files(profile), of_profiles=True)
     with answer(format_, report_file, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-        from busplan.analysis.circle.check import CircleCheck
-        from busplan.analysis.planning.freedoms import freed
-        from busplan.analysis.planning.plan import plan
-        from busplan.answers.plan import plan_report
         from busplan.profile.keys import flat
         from busplan.profile.shipped import load
+        from busplan.questions.circle.check import CircleCheck
+        from busplan.questions.plan.freedoms import freed
+        from busplan.questions.plan.planning import plan
+        from busplan.questions.plan.report import plan_report
 
         if apply:
             require_own_file(profile)
@@ -172,7 +167,7 @@ def plan_command(
             _apply(loaded, result)
         elif file is not None:
             say(f"wrote {new}")
-        report = plan_report(result, with_circle=with_circle)
+        report = plan_report(result)
         (partial(_say_report, changes) if piped else give)(report)
     if result.recommended is None:
         raise PlanFailsError
@@ -204,7 +199,7 @@ def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> Key
     """The changes, with the nodes that --axes needs."""
     if axes is None:
         return changes
-    from busplan.analysis.planning.machine import nodes_for_axes
+    from busplan.questions.plan.machine import nodes_for_axes
 
     of_nodes = KeyChanges(tuple(one for one in changes.each if one.key in ("node", "node.axes")))
     nodes = nodes_for_axes(of_nodes.applied(profile), axes)
@@ -213,9 +208,9 @@ def _wanted(profile: "Profile", changes: KeyChanges, *, axes: int | None) -> Key
 
 def _apply(loaded: "LoadedProfile", result: "Plan") -> None:
     """Write the recommended values into the profile's file."""
-    from busplan.answers.plan import settings
     from busplan.profile.keys import flat
     from busplan.profile.write import whole
+    from busplan.questions.plan.report import settings
 
     if result.recommended is None:
         return

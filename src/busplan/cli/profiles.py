@@ -12,7 +12,7 @@ def profiles_command(format_: FormatOption = None, output: OutputOption = None) 
     Example: busplan profiles
     """
     with answer(format_, output) as give:
-        from busplan.answers.profiles import profiles_report
+        from busplan.cli.profiles_report import profiles_report
         from busplan.profile.shipped import load, shipped_names
 
         give(profiles_report([load(name).profile for name in shipped_names()]))

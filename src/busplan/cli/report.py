@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from busplan.cli.answering import answer
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files
 from busplan.cli.options import OutputOption, complete_profile, format_option
 from busplan.cli.progress import progress_bar
@@ -27,9 +27,7 @@ _REFUSED: Final[dict[Form, str]] = {
 
 
 @takes_changes(
-    period_form(" of all profiles with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"),
-    NODES,
-    GAP_COUNT,
+    period=" of all profiles with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]",
     words="Of all profiles.",
 )
 def report_command(
@@ -80,8 +78,8 @@ def report_command(
 def _page(
     arguments: "Sequence[str]", plans: "Sequence[Profile]", title: str | None, *, changes: KeyChanges, circle: bool
 ) -> "Report":
-    from busplan.analysis.all_answers import answers_of_each
-    from busplan.answers.page.report import ReportedProfile, page_report
+    from busplan.questions.report.all_answers import answers_of_each
+    from busplan.questions.report.page import ReportedProfile, page_report
 
     with progress_bar("circle tests") as progress:
         found = answers_of_each(plans, with_circle=circle, progress=progress)

@@ -11,7 +11,7 @@ from busplan.errors import BusplanError
 
 def complete_code(incomplete: str) -> list[str]:
     """Complete the code of a rule for the shell."""
-    from busplan.rules.registry import all_rules
+    from busplan.gate.registry import all_rules
 
     return [code for code in all_rules() if code.startswith(incomplete)]
 
@@ -34,8 +34,8 @@ def rule_command(
     Example: busplan rule BP110
     """
     with answer(format_, output, is_whole=all_) as give:
-        from busplan.answers.rules import rule_report, rules_report
-        from busplan.rules.registry import all_rules
+        from busplan.gate.registry import all_rules
+        from busplan.gate.rules_report import rule_report, rules_report
 
         rules = all_rules()
         if code is None:

@@ -28,7 +28,7 @@ from busplan.forms import ENDINGS, ROWS_ENDINGS
 from busplan.profile.changes import NO_CHANGES, KeyChanges, require_separate
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.asked import Sweep
+    from busplan.questions.sweep.asked import Sweep
 
 _ENDINGS: Final[Mapping[str, SweepForm]] = MappingProxyType({**ENDINGS, **ROWS_ENDINGS})
 _DEFAULT_TOP: Final = 20
@@ -174,8 +174,8 @@ def sweep_command(
     outputs = {"--output": output, "--output's partial file": kept, "--plot": plot}
     require_apart(outputs, inputs=profile_files(profile))
     plot_form_ = None if plot is None else plot_form(plot)
-    from busplan.analysis.sweep.asked import Names, checked_sweep
     from busplan.cli.workers import available_processors
+    from busplan.questions.sweep.asked import Names, checked_sweep
 
     loaded = load_changed(profile, changes)
     axes = parse_axes(vary or [], profile=loaded)
@@ -259,7 +259,7 @@ def _require_needed(needed: str, is_there: bool, options: dict[str, object]) -> 
 
 def _require_number(sweep: "Sweep", asked: dict[str, str | None]) -> None:
     """Refuse a column that does not exist or is not numeric."""
-    from busplan.analysis.sweep.blocks import word_figures
+    from busplan.questions.sweep.blocks import word_figures
 
     words = {*word_figures(sweep.profile), *(key for key, axis in sweep.grid.axes.items() if axis.has_words)}
     numbers = [name for name in sweep.columns if name not in words]
@@ -276,7 +276,7 @@ def _columns(sweep: "Sweep", asked: str | None, *, short: bool, sort_by: str) ->
             if name not in sweep.columns:
                 raise BusplanError(f"--columns {name}: no such column; there are {', '.join(sweep.columns)}")
     elif short:
-        from busplan.answers.sweep.top import default_columns
+        from busplan.questions.sweep.top import default_columns
 
         chosen = default_columns(sweep)
     else:

@@ -20,8 +20,8 @@ from busplan.profile.write import profile_text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from busplan.analysis.sweep.grid import Array, Values
     from busplan.cli.sweep_run import SweepJob
+    from busplan.questions.sweep.grid import Array, Values
 
 _MANIFEST: Final = "sweep.json"
 _OFTEN_S: Final = 1.0

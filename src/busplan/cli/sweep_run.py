@@ -17,12 +17,12 @@ from busplan.progress import Progress
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from busplan.analysis.sweep.asked import Sweep
-    from busplan.analysis.sweep.blocks import SweepBlock
-    from busplan.answers.sweep.top import Tally
-    from busplan.answers.sweep.writers import RowsWriter
     from busplan.cli.sweep_parts import Parts
-    from busplan.drawings.sweep_plot import FigureData
+    from busplan.questions.sweep.asked import Sweep
+    from busplan.questions.sweep.blocks import SweepBlock
+    from busplan.questions.sweep.plot import FigureData
+    from busplan.questions.sweep.top import Tally
+    from busplan.questions.sweep.writers import RowsWriter
 
 SweepForm = Literal[Form, RowsForm]
 TOP_FORMS: Final = tuple(form for form in get_args(Form) if form not in get_args(RowsForm))
@@ -67,9 +67,9 @@ def run_sweep(job: SweepJob) -> None:
     StoppedError
         Ctrl-C, SIGTERM, SIGHUP or a lost worker. The partial output is valid and marked as partial.
     """
-    from busplan.answers.documents import changes_sentences
-    from busplan.answers.sweep.top import Tally
     from busplan.forms.columns import sentence_text
+    from busplan.questions.sweep.top import Tally
+    from busplan.questions.words.documents import changes_sentences
 
     sweep, drawing, tally = job.sweep, _drawing(job), Tally(job.sweep)
     with ExitStack() as stack:
@@ -138,7 +138,7 @@ def _work(
 def _drawing(job: SweepJob) -> "FigureData | None":
     if job.plot is None:
         return None
-    from busplan.drawings.sweep_plot import FigureData, require_drawable
+    from busplan.questions.sweep.plot import FigureData, require_drawable
 
     require_drawable(job.sweep.grid, option="--plot")
     return FigureData(job.sweep, figure=job.figure)
@@ -157,14 +157,14 @@ def _blocks(
     job: SweepJob, parts: "Parts | None", points: int, report: Progress, watch: Callable[[], None]
 ) -> "Iterator[Iterable[SweepBlock]]":
     """Blocks of a suitable size: as the form wants them, or fewer points where each is a circle test."""
-    from busplan.analysis.sweep.blocks import sweep
+    from busplan.questions.sweep.blocks import sweep
 
     asked = job.sweep
     if job.jobs is None:
         blocks = sweep(asked.profile, asked.grid, timing_models=asked.timing_models, chunk_points=points)
         yield _reported(blocks, asked.grid.points, report)
         return
-    from busplan.analysis.sweep.circle_run import circle_blocks, require_circles
+    from busplan.questions.sweep.circle_run import circle_blocks, require_circles
 
     with ExitStack() as stack:
         if parts is not None:
@@ -212,7 +212,7 @@ def _sink(job: SweepJob, file: BinaryIO | None, tally: "Tally") -> "RowsWriter":
     """Destination for the blocks: the top rows, or every row."""
     match job.form:
         case "csv" | "json" | "jsonl" | "parquet":
-            from busplan.answers.sweep.writers import rows_writer
+            from busplan.questions.sweep.writers import rows_writer
 
             return rows_writer(job.form, job.sweep, emit_document if file is None else file.write)
         case _:
@@ -223,8 +223,8 @@ class _TopSink:
     """Keeps the top rows for an answer at the end."""
 
     def __init__(self, job: SweepJob, form: Form, file: BinaryIO | None, tally: "Tally") -> None:
-        from busplan.analysis.sweep.blocks import CHUNK_POINTS
-        from busplan.answers.sweep.top import TopRows
+        from busplan.questions.sweep.blocks import CHUNK_POINTS
+        from busplan.questions.sweep.top import TopRows
 
         self.points = CHUNK_POINTS
         self._job, self._form, self._file, self._tally = job, form, file, tally
@@ -233,7 +233,7 @@ class _TopSink:
 
     def finish(self, *, complete: bool) -> None:  # noqa: ARG002 - `tally` has the number of points
         """Write the answer."""
-        from busplan.answers.sweep.top import sweep_report
+        from busplan.questions.sweep.top import sweep_report
 
         report = report_with(self._job.sweep.changes, sweep_report(self._rows, self._tally, document=_not_kept))
         if self._file is None:

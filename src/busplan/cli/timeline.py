@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import typer
 
 from busplan.cli.answering import answer, naming
-from busplan.cli.changes import GAP_COUNT, NODES, load_changed, period_form, takes_changes
+from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
     AllOption,
@@ -24,7 +24,7 @@ from busplan.forms import ENDINGS, PICTURES, Form, Picture
 from busplan.profile.changes import NO_CHANGES, KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.analysis.timeline.schedule import Schedule
+    from busplan.questions.timeline.events import Schedule
     from busplan.sections.profile import Profile
 
 TimelineForm = Literal[Form, Picture]
@@ -33,9 +33,7 @@ _ENDINGS: Final[Mapping[str, TimelineForm]] = MappingProxyType({**ENDINGS, **PIC
 _TRANSACTION: Final = re.compile(r"\s*(?P<kind>[a-z_]+)\s*:\s*(?P<node>[0-9]{1,9})\s*")
 
 
-@takes_changes(
-    period_form(" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]"), NODES, GAP_COUNT
-)
+@takes_changes(period=" with its unit, as 4ms, 250us or 0.001s.  [default: the profile's cycle.period_us]")
 def timeline_command(
     profile: ProfileArgument,
     from_: Annotated[
@@ -106,7 +104,7 @@ def timeline_command(
         raise BusplanError(f"--from {from_} --to {to}: the window must end after it begins")
 
     def shown() -> "Schedule":
-        from busplan.analysis.timeline.schedule import schedule, zoom
+        from busplan.questions.timeline.events import schedule, zoom
 
         plan = load_changed(profile, changes)
         one = None if transaction is None else _transaction(transaction, plan)
@@ -120,13 +118,13 @@ def timeline_command(
                 write_picture(_svg(shown(), changes), chosen, output)
         case _:
             with answer(chosen, output, inputs=profile_files(profile), changes=changes, is_whole=all_) as give:
-                from busplan.answers.timeline import timeline_report
+                from busplan.questions.timeline.report import timeline_report
 
                 give(timeline_report(shown()))
 
 
 def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
-    from busplan.analysis.network import bus_of, network_of
+    from busplan.questions.fit.network import bus_of, network_of
 
     match, nodes = _TRANSACTION.fullmatch(text), int(network_of(plan).nodes)
     kinds = [one.key for one in bus_of(plan).stretch_kinds]
@@ -141,7 +139,7 @@ def _transaction(text: str, plan: "Profile") -> tuple[str, int]:
 
 def _svg(shown: "Schedule", changes: KeyChanges) -> str:
     """The drawing as a file of its own."""
-    from busplan.answers.timeline import headline
-    from busplan.drawings.timeline.svg import timeline_svg
+    from busplan.questions.timeline.report import headline
+    from busplan.questions.timeline.svg import timeline_svg
 
     return timeline_svg(shown, title=picture_title(headline(shown), changes))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Final
 from busplan.errors import BusplanError
 
 if TYPE_CHECKING:
-    from busplan.analysis.sweep.grid import Values
+    from busplan.questions.sweep.grid import Values
     from busplan.sections.profile import Profile
 
 VALUES_HELP: Final = (
@@ -57,8 +57,8 @@ def parse_axis(text: str, *, profile: "Profile", option: str) -> "tuple[str, Val
     BusplanError
         Not KEY=VALUES, or invalid values.
     """
-    from busplan.analysis.sweep.axis_values import parse_values
     from busplan.profile.kinds import words_of
+    from busplan.questions.sweep.values import parse_values
 
     key, equals, spec = (part.strip() for part in text.partition("="))
     if not equals or not key or not spec:

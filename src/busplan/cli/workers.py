@@ -11,9 +11,9 @@ from multiprocessing.connection import wait
 from threading import Thread
 from typing import TypeVar
 
-from busplan.analysis.sweep.execution import Here
 from busplan.cli.interrupt import ENDING
 from busplan.errors import WorkerLostError
+from busplan.questions.sweep.execution import Here
 
 Result = TypeVar("Result")
 

@@ -5,14 +5,13 @@ writes every block in its own way.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
-from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from busplan.buses.figure import Figure, Ink
 from busplan.forms.lines import Line
 
-BlockOrPart = TypeVar("BlockOrPart")
 State = Literal["passes", "fails", "warns", "neutral"]
 """Verdict that a piece of text carries; it sets the colour."""
 JsonDocument = dict[str, Any]
@@ -33,11 +32,7 @@ class ShownValue(NamedTuple):
     """Decimals of a number; None for all it has. A number too small for them is written with three digits instead."""
     signed: bool = False
     """If True, a positive number has a plus sign."""
-    at: str = ""
-    """JSON pointer (RFC 6901) to the value in the answer's document; empty if it is not there."""
     state: State = "neutral"
-    command: str = ""
-    """Key of the `Command` whose document `at` points into; empty if the answer has one document."""
     digits: int | None = None
     """Significant digits of a number without `decimals`; None for all it has."""
     fixed: bool = False
@@ -91,8 +86,6 @@ class Command(NamedTuple):
     line: str
     purpose: str = ""
     """Its output, in a few words."""
-    key: str = ""
-    """Key that `ShownValue.command` refers to."""
 
 
 Part = str | ShownValue | Words | Code
@@ -217,10 +210,6 @@ class Question(NamedTuple):
     answer: Words
     sentences: tuple[Sentence, ...]
     facts: Facts
-    at: str = ""
-    """JSON pointer to the joined sentences; empty if they are not in the document."""
-    command: str = ""
-    """As in `ShownValue`."""
 
 
 class Chapter(NamedTuple):
@@ -289,16 +278,14 @@ def joined(*sentences: Sentence, by: str = " ") -> Sentence:
     return Sentence(tuple(parts), sentences[0].state)
 
 
-def figure_value(figure: Figure, value: Any, *, at: str = "") -> ShownValue:
+def figure_value(figure: Figure, value: Any) -> ShownValue:
     """Value with the unit and decimals of a registered figure; False fails where True is better."""
     fails = figure.sort == "truth" and figure.better == "more" and value is False
     decimals = figure.decimals if figure.sort == "number" else None
-    return ShownValue(
-        value, figure.key, figure.column or figure.unit, decimals, at=at, state="fails" if fails else "neutral"
-    )
+    return ShownValue(value, figure.key, figure.column or figure.unit, decimals, state="fails" if fails else "neutral")
 
 
-def attribute_value(figure: Figure, owner: object, *, at: str) -> ShownValue:
+def attribute_value(figure: Figure, owner: object) -> ShownValue:
     """Value of a registered figure, read from the attribute of its key.
 
     Parameters
@@ -307,44 +294,15 @@ def attribute_value(figure: Figure, owner: object, *, at: str) -> ShownValue:
         The figure.
     owner
         Object with an attribute named `figure.key`.
-    at
-        JSON pointer to the owner.
     """
-    return figure_value(figure, getattr(owner, figure.key), at=f"{at}/{figure.key}")
+    return figure_value(figure, getattr(owner, figure.key))
 
 
-def count_value(value: float, key: str = "", *, at: str = "", grouped: bool = False) -> ShownValue:
+def count_value(value: float, key: str = "", *, grouped: bool = False) -> ShownValue:
     """A count, written without a unit."""
-    return ShownValue(value, key, at=at, grouped=grouped)
+    return ShownValue(value, key, grouped=grouped)
 
 
 def state_of(passes: object) -> State:
     """State of a result that passes or fails."""
     return "passes" if passes else "fails"
-
-
-def values_in(item: object) -> Iterator[ShownValue]:
-    """Every figure in a block, or in several, in reading order."""
-    if isinstance(item, ShownValue):
-        yield item
-    elif isinstance(item, tuple):
-        for one in item:
-            yield from values_in(one)
-
-
-def with_values(item: BlockOrPart, change: Callable[[ShownValue], ShownValue]) -> BlockOrPart:
-    """Copy a block, replacing every figure in it.
-
-    Parameters
-    ----------
-    item
-        The block, or a piece of one.
-    change
-        Function from a figure to its replacement.
-    """
-    if isinstance(item, ShownValue):
-        return change(item)  # type: ignore[return-value]
-    if not isinstance(item, tuple):
-        return item
-    parts = [with_values(one, change) for one in item]
-    return item._make(parts) if hasattr(item, "_make") else tuple(parts)  # type: ignore[return-value]

@@ -78,7 +78,7 @@ def decimals_of(number: float, decimals: int, *, signed: bool = False) -> str:
     return f"{sign}{number:.3g}"
 
 
-def period_value(period_us: float, *, at: str = "", command: str = "") -> ShownValue:
+def period_value(period_us: float) -> ShownValue:
     """A communication period in s, ms or us, by its size.
 
     Examples
@@ -87,7 +87,7 @@ def period_value(period_us: float, *, at: str = "", command: str = "") -> ShownV
     ['4 ms', '250 us', '1.2345 ms', '2 s']
     """
     unit = "s" if period_us >= _SECOND_US else "ms" if period_us >= _MILLISECOND_US else "us"
-    return ShownValue(period_us, "period_us", unit, at=at, command=command)
+    return ShownValue(period_us, "period_us", unit)
 
 
 def period(period_us: float) -> str:

@@ -1,4 +1,4 @@
-"""Changes of a profile by options: `--set KEY=VALUE` and its short forms, such as --nodes."""
+"""Changes of a profile by options: `--set KEY=VALUE`, --period, and the goal of `plan`."""
 
 import re
 from collections.abc import Sequence
@@ -70,7 +70,7 @@ class KeyChanges:
 
     @property
     def by_set(self) -> tuple[KeyChange, ...]:
-        """Changes by --set; those by a short form show in every answer."""
+        """Changes by --set; those by another option show in every answer."""
         return tuple(one for one in self.each if one.option == SET)
 
     @property

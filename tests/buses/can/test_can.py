@@ -10,9 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.analysis.capacity.certainty import FITS
-from busplan.analysis.circle.delays import loop_delays_us
-from busplan.analysis.network import network_of
 from busplan.buses import kind_named
 from busplan.buses.can.limits import shared_identifiers
 from busplan.buses.can.response import Sender, worst_response
@@ -25,6 +22,9 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
 
 Run = Callable[..., Any]

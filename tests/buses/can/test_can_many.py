@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 import busplan
-from busplan.analysis.network import network_of
 from busplan.buses.can.constants import SATURATED
 from busplan.buses.can.cycle import WORST, CanCycle
 from busplan.buses.can.limits import LIMITS
@@ -22,6 +21,7 @@ from busplan.buses.can.section import CanProfile
 from busplan.elementwise import pointwise
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
+from busplan.questions.fit.network import network_of
 from busplan.sections.base import with_unchecked
 
 Run = Callable[..., Any]

@@ -5,9 +5,9 @@ from subprocess import CompletedProcess
 
 import pytest
 
-from busplan.analysis.evidence import bus_evidence
 from busplan.buses import kind_named
 from busplan.buses.published import EvidenceSection
+from busplan.questions.evidence.figures import bus_evidence
 
 SECTIONS = bus_evidence(kind_named("can"))
 SYSTEM = SECTIONS[-1]

@@ -12,16 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import busplan
-from busplan.analysis.capacity.cycle import cycle_of, limits_with_time
-from busplan.analysis.circle.delays import loop_delays_us, skew_us
-from busplan.analysis.evidence import bus_evidence
-from busplan.analysis.network import network_of
 from busplan.buses import kind_named
 from busplan.buses.ethercat.section import EthercatProfile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.fit.cycle import cycle_of, limits_with_time
+from busplan.questions.fit.loop_delays import loop_delays_us, skew_us
+from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
 
 Run = Callable[..., Any]

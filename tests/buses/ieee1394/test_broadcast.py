@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.capacity.cycle import cycle_of
-from busplan.analysis.capacity.figures import figures
-from busplan.analysis.circle.delays import loop_delays_us
-from busplan.analysis.latency import latency
-from busplan.analysis.network import bus_of, model_names, network_of
 from busplan.buses.ieee1394.broadcast import BroadcastCycle
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.elementwise import plain
 from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.figures import figures
+from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.latency.figures import latency
 from busplan.sections.profile import Profile
 
 DVRK = load("dvrk").profile

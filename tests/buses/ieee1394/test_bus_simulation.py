@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given, settings, target
 from hypothesis import strategies as st
 
-from busplan.analysis.network import network_of
 from busplan.buses.ieee1394.cycle import Ieee1394Cycle
 from busplan.buses.ieee1394.section import Ieee1394Profile
 from busplan.buses.network import Group
+from busplan.questions.fit.network import network_of
 from busplan.sections.alike_nodes import AlikeNodes
 
 ROUNDING_US = 1e-6

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from busplan.analysis.circle.delays import loop_delays_us
-from busplan.analysis.evidence import bus_evidence
 from busplan.buses import kind_named
 from busplan.buses.ieee1394 import constants as ieee1394
 from busplan.elementwise import plain
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.fit.loop_delays import loop_delays_us
 from busplan.sourced import Sourced
 
 

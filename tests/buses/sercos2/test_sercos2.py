@@ -6,8 +6,6 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.analysis.derivation.inputs import given
-from busplan.analysis.evidence import bus_evidence
 from busplan.buses import kind_named
 from busplan.buses.published import parts_tested
 from busplan.buses.sercos2.section import Sercos2Profile
@@ -16,6 +14,8 @@ from busplan.errors import BusplanError
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
 from busplan.profile.write import profile_text
+from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.fit.inputs import given
 from busplan.sections.profile import Profile
 
 DATA: dict[str, Any] = {

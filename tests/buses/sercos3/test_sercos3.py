@@ -5,13 +5,13 @@ from typing import Any
 import pytest
 
 import busplan
-from busplan.analysis.circle.delays import loop_delays_us
-from busplan.analysis.network import network_of
 from busplan.buses import kind_named
 from busplan.buses.sercos3.section import Sercos3Profile
 from busplan.elementwise import plain
 from busplan.profile.shipped import load
 from busplan.profile.toml import override
+from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.fit.network import network_of
 from busplan.sections.profile import Profile
 
 DATA: dict[str, Any] = {

@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from busplan.analysis.evidence import bus_evidence
-from busplan.analysis.network import network_of
 from busplan.buses import kind_named
 from busplan.buses.sercos3.constants import PERIODS
 from busplan.buses.sercos3.cycle import TELEGRAMS, Sercos3Cycle
@@ -16,6 +14,8 @@ from busplan.buses.sercos3.evidence import most_drives
 from busplan.buses.sercos3.section import Sercos3Profile
 from busplan.elementwise import plain
 from busplan.profile.shipped import load
+from busplan.questions.evidence.figures import bus_evidence
+from busplan.questions.fit.network import network_of
 
 SOME = settings(max_examples=150, deadline=None)
 BYTE_NS = 80

@@ -1,1 +1,0 @@
-"""From a profile to frozen results; everything a command shows is computed here."""

@@ -1,1 +1,0 @@
-"""From measured latencies to the execution time of a node."""

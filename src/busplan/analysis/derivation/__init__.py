@@ -1,1 +1,0 @@
-"""Where a figure comes from: every step to it, and everything it starts from."""

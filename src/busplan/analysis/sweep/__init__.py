@@ -1,1 +1,0 @@
-"""The same figures over a grid of values."""

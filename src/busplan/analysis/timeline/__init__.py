@@ -1,1 +1,0 @@
-"""One cycle as events, one behind the other."""

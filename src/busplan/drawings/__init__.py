@@ -1,1 +1,0 @@
-"""Drawings: what a chart shows, as SVG and in characters."""

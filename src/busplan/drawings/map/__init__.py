@@ -1,1 +1,0 @@
-"""The map of a profile in characters, as SVG and PNG."""

@@ -1,1 +1,0 @@
-"""The timeline of a cycle in characters and as SVG."""

@@ -1,0 +1,182 @@
+"""Rules for every kind of bus: does the cycle fit, is there room, is the execution time known?"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from busplan.buses.node_time import NODE, busy_words, slow_groups
+from busplan.buses.rule import Mending, Rule, RuleFigures, RuleProblem, RuleSubject, margin, overrun, told_apart
+from busplan.questions.fit.assumed import heavy_assumptions
+from busplan.questions.fit.certainty import DOES_NOT_FIT, NOT_SHOWN, limits_behind
+from busplan.questions.fit.cycle import TIME, fits_in
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.execution import TableExecution
+
+
+def slice_overrun(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The cycle does not fit, whatever is not known of it."""
+    one, bus = subject.deciding, bus_of(subject.profile)
+    if one.verdict != DOES_NOT_FIT:
+        return
+    broken = [limit for limit in map(bus.limit, one.exceeded) if limit is not None]
+    alone = [limit for limit in broken if not limit.has_rule]
+    for limit in alone:
+        yield RuleProblem("cycle.period_us", limit.words(network_of(subject.profile)), limit.way_out)
+    if not alone and (TIME in one.exceeded or not broken):
+        yield RuleProblem("cycle.period_us", f"the cycle {overrun(one)}", *subject.cure())
+
+
+def not_shown_to_fit(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The cycle may fit, but what is known of it does not show so."""
+    one, reserve, bus = subject.deciding, subject.profile.limits.reserve, bus_of(subject.profile)
+    if one.verdict != NOT_SHOWN:
+        return
+    for limit in map(bus.limit, limits_behind(one)):
+        if limit is not None and not limit.has_rule:
+            words = limit.words(network_of(subject.profile))
+            yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", limit.way_out)
+    if TIME in (one.not_shown or ()):
+        asked = f"{margin(one)}, limits.reserve asks for {reserve * one.available_us:.1f} us"
+        words = asked if reserve else overrun(one)
+        yield RuleProblem("cycle.period_us", f"not shown to fit: {words}", *subject.cure())
+
+
+def over_utilisation(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The slice is fuller than [limits] allows."""
+    limit, one = subject.profile.limits.max_utilisation, subject.deciding
+    if limit is not None and not (limit and fits_in(one.required_us / limit, available_us=one.available_us)):
+        used, allowed = told_apart(100 * one.utilisation, 100 * limit)
+        words = f"{used}% of the slice is used, {allowed}% allowed"
+        yield RuleProblem("limits.max_utilisation", words, *subject.cure())
+
+
+def too_few_spare_nodes(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The bus carries fewer further nodes than [limits] requires."""
+    limit = subject.profile.limits.min_spare_nodes
+    if limit is None:
+        return
+    for counts in _counted(subject.deciding):
+        spare = (counts.safe_nodes or 0) - counts.nodes
+        if spare < limit:
+            yield RuleProblem("limits.min_spare_nodes", _spare(counts, spare, limit), *_room(subject, counts))
+
+
+def too_few_spare_axes(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """The bus carries fewer further axes than [limits] requires."""
+    limit = subject.profile.limits.min_spare_axes
+    if limit is None:
+        return
+    for counts in _counted(subject.deciding):
+        spare = (counts.safe_axes or 0) - counts.axes
+        if counts.axes and spare < limit:
+            yield RuleProblem("limits.min_spare_axes", _spare(counts, spare, limit), *_room(subject, counts))
+
+
+def _counted(one: RuleFigures) -> Sequence[Any]:
+    """What has counts of its own: the whole, or each group."""
+    return one.groups or (one,)
+
+
+def _spare(counts: Any, spare: int, limit: int) -> str:
+    """How many are to spare, and what limits them."""
+    name = getattr(counts, "name", "")
+    group = f"group {name}: " if name else ""
+    words = f"{max(spare, 0)} to spare that are shown to fit, {limit} asked for"
+    return f"{group}{words}; limited by {counts.safe_limited_by}"
+
+
+def _room(subject: RuleSubject, counts: Any) -> Mending:
+    """How to make room for more nodes."""
+    limit = bus_of(subject.profile).limit(counts.safe_limited_by)
+    return subject.cure() if limit is None or limit.is_safety else Mending(limit.way_out)
+
+
+def node_too_slow(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """A node is not done once a cycle, where the bus does not wait for it."""
+    one, network = subject.deciding, network_of(subject.profile)
+    is_broken = NODE in one.exceeded
+    if is_broken or NODE in (one.not_shown or ()):
+        for group in slow_groups(network):
+            words = busy_words(group, network)
+            name = "time_us" if isinstance(group.node.execution, TableExecution) else "base_us"
+            said = words if is_broken else f"not shown: {words}"
+            yield RuleProblem(group.key(f"execution.{name}"), said, *subject.cure())
+
+
+def assumed_key(subject: RuleSubject) -> Iterator[RuleProblem]:
+    """Much of the required time, or of what is not known of it, is an assumption."""
+    for one in heavy_assumptions(subject.deciding, subject.profile):
+        what = "an assumption" if len(one.keys) == 1 else "an assumption of several"
+        for key in one.keys:
+            at = f"{key}.grade" if one.is_execution else key
+            yield RuleProblem(at, f"{what}, which {one.carries}", "measure it")
+
+
+RULES: Final = (
+    Rule(
+        "BP101",
+        "slice-overrun",
+        "error",
+        "the cycle does not fit its time slice",
+        "All terms of one cycle together (equation 2), with the bias of the timing model, take longer than "
+        "slice_ratio * period_us (equation 1), by more than is not known; or a limit is broken that has no rule of its "
+        "own. The message names the cheapest cure, "
+        "which `busplan plan` finds: a setting of the bus needs no new parts, the slice ratio is computing time of the "
+        "host, the period is what the machine is for.",
+        slice_overrun,
+    ),
+    Rule(
+        "BP114",
+        "not-shown-to-fit",
+        "error",
+        "the cycle is not shown to fit its time slice",
+        "The margin, less the bias of the timing model, is smaller than its uncertainty and limits.reserve together: "
+        "the plan may work, and nobody can say so. `busplan explain PROFILE uncertainty_us` shows what the "
+        "uncertainty is made of; measuring the execution time is the most frequent way to make it smaller.",
+        not_shown_to_fit,
+    ),
+    Rule(
+        "BP103",
+        "over-utilisation",
+        "error",
+        "the slice is fuller than limits.max_utilisation",
+        "[limits] max_utilisation keeps a share of the slice free, for retries, growth and what the model does "
+        "not cover.",
+        over_utilisation,
+    ),
+    Rule(
+        "BP104",
+        "too-few-spare-nodes",
+        "error",
+        "fewer nodes to spare than limits.min_spare_nodes",
+        "[limits] min_spare_nodes asks that so many more nodes are shown to fit the same period.",
+        too_few_spare_nodes,
+    ),
+    Rule(
+        "BP105",
+        "too-few-spare-axes",
+        "error",
+        "fewer axes to spare than limits.min_spare_axes",
+        "[limits] min_spare_axes asks that so many more axes are shown to fit the same period.",
+        too_few_spare_axes,
+    ),
+    Rule(
+        "BP115",
+        "node-too-slow",
+        "error",
+        "a node is not done once a cycle",
+        "Where nodes execute beside the telegrams, no cycle waits for them. But each has a read and a write in every "
+        "period: both execution times, with execution.worst_extra_us of each and their uncertainty, must fit into "
+        "cycle.period_us.",
+        node_too_slow,
+    ),
+    Rule(
+        "BP112",
+        "assumed-key",
+        "warning",
+        "the verdict rests on an assumption",
+        "A key that its comment or its grade calls assumed carries more than a quarter of the required time or of U "
+        "squared; of execution times, which no equation gives, all that are assumed count together. Measure it, and "
+        "say so in its grade or comment.",
+        assumed_key,
+    ),
+)

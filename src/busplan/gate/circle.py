@@ -1,0 +1,125 @@
+"""Rules of the circle test: does the loop have its margins, does the circle hold its tolerances?
+
+They share one run of the test, only for profiles with a section for it.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from busplan.buses.rule import Mending, Rule, RuleProblem
+from busplan.gate.finding import Subject
+from busplan.questions.fit.circle_refusal import STEP, circle_refusals
+from busplan.sections.base import value_at
+from busplan.sections.machine import CONTOUR_MEASURES
+from busplan.sections.profile import Profile
+from busplan.servo.checks import Refused
+
+_NOT_RUN: Final = ("BP203", "BP204")
+
+
+def circle_problems(subject: Subject) -> Iterator[tuple[str, RuleProblem]]:
+    """Run the circle test of a profile, and yield the code of each broken rule with its problem.
+
+    A circle that cannot be run is said whether or not it was to be run. A cycle that does not fit breaks another rule,
+    and has no circle.
+
+    Parameters
+    ----------
+    subject
+        The profile, and the most simulated steps of each axis: a longer circle is not run.
+    """
+    profile, most_steps = subject.profile, subject.circle_steps
+    refused = circle_refusals(profile) if subject.deciding.circle_refused_by else ()
+    yield from (("BP203", _refused(one, subject)) for one in refused)
+    if refused or most_steps is None or not profile.asks_for_circle or not subject.deciding.fits:
+        return
+    from busplan.questions.circle.failures import STABILITY
+    from busplan.questions.circle.roundness import circle_test, to_attack
+    from busplan.questions.fit.circle_move import path_steps
+
+    steps = path_steps(profile)
+    if steps > most_steps:
+        words = f"the circle takes {steps:,} steps, more than {most_steps:,}: not run"
+        yield "BP204", RuleProblem(_key_in_file("circle.radius_mm", profile=profile), words)
+        return
+    result = circle_test(profile).results[0]
+    # A cycle that is not shown to fit has a rule of its own: nothing of the circle mends it.
+    failures = [one for one in result.failures if not one.is_of_bus]
+    first = to_attack(result)
+    attack = "no single error source of the profile explains it" if first is None else f"attack {first[0].source} first"
+    for failure in failures:
+        stability = failure.name in STABILITY
+        # A finding needs a key in the file: a default limit has none.
+        said = failure.name in profile.tolerance.model_fields_set
+        key = f"tolerance.{failure.name}" if said else "servo.position_gain_per_s"
+        gain = profile.servo.position_gain_per_s
+        way_out = "lower servo.position_gain_per_s or what delays the loop" if stability and gain else ""
+        if failure.name in CONTOUR_MEASURES and failure.value is not None:
+            way_out = attack
+        yield "BP202" if stability else "BP201", RuleProblem(key, failure.text, way_out)
+
+
+def _refused(cause: Refused, subject: Subject) -> RuleProblem:
+    """Why a circle cannot be run, at a key of the file."""
+    key = _key_in_file(cause.name, *cause.beside, profile=subject.profile)
+    # A key that is the cause says its name already.
+    words, _, way_out = (f"{cause.value}: {cause.right}" if key == cause.name else cause.message).partition("; ")
+    return RuleProblem(key, words, *(subject.cure() if cause.name == STEP else Mending(way_out)))
+
+
+def _key_in_file(*keys: str, profile: Profile) -> str:
+    """The first of some keys that the profile sets, or the nearest section."""
+    for key in keys:
+        section, _, name = key.rpartition(".")
+        if name in value_at(profile, section).model_fields_set:
+            return key
+    return "servo" if "servo" in profile.model_fields_set else "circle"
+
+
+def answered(subject: Subject, problems: Sequence[tuple[str, RuleProblem]]) -> set[str]:
+    """Codes of the rules that were checked: without a test, the one alone that says why it was not or cannot be run."""
+    not_run = {code for code, _ in problems if code in _NOT_RUN}
+    if not_run:
+        return not_run
+    is_run = subject.circle_steps is not None and (subject.deciding.fits or not subject.profile.asks_for_circle)
+    return {rule.code for rule in RULES} if is_run else {"BP203"}
+
+
+RULES: Final = (
+    Rule(
+        "BP201",
+        "circle-tolerance",
+        "error",
+        "the circle misses a tolerance",
+        "The circle test of this profile, at its own period, does not hold a contour tolerance of [tolerance]. "
+        "`busplan circle-test PROFILE --contributions` ranks the error sources.",
+    ),
+    Rule(
+        "BP202",
+        "no-stability-margin",
+        "error",
+        "the position loop lacks its stability margin",
+        "The discrete position loop, with everything that delays it, is unstable or has less phase or gain margin "
+        "than [tolerance] requires. Delay in a loop can make its circle rounder while it reduces the margins, so a "
+        "circle without margins fails.",
+    ),
+    Rule(
+        "BP203",
+        "circle-impossible",
+        "error",
+        "the circle test cannot be run",
+        "The values of [servo], [circle] and [delivery] do not go together: the period is no multiple of the step, the "
+        "drive cannot reach the feed, the circle is too short for its ramps or too long for memory, jitter and skew "
+        "exceed half the period, or the bus puts more than one period into a loop on the host. No circle is run to "
+        "know it, so that --no-circle reports it, too, and every other command says it first.",
+    ),
+    Rule(
+        "BP204",
+        "circle-too-long",
+        "warning",
+        "the circle test is too long for a check, and was not run",
+        "The circle of this profile takes more simulated steps than a check allows (--circle-steps, 10,000,000 unless "
+        "it says otherwise), so nothing is known of its circle. A faster circle.feed_mm_per_min, a smaller "
+        "circle.radius_mm or a longer servo.step_us makes it shorter; `busplan circle-test PROFILE` runs it.",
+    ),
+)

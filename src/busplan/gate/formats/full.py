@@ -1,0 +1,114 @@
+"""Findings with their line of the file, the value underlined, and the cure on a line of its own."""
+
+import re
+from collections.abc import Iterator
+from textwrap import wrap
+from typing import Final, NamedTuple
+from unicodedata import category, east_asian_width
+
+from busplan.forms.lines import BLANK, Line, Mark, plain_text, styled_text
+from busplan.gate.formats import GateFormat
+from busplan.gate.formats.plain import TONES, finding_parts, marked_line
+from busplan.gate.report import CheckReport, Located
+from busplan.printable import printable
+
+WIDTH: Final = 100
+"""Widest line, in columns: of sentences, which are wrapped, and of source lines, which are cut."""
+_INDENT: Final = 4 * " "
+_CUT: Final = "..."
+_UNBROKEN: Final = "\xa0"
+"""A space at which no line ends; printable text has none."""
+_NUMBER_AND_WORD: Final = re.compile(r"(?<=[0-9]) (?=[a-z])")
+
+
+class Full(GateFormat):
+    """Each finding with its line of the file."""
+
+    def write(self, report: CheckReport) -> str:
+        """Write the lines of each finding."""
+        return plain_text(_lines(report, WIDTH))
+
+    def on_terminal(self, report: CheckReport, *, width: int) -> str:
+        """Write the lines of each finding in colours."""
+        return styled_text(_lines(report, min(width, WIDTH)))
+
+
+def _lines(report: CheckReport, width: int) -> Iterator[Line]:
+    for one in report.located:
+        yield from _heading(one, width)
+        yield from _source(one, width)
+        yield from _mending(one, width)
+        yield BLANK
+
+
+def _heading(one: Located, width: int) -> Iterator[Line]:
+    """Place, code and severity, which editors read, and the problem, wrapped."""
+    place, words = finding_parts(one.path, one.finding)
+    head = printable(f"{place} {words.removesuffix(one.finding.message)}")
+    first, *others = _wrapped(one.finding.problem, width, first=head)
+    yield marked_line(first, one.path, one.finding)
+    yield from (Line(line, "drawn") for line in others)
+
+
+def _source(one: Located, width: int) -> Iterator[Line]:
+    number, finding = str(one.finding.line), one.finding
+    margin = f"{' ' * len(number)} | "
+    shown = _shown(one.source, finding.marked_column - 1, finding.marked_end_column - 1, width - len(margin))
+    under = f"{margin}{' ' * _columns(shown.before)}"
+    carets = "^" * max(_columns(shown.marked), 1)
+    named = f"{under}{carets} {finding.rule}"
+    marked = named if len(named) <= width else f"{under}{carets}"
+    yield Line(margin.rstrip(), "drawn")
+    yield Line(f"{number} | {shown.before}{shown.marked}{shown.after}".rstrip(), "drawn")
+    yield Line(marked, "drawn", (Mark(len(under), len(marked), TONES[finding.severity]),))
+
+
+def _mending(one: Located, width: int) -> Iterator[Line]:
+    if one.finding.help:
+        yield from (Line(line, "drawn") for line in _wrapped(one.finding.help, width, first="help: "))
+    if one.finding.cure:
+        yield Line("cheapest cure:", "drawn")
+        yield from (Line(f"{_INDENT}{line}", "drawn") for line in one.finding.cure.split("\n"))
+
+
+def _wrapped(text: str, width: int, *, first: str) -> list[str]:
+    """Break a sentence between words, but never between a number and its unit."""
+    lines = wrap(
+        _NUMBER_AND_WORD.sub(_UNBROKEN, printable(text)),
+        width,
+        initial_indent=first,
+        subsequent_indent=_INDENT,
+        break_long_words=False,
+        break_on_hyphens=False,
+        replace_whitespace=False,
+    )
+    return [line.replace(_UNBROKEN, " ") for line in lines]
+
+
+class _Shown(NamedTuple):
+    """A source line as shown: what is marked, and what stands around it."""
+
+    before: str
+    marked: str
+    after: str
+
+
+def _shown(source: str, start: int, end: int, width: int) -> _Shown:
+    """Cut a source line around what is marked; tabs become spaces, so that the carets stand below it."""
+    parts = source[:start], source[start:end], source[end:]
+    before, marked, after = (printable(part, write=lambda one: _INDENT if one == "\t" else " ") for part in parts)
+    if _columns(before + marked + after) <= width:
+        return _Shown(before, marked, after)
+    room = width - 2 * len(_CUT)
+    marked, rest = marked[:room], marked[room:]
+    kept = max(room - len(marked), 0)
+    behind = (rest + after)[: max(kept - len(before), kept // 2)]
+    ahead = before[max(len(before) - (kept - len(behind)), 0) :]
+    return _Shown(
+        f"{_CUT if ahead != before else ''}{ahead}", marked, f"{behind}{_CUT if behind != rest + after else ''}"
+    )
+
+
+def _columns(text: str) -> int:
+    """Columns that a text takes."""
+    return sum(0 if category(one) in ("Mn", "Me") else 2 if east_asian_width(one) in "WF" else 1 for one in text)

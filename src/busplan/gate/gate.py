@@ -1,0 +1,205 @@
+"""Check documents against all rules."""
+
+from collections.abc import Iterator, Mapping
+from typing import Literal, NamedTuple
+
+from busplan.buses.rule import Rule, RuleProblem
+from busplan.errors import BusplanError, PlacedError
+from busplan.gate import circle
+from busplan.gate.baseline import Record, figures_of, keys_of
+from busplan.gate.file import BY_KIND
+from busplan.gate.finding import Finding, PlacedProblem, Subject, finding_of
+from busplan.gate.registry import BASELINE, all_rules, cycle_rules
+from busplan.gate.regression import regression
+from busplan.gate.suppression import suppress
+from busplan.profile.changes import NO_CHANGES, KeyChanges
+from busplan.profile.collect import ProfileSource
+from busplan.profile.document import Document, Spot
+from busplan.profile.keys import path_of
+from busplan.profile.toml import LoadedProfile, decode, read_bytes, validate
+from busplan.questions.circle.check import MOST_STEPS
+
+Status = Literal["ok", "findings", "error"]
+
+
+class Fit(NamedTuple):
+    """How the cycle of a profile fits its slice, by the timing model that decides."""
+
+    verdict: str | None
+    """fits, not shown to fit, or does not fit."""
+    margin_corrected_us: float | None
+    """What is left of the slice, less the bias [us]."""
+    uncertainty_us: float | None
+    """Expanded uncertainty of that [us]."""
+
+
+class FileResult(NamedTuple):
+    """Result of one file."""
+
+    path: str
+    profile: str | None
+    """Name of the profile; None if it cannot be read."""
+    findings: tuple[Finding, ...]
+    """In the order of their places."""
+    figures: dict[str, float]
+    """Figures for a baseline; empty if the profile cannot be read or they were not requested."""
+    source: tuple[str, ...] = ()
+    """Source line of each finding."""
+    failure: str | None = None
+    """Why the file could not be checked; None if it was checked."""
+    keys: Mapping[str, object] | None = None
+    """Keys for a baseline; None as the figures are empty."""
+    fit: Fit | None = None
+    """How the cycle fits; None if the profile cannot be read."""
+
+    @property
+    def status(self) -> Status:
+        """Whether the file has no findings, has findings, or could not be checked."""
+        if self.failure is not None:
+            return "error"
+        return "findings" if self.findings else "ok"
+
+
+def check_source(
+    source: ProfileSource,
+    *,
+    with_circle: bool = True,
+    circle_steps: int = MOST_STEPS,
+    changes: KeyChanges = NO_CHANGES,
+    recorded: Mapping[str, Record] | None = None,
+    record: bool = False,
+) -> FileResult:
+    """Read one file and check it against all rules.
+
+    Parameters
+    ----------
+    source
+        The file; if it cannot be read, the result has a failure.
+    with_circle
+        Whether to run the circle test of profiles that ask for one.
+    circle_steps
+        Most simulated steps of each axis of a circle: a longer one is not run.
+    changes
+        Changes of the profile; if its schema refuses them, the result has a failure.
+    recorded
+        Records of a baseline by file name; None for no baseline.
+    record
+        Whether to give the figures that a baseline records.
+    """
+    if source.failure is not None:
+        return FileResult(source.name, None, (), {}, failure=source.failure)
+    try:
+        content = read_bytes(source.path, name=source.name)
+    except BusplanError as error:
+        return FileResult(source.name, None, (), {}, failure=str(error))
+    try:
+        document = decode(content, name=source.name)
+    except PlacedError as error:
+        return unreadable(source.name, error, content)
+    before = None if recorded is None else recorded.get(source.name, Record({}))
+    return check_document(
+        document,
+        with_circle=with_circle,
+        circle_steps=circle_steps,
+        changes=changes,
+        baseline=before,
+        record=record,
+    )
+
+
+def check_document(
+    document: Document,
+    *,
+    with_circle: bool = True,
+    circle_steps: int = MOST_STEPS,
+    changes: KeyChanges = NO_CHANGES,
+    baseline: Record | None = None,
+    record: bool = True,
+) -> FileResult:
+    """Check one document against all rules.
+
+    Parameters
+    ----------
+    document
+        The text and its name.
+    with_circle
+        Whether to run the circle test of profiles that ask for one.
+    circle_steps
+        Most simulated steps of each axis of a circle: a longer one is not run.
+    changes
+        Changes of the profile; if its schema refuses them, the result has a failure.
+    baseline
+        Record of the profile in a baseline; None for none.
+    record
+        Whether to give the figures that a baseline records.
+
+    Returns
+    -------
+    FileResult
+        Findings in the order of their places, without suppressed ones.
+    """
+    try:
+        profile = validate(document)
+    except PlacedError as error:
+        # These cannot be suppressed: nothing else of the file was checked.
+        return _result(document, None, list(_of_file(error)))
+    try:
+        profile = changes.applied(profile)
+    except BusplanError as error:
+        failure = f"{document.name}: {'; '.join(error.problems)}"
+        return FileResult(document.name, profile.name, (), {}, failure=failure)
+    subject = Subject(LoadedProfile(profile, document), changes, circle_steps=circle_steps if with_circle else None)
+    own = cycle_rules(profile.bus.kind)
+    found = [_placed(document, rule, problem) for rule in own if rule.check for problem in rule.check(subject)]
+    ran = {rule.code for rule in own}
+    problems = list(circle.circle_problems(subject))
+    found += [_placed(document, all_rules()[code], problem) for code, problem in problems]
+    ran |= circle.answered(subject, problems)
+    if baseline is not None:
+        lost = regression(subject, baseline)
+        found += [_placed(document, BASELINE, problem) for problem in lost]
+        ran.add(BASELINE.code)
+    if changes.each:
+        # What a comment suppresses is of the file as it is.
+        ran = set()
+    left, of_comments = suppress(found, document, ran=ran)
+    findings = [*(_said(placed, subject) for placed in left), *of_comments]
+    one = subject.deciding
+    fit = Fit(one.verdict, one.margin_corrected_us, one.uncertainty_us)
+    result = _result(document, profile.name, findings)._replace(fit=fit)
+    return result._replace(figures=figures_of(subject), keys=keys_of(profile)) if record else result
+
+
+def unreadable(name: str, error: PlacedError, content: bytes) -> FileResult:
+    """Make the result for a file that is not text."""
+    lines = content.decode("utf-8-sig", errors="replace").split("\n")
+    found = tuple(_of_file(error))
+    return FileResult(name, None, found, {}, tuple(lines[one.line - 1] for one in found))
+
+
+def _of_file(error: PlacedError) -> Iterator[Finding]:
+    last = len(error.placed) - 1
+    for number, one in enumerate(error.placed):
+        rule = BY_KIND[one.kind]
+        more = f"; {error.hidden} more problems of this file are not listed" if error.hidden and number == last else ""
+        spot = Spot(one.line, one.column, *(one.marked or (one.column, one.column + 1)))
+        words = one.message + more
+        yield finding_of(rule, RuleProblem(one.key, words), spot, words=words)
+
+
+def _placed(document: Document, rule: Rule, problem: RuleProblem) -> PlacedProblem:
+    """Find the line of a problem's key, or of the table that should have it."""
+    spot = document.spot(path_of(document.data() if problem.key.count(".") > 1 else {}, problem.key))
+    return PlacedProblem(rule, problem, spot)
+
+
+def _said(placed: PlacedProblem, subject: Subject) -> Finding:
+    rule, problem, spot = placed
+    message = problem.message if isinstance(problem.message, str) else problem.message()
+    return finding_of(rule, problem, spot, words=f"{problem.key}: {message}{subject.origin}")
+
+
+def _result(document: Document, name: str | None, found: list[Finding]) -> FileResult:
+    ordered = tuple(sorted(found, key=lambda one: (one.line, one.column, one.code, one.message)))
+    lines = document.text.split("\n") if ordered else []
+    return FileResult(document.name, name, ordered, {}, tuple(lines[one.line - 1] for one in ordered))

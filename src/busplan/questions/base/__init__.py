@@ -1,0 +1,1 @@
+"""What public functions share: the base of answers, and profiles as arguments."""

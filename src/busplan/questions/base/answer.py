@@ -1,0 +1,110 @@
+"""Base class of the answers of the Python interface."""
+
+import json
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from busplan.errors import BusplanError
+from busplan.extras import require_pyarrow, require_resvg
+from busplan.files import document_bytes, write_file
+from busplan.forms import ENDINGS, Form, ending_expected, render
+from busplan.forms.blocks import Report
+from busplan.forms.terminal import block_lines
+
+_LIBRARIES: Final = MappingProxyType({".png": require_resvg, ".parquet": require_pyarrow})
+"""What must be there for a file, by ending."""
+
+
+class Answer(ABC):
+    """A frozen answer: figures are attributes, `str()` is the report, `to_dict()` the JSON document.
+
+    A notebook shows the tables and charts of `--format html`.
+    """
+
+    __slots__ = ()
+
+    def to_json(self) -> str:
+        """Return the document of the command's `--format json` as text."""
+        return render(self.report(), "json")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the document of the command's `--format json` as new plain data."""
+        # Parse the text, so that both are equal whatever the types of the figures.
+        document: dict[str, Any] = json.loads(self.to_json())
+        return document
+
+    @property
+    def html(self) -> str:
+        """The page of the command's `--format html`: one file without network or script."""
+        return render(self.report(), "html")
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the answer to a file in the form of its ending; an old file is whole until the new one replaces it.
+
+        Parameters
+        ----------
+        path
+            A name ending in .html, .md, .txt, .json or .csv; .svg or .png (with the extra `plot`) for an answer with
+            a picture; .jsonl or .parquet (with the extra `table`) for a sweep.
+
+        Raises
+        ------
+        BusplanError
+            Another ending, a form that the answer does not have, or the file cannot be written.
+        """
+        contents, ending = self._contents(), Path(path).suffix.lower()
+        if ending not in contents:
+            raise BusplanError(f"{path}: {ending_expected(ending, contents)}")
+        if ending in _LIBRARIES:
+            _LIBRARIES[ending](str(path))
+        write_file(Path(path), document_bytes(contents[ending]()), overwrite=True)
+
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        """What makes the content of a file, by ending."""
+        texts = {ending: partial(self._text, form) for ending, form in ENDINGS.items()}
+        return {**texts, ".svg": self._svg, ".png": self._png}
+
+    def _svg(self) -> str:
+        """The picture, which not every answer has."""
+        found = self._repr_svg_()
+        if found is None:
+            raise BusplanError("there is nothing to draw: this answer has no picture")
+        return found
+
+    def _png(self) -> bytes:
+        from busplan.forms.raster import png
+
+        return png(self._svg())
+
+    def _text(self, form: Form) -> str:
+        """The answer in a form."""
+        return self.to_json() if form == "json" else render(self.report(), form)
+
+    @abstractmethod
+    def report(self) -> Report:
+        """The answer in blocks, which every form but JSON and CSV is made of."""
+
+    def _headline(self) -> str:
+        """The answer in one line."""
+        return next(block_lines(self.report().blocks())).text
+
+    def __str__(self) -> str:
+        return render(self.report(), "table").removesuffix("\n")
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._headline()}>"
+
+    def _repr_html_(self) -> str:
+        from busplan.forms.html import fragment
+
+        return fragment(self.report())
+
+    def _repr_svg_(self) -> str | None:
+        from busplan.forms.picture import first_picture
+
+        return first_picture(self.report().blocks())

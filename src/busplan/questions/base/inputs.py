@@ -1,0 +1,166 @@
+"""Arguments of the Python interface: profiles, and values as lists, ranges or NumPy arrays."""
+
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any, Final, TypeVar
+
+from busplan.errors import BusplanError
+from busplan.forms.numbers import listed
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.questions.fit.network import bus_of, known_model, model_names
+from busplan.sections.base import MAX_COUNT
+from busplan.sections.profile import Profile
+
+Path = str | os.PathLike[str]
+"""A str may also be the name of a shipped profile; a path object is always a path."""
+ProfileLike = Profile | Path
+Periods = float | Iterable[float]
+"""A communication period [us], or several."""
+Models = str | Iterable[str]
+"""The name of a timing model, or several."""
+MOST_FLOAT: Final = sys.float_info.max
+
+_Item = TypeVar("_Item")
+
+
+def load_profile(profile: ProfileLike, *, changes: Mapping[str, object] | None = None) -> Profile:
+    """Read and check a profile, and change some of its values.
+
+    Parameters
+    ----------
+    profile
+        A path, the name of a shipped profile, or a `Profile`. A str that is a shipped name means the shipped profile;
+        "./paper-4ms" and path objects are always files.
+    changes
+        New values by dotted key, in the key's unit: {"bus.nodes": 3, "cycle.period_us": 500}. They are checked like a
+        file; the file is not changed.
+
+    Returns
+    -------
+    Profile
+        Frozen, with a typed attribute for every key: `profile.cycle.period_us` [us].
+
+    Raises
+    ------
+    BusplanError
+        The file does not exist, cannot be read or is not a valid profile, with the place of every problem; or the
+        profile's schema refuses a change.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> busplan.load_profile("paper-4ms").cycle.period_us
+    4000.0
+    >>> busplan.load_profile("paper-4ms", changes={"bus.nodes": 3, "cycle.nonperiodic_us": 2}).bus.nodes
+    3
+    """
+    if not isinstance(changes, Mapping | None):
+        raise BusplanError(f'changes {changes!r}: expected new values by key, as {{"bus.nodes": 3}}')
+    found = profile if isinstance(profile, Profile) else load(argument(profile)).profile
+    return override(found, {_key(key): plain(value) for key, value in (changes or {}).items()})
+
+
+def _key(key: object) -> str:
+    if not isinstance(key, str):
+        raise BusplanError(f"changes {key!r}: expected a dotted key of the profile, as bus.nodes")
+    return key
+
+
+def argument(path: Path) -> str:
+    """PROFILE argument of the command line for a path.
+
+    Raises
+    ------
+    BusplanError
+        Standard input, or not a path.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise BusplanError(f"{path!r}: expected a path, the name of a shipped profile, or a Profile")
+    if path == "-":
+        raise BusplanError("-: standard input is read by the command line alone; give a file or a shipped profile")
+    return path if isinstance(path, str) else os.path.abspath(path)  # noqa: PTH100 - pathlib would resolve links
+
+
+def plain(value: Any) -> Any:
+    """Convert a NumPy number or array to Python; return anything else unchanged."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def items(values: Iterable[_Item], *, name: str) -> list[_Item]:
+    """List of several values, converted from NumPy.
+
+    Raises
+    ------
+    BusplanError
+        A single value, or no values.
+    """
+    plain_values = plain(values)
+    if isinstance(plain_values, str) or not isinstance(plain_values, Iterable):
+        raise BusplanError(f"{name} {values!r}: expected several values, as a list")
+    found = [plain(value) for value in plain_values]
+    if not found:
+        raise BusplanError(f"{name}: no values; give at least one")
+    return found
+
+
+def one_or_several(values: Any, *, name: str) -> list[Any]:
+    """List of one value or of several, converted from NumPy.
+
+    Raises
+    ------
+    BusplanError
+        No values.
+    """
+    found = plain(values)
+    is_one = isinstance(found, str | os.PathLike) or not isinstance(found, Iterable)
+    return [found] if is_one else items(found, name=name)
+
+
+def checked_models(timing_model: Models | None, profile: Profile) -> tuple[str, ...]:
+    """Check the name of a timing model, or of several; None means all of the profile's kind of bus.
+
+    Raises
+    ------
+    BusplanError
+        An unknown or a repeated name.
+    """
+    if timing_model is None:
+        return model_names(profile)
+    found = one_or_several(timing_model, name="timing_model")
+    names = [one.name for one in bus_of(profile).timing_models]
+    if len(set(map(str, found))) != len(found) or not set(map(str, found)) <= set(names):
+        raise BusplanError(
+            f"timing_model {timing_model!r}: expected {listed([*map(repr, names)], 'or')}, or a list of them, each once"
+        )
+    return tuple(known_model(profile, one, name="timing_model") for one in found)
+
+
+def finite(value: object, *, name: str) -> float:
+    """A number that is one.
+
+    Raises
+    ------
+    BusplanError
+        NaN, infinite, a bool, or not a number.
+    """
+    found = plain(value)
+    # Comparing first: float() of a huge int would raise OverflowError.
+    if type(found) not in (int, float) or not -MOST_FLOAT <= found <= MOST_FLOAT:
+        raise BusplanError(f"{name} {found!r}: expected a finite number")
+    return float(found)
+
+
+def whole(value: object, *, name: str) -> int:
+    """A whole number above zero.
+
+    Raises
+    ------
+    BusplanError
+        Anything else, or more than the largest count in a profile.
+    """
+    found = plain(value)
+    if type(found) is not int or not 1 <= found <= MAX_COUNT:
+        raise BusplanError(f"{name} {found!r}: expected a whole number from 1 to {MAX_COUNT:,}")
+    return found

@@ -1,0 +1,437 @@
+"""From measured latencies to the execution time of a node: the inverse of equation (3)."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from math import ceil, sqrt
+from statistics import fmean, median, stdev
+from typing import Final, Literal, NamedTuple
+
+from busplan.buses.parts import Halves, Value
+from busplan.elementwise import plain
+from busplan.errors import BusplanError
+from busplan.profile.measurements import Measurement
+from busplan.questions.calibrate.execution_fit import METHODS, ExecutionForm, Method, fit_execution
+from busplan.questions.calibrate.outliers import Sample, Screening, screen
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.alike_nodes import AlikeNodes
+from busplan.sections.execution import MEASURED_UNCERTAINTY_US, LinearExecution, TableExecution
+from busplan.sections.profile import Profile
+
+Way = Literal["timing-model", "measured-halves"]
+"""Source of the two halves that are subtracted from a latency."""
+
+_PICOSECOND: Final = 1e-3
+"""A picosecond in nanoseconds: what rounding adds is no nanosecond."""
+_EXACT_DECIMALS: Final = 6
+"""A picosecond: smaller residuals are rounding of the subtraction."""
+
+
+class Residual(NamedTuple):
+    """One measurement compared with the fit."""
+
+    line: int
+    transaction: str
+    payload_bytes: int
+    latency_us: float
+    packets_us: float
+    """Both halves, (T1+T2) + (T4+T5), which are subtracted from the latency."""
+    execution_us: float
+    """T_exec of this measurement."""
+    residual_us: float
+    """T_exec minus that of the fit."""
+
+
+class Outlier(NamedTuple):
+    """One measurement far from the others, compared with them and with the fit.
+
+    Above them it is a slow execution, which belongs to `worst_extra_us`; below, the others contradict it.
+    """
+
+    line: int
+    transaction: str
+    payload_bytes: int
+    latency_us: float
+    packets_us: float
+    execution_us: float
+    residual_us: float | None
+    """T_exec minus that of the fit; None outside a table."""
+    expected_us: float
+    """T_exec that the other measurements say."""
+    off_us: float
+    """`execution_us` minus `expected_us`."""
+
+
+class PayloadFit(NamedTuple):
+    """All measurements of one payload, times in us.
+
+    Times are of those in the fit; where none is, because all were left out, of all.
+    """
+
+    payload_bytes: int
+    measurements: int
+    latency_us: float
+    """T_lant: the median."""
+    packets_us: float
+    execution_us: float
+    """T_exec: the median."""
+    deviation_us: float | None
+    """Standard deviation of T_exec over the repetitions; None for a single measurement."""
+    range_us: float
+    """Largest minus smallest T_exec of the repetitions."""
+    fitted_us: float | None
+    """T_exec of the fit; None outside a table."""
+    residual_us: float | None
+    """`execution_us` minus `fitted_us`."""
+    read_less_write_us: float | None
+    """T_exec of the reads minus that of the writes, 0 in the timing model; None without both."""
+    request_and_acknowledge_us: float | None
+    """T1 + T2, measured."""
+    model_request_and_acknowledge_us: float
+    """T1 + T2 of the timing model, (13)."""
+    unexplained_us: float | None
+    """T1 + T2, measured minus modelled."""
+    left_out: int
+    """Outliers among the measurements that are not in the fit."""
+
+
+class Calibration(NamedTuple):
+    """Answer of `calibrate`."""
+
+    profile: Profile
+    """The network that was measured."""
+    nodes: AlikeNodes
+    """Those of its nodes that were measured."""
+    timing_model: str
+    way: Way
+    method: Method
+    execution: LinearExecution | TableExecution
+    measurements: int
+    """Number of all measurements, the outliers among them."""
+    residuals: tuple[Residual, ...]
+    """Of the measurements in the fit."""
+    payloads: tuple[PayloadFit, ...]
+    rms_residual_us: float
+    largest: Residual
+    """The measurement farthest from the fit."""
+    outliers: tuple[Outlier, ...]
+    """Measurements far from the others, slow or fast."""
+    worst_extra_us: float | None
+    """What the slowest execution takes beyond the fit; None where no measurement outside the fit is slow."""
+    unchecked_bytes: tuple[int, ...]
+    """Payloads with too few measurements to tell an outlier."""
+    uncertainty_us: float | None
+    """Standard uncertainty of T_exec, the spread of the measurements about the fit; None where nothing is left over."""
+    fit_keys: dict[str, Value]
+    """Further keys of [node.execution]: what it was fitted against."""
+    at_most_us: float
+    """A shorter execution cannot be told from a latency."""
+
+
+def calibrate(
+    profile: Profile,
+    measurements: Sequence[Measurement],
+    *,
+    source: str,
+    group: str | None = None,
+    timing_model: str | None = None,
+    form: ExecutionForm | None = None,
+    grade: Literal["measured", "derived"] = "measured",
+) -> Calibration:
+    """Find the execution time of a node from measured latencies.
+
+    T_exec is the latency minus both halves: T1 + T2 as measured, and T4 + T5 as that of the smallest payload with
+    the packets' own sizes; or, where T1 + T2 was not measured, both halves of the
+    timing model.
+
+    Parameters
+    ----------
+    profile
+        The network that was measured; the transactions are those of its farthest node.
+    measurements
+        At least one; either all or none have T1 + T2.
+    source
+        Name of the measurements in messages.
+    group
+        Name of the group of nodes that was measured, of a profile with groups.
+    timing_model
+        Timing model; by default the one that decides.
+    form
+        Form of the execution time; by default the profile's own. A table has the median at each payload, a line is that
+        of Theil and Sen through these medians, which has no tuning constant and tolerates about 29 % of wrong payloads.
+        Outliers are in neither: the slow ones are what the slowest execution takes more, and the others contradict the
+        fast ones.
+    grade
+        How the execution time is known.
+
+    Returns
+    -------
+    Calibration
+        The execution time, and how well it fits the measurements.
+
+    Raises
+    ------
+    BusplanError
+        No group of that name, a latency shorter than its packets, a payload over the limit of the speed, a line through
+        one payload or with a negative part.
+
+    References
+    ----------
+    Paper, equations (3), (13) and (14); Table I. P. K. Sen, "Estimates of the regression coefficient based on
+    Kendall's tau", JASA 63 (1968). Outliers: `outliers.screen`.
+    """
+    model = timing_model or bus_of(profile).deciding_model
+    nodes = _nodes(profile, group)
+    halves = _packets(profile, nodes, measurements, model)
+    way: Way = "timing-model" if measurements[0].request_and_acknowledge_us is None else "measured-halves"
+    raw = _with_packets(measurements, measurements, halves)
+    _require_possible(profile, raw, source=source, way=way, model=model)
+    screening = screen(
+        [Sample(one.transaction, one.payload_bytes, one.latency_us, one.latency_us - us) for one, us in raw]
+    )
+    left_out = frozenset(screening.expected_us)
+    kept = [place for place in range(len(raw)) if place not in left_out]
+    if left_out:
+        # The smallest payload gives T4 + T5 to all others: that of an outlier would stay in them.
+        raw = _with_packets(measurements, [measurements[place] for place in kept], halves)
+    groups: defaultdict[int, list[float]] = defaultdict(list)
+    for one, packets_us in (raw[place] for place in kept):
+        groups[one.payload_bytes].append(one.latency_us - packets_us)
+    chosen = form or nodes.node.execution.kind
+    fit = fit_execution(groups, chosen, grade=grade, source=source)
+    compared = _compared(raw, fit)
+    residuals = tuple(_residual(compared[place]) for place in kept)
+    outliers = _outliers(compared, screening)
+    return Calibration(
+        profile=profile,
+        nodes=nodes,
+        timing_model=model,
+        way=way,
+        method=METHODS[chosen],
+        execution=fit,
+        measurements=len(measurements),
+        residuals=residuals,
+        payloads=tuple(_payload_fits(compared, halves, left_out=left_out)),
+        rms_residual_us=fmean(one.residual_us**2 for one in residuals) ** 0.5,
+        largest=max(residuals, key=lambda one: abs(one.residual_us)),
+        outliers=outliers,
+        worst_extra_us=_worst_extra_us(outliers, residuals),
+        unchecked_bytes=screening.unchecked_bytes,
+        uncertainty_us=_uncertainty_us(residuals, fit),
+        fit_keys=bus_of(profile).fit_keys(network_of(profile), model=model if way == "timing-model" else None),
+        at_most_us=max(one.shortest_us for one in halves.values()),
+    )
+
+
+_Halves = Mapping[tuple[str, int], Halves]
+
+
+def _nodes(profile: Profile, group: str | None) -> AlikeNodes:
+    """The nodes that were measured."""
+    each = {one.name: one for one in profile.alike_nodes}
+    if group is None and len(each) == 1:
+        return profile.alike_nodes[0]
+    if group in each:
+        return each[group]
+    known = f"the groups {', '.join(each)}" if profile.group else "no groups"
+    if group is None:
+        raise BusplanError(f"{profile.name} has {known}; give the group that was measured")
+    raise BusplanError(f"group {group}: {profile.name} has {known}")
+
+
+def _packets(profile: Profile, nodes: AlikeNodes, measurements: Sequence[Measurement], model: str) -> _Halves:
+    """Time of the packets for every transaction and payload that was measured."""
+    bus, network = bus_of(profile), network_of(profile)
+    return {
+        (kind, size): bus.halves(network, group=nodes.name, model=model, kind=kind, payload_bytes=size)
+        for kind, size in dict.fromkeys((one.transaction, one.payload_bytes) for one in measurements)
+    }
+
+
+def _with_packets(
+    measurements: Sequence[Measurement], trusted: Sequence[Measurement], halves: _Halves
+) -> list[tuple[Measurement, float]]:
+    """Each measurement with its latency minus T_exec [us]."""
+    second_us = _second_halves_us(measurements, trusted, halves)
+    return [(one, _packets_us(one, halves, second_us)) for one in measurements]
+
+
+def _second_halves_us(
+    measurements: Sequence[Measurement], trusted: Sequence[Measurement], halves: _Halves
+) -> dict[tuple[str, int], float]:
+    """T4 + T5 of each transaction and payload whose T1 + T2 was measured [us].
+
+    It is the T1 + T2 of the smallest payload that is trusted, where the two packets differ least, and what the sizes of
+    the packets change. Two equal halves would charge the payload of a write to its response, too.
+    """
+    found: dict[tuple[str, int], float] = {}
+    for kind in {one.transaction for one in measurements}:
+        own = [one for one in measurements if one.transaction == kind]
+        sure = [one for one in trusted if one.transaction == kind] or own
+        smallest = min(one.payload_bytes for one in sure)
+        measured_us = [one.request_and_acknowledge_us for one in sure if one.payload_bytes == smallest]
+        first_us = median(us for us in measured_us if us is not None) if None not in measured_us else 0.0
+        for size in {one.payload_bytes for one in own}:
+            second, first = halves[kind, size], halves[kind, smallest]
+            found[kind, size] = first_us + second.response_and_acknowledge_us - first.request_and_acknowledge_us
+    return found
+
+
+def _packets_us(one: Measurement, halves: _Halves, second_us: Mapping[tuple[str, int], float]) -> float:
+    """Latency minus T_exec [us]."""
+    key = (one.transaction, one.payload_bytes)
+    if one.request_and_acknowledge_us is not None:
+        return one.request_and_acknowledge_us + second_us[key]
+    return halves[key].latency_us
+
+
+def _uncertainty_us(residuals: Sequence[Residual], fit: LinearExecution | TableExecution) -> float | None:
+    """Standard deviation of the measurements about the fit [us]; None where the fit uses all of them up."""
+    parameters = len(fit.payload_bytes) if isinstance(fit, TableExecution) else 2
+    free = len(residuals) - parameters
+    if free <= 0:
+        return None
+    spread_us = sqrt(sum(one.residual_us**2 for one in residuals) / free)
+    return round(max(spread_us, float(MEASURED_UNCERTAINTY_US)), 3)
+
+
+def _require_possible(
+    profile: Profile, raw: Sequence[tuple[Measurement, float]], *, source: str, way: Way, model: str
+) -> None:
+    """Refuse measurements that are impossible on this bus, all in one error."""
+    payloads = bus_of(profile).payloads(network_of(profile))
+    limit = payloads.most_bytes
+    needed = (
+        "its T1 + T2 and T4 + T5 are" if way == "measured-halves" else f"the packets alone take in the {model} model"
+    )
+    problems = [
+        f"{source}:{one.line}: payload {one.payload_bytes} bytes is over the {limit} bytes of {payloads.carrier}"
+        for one, _ in raw
+        if one.payload_bytes > limit
+    ]
+    short = [(one, packets_us) for one, packets_us in raw if one.latency_us < packets_us]
+    problems += [
+        f"{source}:{one.line}: latency {one.latency_us:g} us at {one.payload_bytes} bytes is below the "
+        f"{packets_us:.3f} us that {needed}"
+        for one, packets_us in short
+    ]
+    if len(short) == len(raw) and way == "timing-model":
+        problems.append(f"{source}: every latency is too short: is latency_us in us?")
+    if problems:
+        raise BusplanError(*problems[:_MOST_SHOWN], *_more(source, len(problems) - _MOST_SHOWN))
+
+
+_MOST_SHOWN: Final = 50
+
+
+def _more(source: str, hidden: int) -> list[str]:
+    return [f"{source}: and {hidden} more problems"] if hidden > 0 else []
+
+
+class _Compared(NamedTuple):
+    """One measurement with its T_exec and, where the fit covers its payload, that of the fit [us]."""
+
+    measured: Measurement
+    packets_us: float
+    execution_us: float
+    fitted_us: float | None
+
+    @property
+    def residual_us(self) -> float | None:
+        """T_exec minus that of the fit."""
+        return None if self.fitted_us is None else round(self.execution_us - self.fitted_us, _EXACT_DECIMALS)
+
+
+def _compared(raw: Sequence[tuple[Measurement, float]], fit: LinearExecution | TableExecution) -> list[_Compared]:
+    sizes = {one.payload_bytes for one, _ in raw}
+    fitted_us = {size: plain(fit.execution_us(size)) for size in sizes if fit.covers(size)}
+    return [
+        _Compared(
+            one, packets_us, round(one.latency_us - packets_us, _EXACT_DECIMALS), fitted_us.get(one.payload_bytes)
+        )
+        for one, packets_us in raw
+    ]
+
+
+def _residual(one: _Compared) -> Residual:
+    """Comparison of a measurement in the fit, which covers it."""
+    measured, residual_us = one.measured, one.residual_us
+    assert residual_us is not None  # noqa: S101 - for mypy: a fit covers its own payloads
+    return Residual(
+        line=measured.line,
+        transaction=measured.transaction,
+        payload_bytes=measured.payload_bytes,
+        latency_us=measured.latency_us,
+        packets_us=one.packets_us,
+        execution_us=one.execution_us,
+        residual_us=residual_us,
+    )
+
+
+def _outliers(compared: Sequence[_Compared], screening: Screening) -> tuple[Outlier, ...]:
+    found = []
+    for place, expected_us in sorted(screening.expected_us.items()):
+        one, us = compared[place], round(expected_us, _EXACT_DECIMALS)
+        found.append(
+            Outlier(
+                line=one.measured.line,
+                transaction=one.measured.transaction,
+                payload_bytes=one.measured.payload_bytes,
+                latency_us=one.measured.latency_us,
+                packets_us=one.packets_us,
+                execution_us=one.execution_us,
+                residual_us=one.residual_us,
+                expected_us=us,
+                off_us=round(one.execution_us - us, _EXACT_DECIMALS),
+            )
+        )
+    return tuple(found)
+
+
+def _worst_extra_us(outliers: Sequence[Outlier], residuals: Sequence[Residual]) -> float | None:
+    """What the slowest of all measurements takes beyond the fit, where some are slow [us]."""
+    slow_us = [one.off_us if one.residual_us is None else one.residual_us for one in outliers if one.off_us > 0]
+    if not slow_us:
+        return None
+    worst_us = max(*slow_us, *(one.residual_us for one in residuals))
+    return ceil(1000 * worst_us - _PICOSECOND) / 1000
+
+
+def _payload_fits(
+    compared: Sequence[_Compared],
+    halves: _Halves,
+    *,
+    left_out: frozenset[int],
+) -> list[PayloadFit]:
+    groups: defaultdict[int, list[int]] = defaultdict(list)
+    for place, one in enumerate(compared):
+        groups[one.measured.payload_bytes].append(place)
+
+    def of_payload(size: int, places: Sequence[int]) -> PayloadFit:
+        group = [compared[place] for place in places if place not in left_out] or [compared[one] for one in places]
+        times_us = [one.execution_us for one in group]
+        by_kind = {
+            kind: [one.execution_us for one in group if one.measured.transaction == kind] for kind in ("read", "write")
+        }
+        halves_us = (one.measured.request_and_acknowledge_us for one in group)
+        measured_us = [us for us in halves_us if us is not None]
+        fitted_us = group[0].fitted_us
+        half_us = median(measured_us) if measured_us else None
+        model_us = median([halves[one.measured.transaction, size].request_and_acknowledge_us for one in group])
+        return PayloadFit(
+            payload_bytes=size,
+            measurements=len(places),
+            latency_us=median([one.measured.latency_us for one in group]),
+            packets_us=median([one.packets_us for one in group]),
+            execution_us=median(times_us),
+            deviation_us=stdev(times_us) if len(group) > 1 else None,
+            range_us=round(max(times_us) - min(times_us), _EXACT_DECIMALS),
+            fitted_us=fitted_us,
+            residual_us=None if fitted_us is None else round(median(times_us) - fitted_us, _EXACT_DECIMALS),
+            read_less_write_us=median(by_kind["read"]) - median(by_kind["write"]) if all(by_kind.values()) else None,
+            request_and_acknowledge_us=half_us,
+            model_request_and_acknowledge_us=model_us,
+            unexplained_us=None if half_us is None else half_us - model_us,
+            left_out=len(left_out.intersection(places)),
+        )
+
+    return [of_payload(size, groups[size]) for size in sorted(groups)]

@@ -1,0 +1,120 @@
+"""`busplan.capacity`."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from busplan.forms.blocks import Report
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import Models, Periods, ProfileLike, checked_models, load_profile, one_or_several
+from busplan.questions.capacity.verdict import Verdict, verdicts
+from busplan.questions.fit import figures as analysis
+from busplan.questions.fit.figures import Capacity, CapacityFigures
+from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.questions.capacity.sensitivity import Sensitivity
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class CapacityAnswer(Answer):
+    """Answer of `capacity`.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    periods
+        Figures of each period, one set for each timing model.
+    verdicts
+        One verdict for each period.
+    sensitivities
+        What moves the margin, one for each period; empty if it was not asked for.
+    """
+
+    profile: Profile
+    periods: tuple[tuple[CapacityFigures, ...], ...]
+    verdicts: tuple[Verdict, ...]
+    sensitivities: "tuple[Sensitivity, ...]" = ()
+
+    @property
+    def results(self) -> tuple[CapacityFigures, ...]:
+        """All sets of figures, period by period, and in each period timing model by timing model."""
+        return self._found.results
+
+    def report(self) -> Report:
+        """The answer in blocks."""
+        from busplan.questions.capacity.report import capacity_report
+
+        if not self.sensitivities:
+            return capacity_report(self._found, self.verdicts)
+        from busplan.questions.capacity.sensitivity_report import sensitivity_report
+
+        return sensitivity_report(self._found, self.verdicts, self.sensitivities)
+
+    @property
+    def _found(self) -> Capacity:
+        return Capacity(self.profile, self.periods)
+
+
+def capacity(
+    profile: ProfileLike,
+    *,
+    period_us: Periods | None = None,
+    timing_model: Models | None = None,
+    sensitivity: bool = False,
+) -> CapacityAnswer:
+    """Tell whether the cycle fits its period, by what margin, and how many axes the bus carries.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    period_us
+        Communication period T_s [us], or n of them; by default the profile's own.
+    timing_model
+        Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
+        the paper's equations as published, and "standard" for the standard's clock and packets.
+    sensitivity
+        If True, `sensitivities` say what moves the margin: by how much each small change of the network does, by the
+        timing model that decides, and what binds next.
+
+    Returns
+    -------
+    CapacityAnswer
+        Its `results` have n entries for each timing model, its `verdicts` n, its `sensitivities` n or none. Times are
+        in us, shares are 0..1.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, an invalid period, or an unknown timing model.
+
+    References
+    ----------
+    Paper, equations (1), (2), (11).
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.capacity("paper-1ms", period_us=500)
+    >>> [(one.timing_model, one.fits, one.max_axes) for one in answer.results]
+    [('paper', True, 8), ('standard', False, 4)]
+    >>> answer.verdicts[0].models_agree, answer.verdicts[0].deciding.verdict
+    (False, 'does not fit')
+    >>> (found,) = busplan.capacity("paper-1ms", sensitivity=True).sensitivities
+    >>> [(one.change, round(one.margin_change_us, 1)) for one in found.effects[:2]]
+    [('one node more', -128.1), ('one busy retry more', -28.0)]
+    >>> found.next_bottleneck.next_binding_term.name
+    'idle'
+    """
+    network = load_profile(profile)
+    found = analysis.capacity(
+        network,
+        periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
+        timing_models=checked_models(timing_model, network),
+    )
+    if not sensitivity:
+        return CapacityAnswer(*found, verdicts=verdicts(found))
+    from busplan.questions.capacity.sensitivity import sensitivities
+
+    return CapacityAnswer(*found, verdicts=verdicts(found), sensitivities=sensitivities(found))

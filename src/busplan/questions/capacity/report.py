@@ -1,0 +1,252 @@
+"""Answer of `busplan capacity`."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
+
+from busplan.buses import figure
+from busplan.buses.bus import Bus
+from busplan.buses.figure import Figure
+from busplan.forms.blocks import (
+    Block,
+    Cell,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    State,
+    Table,
+    TableColumn,
+    TableRow,
+    attribute_value,
+    count_value,
+    sentence,
+    state_of,
+)
+from busplan.forms.columns import sentence_text
+from busplan.forms.numbers import nouns, period
+from busplan.questions.capacity.sentences import uncertainty_parts, verdict_sentences
+from busplan.questions.capacity.verdict import Verdict
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.figures import COUNTS, Capacity, CapacityFigures
+from busplan.questions.fit.network import bus_of, leading_model, network_of
+from busplan.questions.words.documents import document, with_profile
+from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.questions.words.sentences import safety_record, warnings
+
+
+def capacity_report(result: Capacity, verdicts: Sequence[Verdict]) -> Report:
+    """Report of `capacity`."""
+    return Report(
+        Sentence(("Capacity of ", Code(result.profile.name))),
+        lambda: tuple(_blocks(result, verdicts)),
+        partial(capacity_document, result, verdicts),
+        lambda: with_profile(result.profile.name, capacity_records(result)),
+    )
+
+
+def _blocks(result: Capacity, verdicts: Sequence[Verdict]) -> Iterator[Block]:
+    """Verdict of each period, and the figures of all, the timing models side by side."""
+    said = [list(verdict_sentences(verdict, result.profile)) for verdict in verdicts]
+    yield from said[0] if len(said) == 1 else _of_all(said)
+    yield capacity_table(result)
+    if result.profile.group:
+        yield groups_table(result)
+
+
+def _of_all(said: Sequence[Sequence[Sentence]]) -> Iterator[Sentence]:
+    """The sentences of each period, and at the end once those that are the same for all."""
+    first, *others = ([sentence_text(one) for one in sentences] for sentences in said)
+    common = {text for text in first if all(text in other for other in others)}
+    for sentences in said:
+        yield from (one for one in sentences if sentence_text(one) not in common)
+    yield from (one for one in said[0] if sentence_text(one) in common)
+
+
+def capacity_table(result: Capacity) -> Table:
+    """Figures of all periods, the timing models side by side; what does not decide is detail.
+
+    Parameters
+    ----------
+    result
+        The capacity.
+    """
+    profile, first, bus = result.profile, result.results[0], bus_of(result.profile)
+    setup = "".join(f"; {words}" for words in (", ".join(bus.setup_words(network_of(profile))),) if words)
+    caption = sentence(
+        "{} " + nouns(first.nodes, "node") + ", {} " + nouns(first.axes, "axis") + setup,
+        count_value(first.nodes, "nodes"),
+        count_value(first.axes, "axes"),
+    )
+    owners = list(_owners(result))
+    shown = {*_DECIDES, *(term.key for one in result.results for term in one.terms if term.us)}
+    return figure_table(
+        [row for row in _rows(bus) if not (profile.group and row[0].key in COUNTS)],
+        owners,
+        caption=caption,
+        is_detail=lambda figure: figure.key not in shown,
+        state=_state,
+    )
+
+
+def _owners(result: Capacity) -> Iterator[Owner]:
+    """A column for each period and timing model, the profile's own model first."""
+    leading, deciding = leading_model(result.profile), bus_of(result.profile).deciding_model
+    for figures in result.periods:
+        several = len(result.periods) > 1
+        group = period(figures[0].period_us) if several else ""
+        for one in sorted(figures, key=lambda each: each.timing_model != leading):
+            rank = 1 if several and len(figures) > 1 and one.timing_model != deciding else 0
+            yield Owner(TableColumn(one.timing_model, group=group, rank=rank), one)
+
+
+def _state(key: Figure, one: CapacityFigures) -> State:
+    """State of a figure that, by itself, decides whether the cycle fits."""
+    match key:
+        case figure.VERDICT:
+            return "neutral" if one.verdict is None else state_of(one.verdict == FITS)
+        case figure.MARGIN_CORRECTED:
+            is_short = one.safe_required_us is not None and one.safe_required_us > one.available_us
+            return "fails" if is_short else "neutral"
+        case figure.MARGIN:
+            return "fails" if TIME in one.exceeded else "neutral"
+    return "neutral"
+
+
+def groups_table(result: Capacity) -> Table:
+    """How many nodes of each group fit each period, the other groups as they are.
+
+    Parameters
+    ----------
+    result
+        The capacity.
+    """
+    columns = [TableColumn("group", kind="words"), TableColumn("nodes"), TableColumn("axes")]
+    shown: list[tuple[int, tuple[Figure, ...]]] = []
+    for number, one in enumerate(result.results):
+        keys = _GROUP_CLOSED if one.verdict is None else _GROUP_SAFE
+        shown.append((number, keys))
+        models = f"{period(one.period_us)}, {one.timing_model}" if len(result.periods) > 1 else one.timing_model
+        columns += (
+            TableColumn(key.label, kind="words" if key.sort == "word" else "figures", group=models) for key in keys
+        )
+    rows = []
+    for place, group in enumerate(result.results[0].groups):
+        cells: list[Cell] = [Code(group.name), count_value(group.nodes, "nodes"), count_value(group.axes, "axes")]
+        for number, keys in shown:
+            cells += (attribute_value(key, result.results[number].groups[place]) for key in keys)
+        rows.append(TableRow(tuple(cells)))
+    return Table(tuple(columns), tuple(rows), Sentence(("Nodes of each group, the others as they are",)))
+
+
+_GROUP_SAFE: Final[tuple[Figure, ...]] = (figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY)
+"""Under the timing model that decides."""
+_GROUP_CLOSED: Final[tuple[Figure, ...]] = (figure.MAX_NODES, figure.LIMITED_BY)
+"""Under another timing model."""
+
+
+_DECIDES: Final = frozenset(
+    one.key
+    for one in (
+        *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
+        *(figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY),
+        *(figure.AVAILABLE, figure.REQUIRED, figure.MARGIN),
+    )
+)
+"""Figures that are no detail; beside them the terms that take time."""
+
+
+def _rows(bus: Bus) -> list[tuple[Figure, int]]:
+    """The verdict's figures, the cycle and its terms, the slice, what the kind of bus adds, and what would fit.
+
+    Terms are of level 1.
+    """
+    above = (
+        *(figure.VERDICT, figure.FITS, figure.MARGIN_CORRECTED, figure.UNCERTAINTY, figure.BIAS),
+        *(figure.SAFE_NODES, figure.SAFE_AXES, figure.SAFE_LIMITED_BY, figure.SAFE_MIN_PERIOD),
+        *(figure.AVAILABLE, figure.REQUIRED),
+    )
+    below = (
+        *(figure.MARGIN, figure.UTILISATION, figure.TIME_SLICE, figure.REQUIRED_TIME_SLICE),
+        *bus.table_figures,
+        *(figure.MIN_PERIOD, figure.MIN_SLICE_RATIO, figure.MAX_NODES, figure.MAX_AXES, figure.LIMITED_BY),
+    )
+    return [
+        *((one, 0) for one in above),
+        *((one, 1) for one in bus.term_figures),
+        *((one, 0) for one in below),
+    ]
+
+
+def capacity_records(result: Capacity) -> list[Record]:
+    """One row for each period and timing model; what each group has for itself stands in columns of its name."""
+    return [
+        {
+            **figures.by_key(),
+            **{f"group.{one.name}.{key}": getattr(one, key) for one in figures.groups for key in COUNTS},
+        }
+        for figures in result.results
+    ]
+
+
+def _results(result: Capacity) -> Iterator[Record]:
+    """As the rows, with a list of groups where the profile has some."""
+    for figures in result.results:
+        record: Record = figures.by_key()
+        yield {**record, "groups": [one.record() for one in figures.groups]} if figures.groups else record
+
+
+def capacity_document(result: Capacity, verdicts: Sequence[Verdict]) -> JsonDocument:
+    """Document of `busplan capacity --format json`."""
+    return document(
+        "capacity",
+        profile=result.profile.name,
+        results=list(_results(result)),
+        verdicts=[_verdict(verdict, result) for verdict in verdicts],
+    )
+
+
+def _verdict(verdict: Verdict, result: Capacity) -> JsonDocument:
+    change, figures, bus = verdict.change, verdict.deciding, bus_of(result.profile)
+    network = network_of(result.profile)
+    left_out = bus.cycle(network, model=bus.deciding_model).left_out()
+    unable = {model.name: bus.cannot_express(network, model=model.name) for model in bus.timing_models}
+    return {
+        "period_us": verdict.period_us,
+        "timing_model": figures.timing_model,
+        "verdict": figures.verdict,
+        "fits": figures.fits,
+        "circle_refused_by": list(figures.circle_refused_by),
+        "missed_limits": [need.key for need in verdict.missed_limits],
+        "models_agree": verdict.models_agree,
+        "verdict_after_reset": None if verdict.after_reset is None else verdict.after_reset.verdict,
+        **safety_record(figures, result.profile),
+        "available_us": figures.available_us,
+        "required_us": figures.required_us,
+        "margin_us": figures.margin_us,
+        **certainty_record(figures),
+        "uncertainty_parts": uncertainty_parts(figures),
+        "reserve": result.profile.limits.reserve,
+        "not_in_it": [one.key for one in left_out],
+        "not_applicable": {model: list(keys) for model, keys in unable.items() if keys},
+        "cheapest_change": change
+        and {
+            "changes": change.changes,
+            "nodes": change.nodes,
+            "fits": change.figures.fits,
+            "margin_us": change.figures.margin_us,
+            "verdict": change.figures.verdict,
+            "margin_corrected_us": change.figures.margin_corrected_us,
+            "uncertainty_us": change.figures.uncertainty_us,
+            "circle_is_untested": change.circle_is_untested,
+        },
+        "warnings": warnings(result.profile, nodes=figures.nodes, most=figures.safe_nodes or 0),
+        "text": " ".join(map(sentence_text, verdict_sentences(verdict, result.profile))),
+    }
+
+
+def certainty_record(figures: CapacityFigures) -> Record:
+    """Figures of how sure the verdict is, without its word."""
+    return {one.key: getattr(figures, one.key) for one in figure.CERTAINTY if one is not figure.VERDICT}

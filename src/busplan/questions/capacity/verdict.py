@@ -1,0 +1,61 @@
+"""The verdict on one period: by the timing model that decides, with what the others say and what to do."""
+
+from typing import NamedTuple
+
+from busplan.profile.toml import override
+from busplan.questions.fit.certainty import FITS
+from busplan.questions.fit.figures import Capacity, CapacityFigures, after_reset, figures
+from busplan.questions.fit.network import bus_of
+from busplan.questions.plan.advice import Change, advice
+from busplan.questions.plan.constraints import Need, missed_limits
+
+
+class Verdict(NamedTuple):
+    """What a person acts on."""
+
+    period_us: float
+    deciding: CapacityFigures
+    """Figures of the timing model that decides, whatever was asked for."""
+    others: tuple[CapacityFigures, ...]
+    """Figures of the other models that were asked for."""
+    missed_limits: tuple[Need, ...]
+    """What keys of [limits] ask for, and the slice does not give."""
+    after_reset: CapacityFigures | None
+    """Figures after a bus reset, where the cycle fits as it is set and is not shown to fit then."""
+    change: Change | None
+    """The least change after which every constraint of a plan holds; or, where all do already, one that carries another
+    node."""
+    no_change: str
+    """What stands in the way of a change; empty if there is one."""
+
+    @property
+    def models_agree(self) -> bool | None:
+        """Whether required <= available is the same under every model; None where there is no other."""
+        return all(other.fits == self.deciding.fits for other in self.others) if self.others else None
+
+    @property
+    def all_well(self) -> bool:
+        """Whether the cycle is shown to fit, on a safe bus, within [limits], and the circle can be run."""
+        one = self.deciding
+        return one.verdict == FITS and one.safe and not one.circle_refused_by and not self.missed_limits
+
+
+def verdicts(capacity: Capacity) -> tuple[Verdict, ...]:
+    """Judge each period of a capacity result, by the timing model that decides."""
+    return tuple(_judge(capacity, results) for results in capacity.periods)
+
+
+def _judge(capacity: Capacity, results: tuple[CapacityFigures, ...]) -> Verdict:
+    profile = override(capacity.profile, {"cycle.period_us": results[0].period_us})
+    model = bus_of(profile).deciding_model
+    deciding = next((one for one in results if one.timing_model == model), None) or figures(profile, model=model)
+    change, no_change = advice(profile, deciding)
+    return Verdict(
+        period_us=deciding.period_us,
+        deciding=deciding,
+        others=tuple(one for one in results if one is not deciding),
+        missed_limits=missed_limits(profile),
+        after_reset=after_reset(profile, deciding),
+        change=change,
+        no_change=no_change,
+    )

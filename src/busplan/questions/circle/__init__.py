@@ -1,0 +1,85 @@
+"""`busplan.circle_test`."""
+
+from busplan.forms.blocks import Report
+from busplan.progress import Progress
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import Periods, ProfileLike, load_profile, one_or_several
+from busplan.questions.circle.record import CircleTest
+
+
+class CircleTestAnswer(Answer, CircleTest):
+    """Answer of `circle_test`: `results` and `runs`, one for each period.
+
+    Figures of a simulation that did not run are None, as is the run of a cycle that does not fit the bus.
+    """
+
+    __slots__ = ()
+    # Traces are arrays, which have no single truth.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def report(self) -> Report:
+        """The answer in blocks."""
+        from busplan.questions.circle.report import circle_report
+
+        return circle_report(self)
+
+    def _repr_svg_(self) -> str | None:
+        from busplan.questions.circle.plot import circle_svg
+
+        return circle_svg(self) if any(self.runs) else None
+
+
+def circle_test(
+    profile: ProfileLike,
+    *,
+    period_us: Periods | None = None,
+    contributions: bool = False,
+    progress: Progress | None = None,
+) -> CircleTestAnswer:
+    """Tell whether the circle is still round: simulate both axes at the communication period.
+
+    Parameters
+    ----------
+    profile
+        The network, its servo and its circle: a `Profile`, a path or a shipped name.
+    period_us
+        Communication period T_s [us], or n of them; by default the profile's own.
+    contributions
+        If True, remove each error source in turn, and rank them.
+    progress
+        Called from time to time with the steps simulated and the steps known to be needed.
+
+    Returns
+    -------
+    CircleTestAnswer
+        Its `results` and `runs` have n entries. Errors are in mm, margins in deg and dB.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, a period that is no multiple of the step, a feed that the drive cannot reach, or a circle too
+        short for its ramps.
+
+    References
+    ----------
+    ISO 230-4 for the measures; the paper's section IV-B for the test.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.circle_test("paper-4ms")
+    >>> answer.passed, round(answer.results[0].max_contour_error_mm, 6)
+    (True, 0.018967)
+    >>> answer.runs[0].trace(every=10).contour_error_mm.shape
+    (48656,)
+    """
+    from busplan.questions.circle import roundness
+
+    found = roundness.circle_test(
+        load_profile(profile),
+        periods_us=None if period_us is None else one_or_several(period_us, name="period_us"),
+        with_contributions=contributions,
+        progress=progress,
+    )
+    return CircleTestAnswer(*found)

@@ -1,0 +1,247 @@
+"""Failures of a circle test: the bus, stability, the turn, margins and tolerances, each with its message."""
+
+from collections.abc import Iterator
+from math import inf
+from string import Formatter
+from typing import Any, Final, NamedTuple
+
+from busplan.elementwise import existing
+from busplan.questions.fit.certainty import FITS, limits_behind
+from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.machine import CONTOUR_MEASURES
+from busplan.sections.profile import Profile
+from busplan.servo.circle import FULL_TURN_DEG, CircleRun
+from busplan.servo.runnable import LONGEST_SETTLING_US
+
+MARGINS: Final = {"min_phase_margin_deg": "deg", "min_gain_margin_db": "dB"}
+"""Least margins of the loop by key, with their unit; they have defaults, so that they are always asked for."""
+STABILITY: Final = ("stability", *MARGINS)
+"""Failures of the loop itself."""
+_WITHOUT_TURN: Final = "circular_deviation_without_turn"
+_NEXT_SYNC: Final = (
+    ' (servo.update = "next_sync" puts one period inside the loop; "on_arrival" is for nodes that apply a command when '
+    "it comes)"
+)
+
+
+class Stated(NamedTuple):
+    """A number in the message of a failure."""
+
+    value: float
+    """In the unit of its key."""
+    key: str
+    """The figure of the circle test, or the tolerance."""
+    unit: str
+    """Unit to write it in."""
+    decimals: int | None
+    """None for all it has."""
+
+    def __str__(self) -> str:
+        number = self.value * 1e3 if self.unit == "um" else self.value
+        return f"{number:g} {self.unit}" if self.decimals is None else f"{number:.{self.decimals}f} {self.unit}"
+
+
+class _Saying(NamedTuple):
+    """Message template of a failure; {beyond} is the distance between {value} and {limit}."""
+
+    words: str
+    key: str = ""
+    """The figure that fails."""
+    unit: str = ""
+    decimals: int = 3
+    limit_key: str = ""
+    """Key of the limit, if it is not the name of the failure."""
+    limit_decimals: int | None = None
+    limit_unit: str = ""
+    """Unit of the limit, if it is not that of the figure."""
+
+
+_FAILURES: Final[dict[str, _Saying]] = {
+    "required_us": _Saying(
+        "the cycle does not fit the bus: {value} needed of {limit}",
+        "required_us",
+        "us",
+        limit_key="available_us",
+        limit_decimals=3,
+    ),
+    "safe_required_us": _Saying(
+        "the cycle is not shown to fit the bus: with bias, uncertainty and reserve {value} needed of {limit}",
+        "safe_required_us",
+        "us",
+        limit_key="available_us",
+        limit_decimals=3,
+    ),
+    "stability": _Saying("the position loop is unstable"),
+    "circle_not_followed": _Saying(
+        "the table did not follow the circle (not the whole turn, or an error above the radius): "
+        "it went {value} of {limit} round the centre",
+        "covered_deg",
+        "deg",
+        0,
+        limit_decimals=0,
+    ),
+    "min_phase_margin_deg": _Saying(
+        "the phase margin of {value} is {beyond} under its {limit}", "phase_margin_deg", "deg", 2
+    ),
+    "min_gain_margin_db": _Saying(
+        "the gain margin of {value} is {beyond} under its {limit}", "gain_margin_db", "dB", 2
+    ),
+    "mean_contour_error_mm": _Saying(
+        "the mean contour error of {value} is {beyond} over its {limit}", "mean_contour_error_mm", "um"
+    ),
+    "max_contour_error_mm": _Saying(
+        "the largest contour error of {value} is {beyond} over its {limit}", "max_contour_error_mm", "um"
+    ),
+    "not_settled": _Saying(
+        "the loops and their friction take more than {limit} to settle, so that the turn is not measured",
+        "",
+        "s",
+        0,
+        limit_decimals=0,
+    ),
+    _WITHOUT_TURN: _Saying(
+        "the circular deviation G is measured on a whole turn, and the path is a trapezoid: "
+        'set circle.path = "iso230-4", or take out tolerance.circular_deviation_mm = {limit}',
+        limit_unit="mm",
+    ),
+    "circular_deviation_mm": _Saying(
+        "the circular deviation G of {value} is {beyond} over its {limit}", "circular_deviation_mm", "um"
+    ),
+}
+
+
+_OF_TIME: Final = ("required_us", "safe_required_us")
+
+
+class Failure(NamedTuple):
+    """One failure of the test: a tolerance by its key, a limit of the bus, or stability."""
+
+    name: str
+    value: float | None
+    limit: float | None
+    said: str = ""
+    """Message of a broken limit of the bus; empty for other failures."""
+    is_default: bool = False
+    """Whether the limit is the default of its key: the profile does not say it."""
+    more: str = ""
+    """What the message goes on to say."""
+
+    @property
+    def is_of_bus(self) -> bool:
+        """Whether the bus is what fails, and not the circle."""
+        return bool(self.said) or self.name in _OF_TIME
+
+    def document(self) -> dict[str, Any]:
+        """Return it as in the JSON document; a value that does not exist is null, and the text says why."""
+        numbers = {"value": self.value, "limit": self.limit, "limit_is_default": self.is_default}
+        return {"name": self.name, **numbers, "text": self.text}
+
+    @property
+    def text(self) -> str:
+        """Message: what does not hold, and by how much."""
+        return "".join(map(str, self.parts()))
+
+    def parts(self) -> Iterator[str | Stated]:
+        """Words and numbers of the message."""
+        if self.said:
+            yield self.said
+            return
+        known = _WITHOUT_TURN if self.name == CONTOUR_MEASURES[-1] and self.value is None else self.name
+        saying, value, limit = _FAILURES[known], self.value or 0.0, self.limit or 0.0
+        limit_key = saying.limit_key or self.name
+        numbers = {
+            "value": Stated(value, saying.key, saying.unit, saying.decimals),
+            "limit": Stated(limit, limit_key, saying.limit_unit or saying.unit, saying.limit_decimals),
+            "beyond": Stated(abs(value - limit), limit_key, saying.unit, saying.decimals),
+        }
+        for words, field, _, _ in Formatter().parse(saying.words):
+            yield words
+            if field is not None:
+                yield numbers[field]
+            if field == "limit" and self.is_default:
+                yield " (default)"
+        yield self.more
+
+
+def tightest_margins(run: CircleRun) -> tuple[float | None, float | None, float | None]:
+    """Smallest phase margin [deg] and gain margin [dB] of both axes, and the crossover of the former [Hz].
+
+    The two margins may come from different axes. If either loop is unstable, all are None.
+    """
+    axes = (run.margins_x, run.margins_y)
+    if not all(one.stable for one in axes):
+        return None, None, None
+    gains = [one.gain_margin_db for one in axes if one.gain_margin_db is not None]
+    phase = min(axes, key=lambda one: inf if one.phase_margin_deg is None else one.phase_margin_deg)
+    return phase.phase_margin_deg, min(gains, default=None), phase.crossover_hz
+
+
+def bus_failures(profile: Profile, capacity: CapacityFigures) -> tuple[Failure, ...]:
+    """Tell which limits of the bus a cycle breaks, or that it is not shown to fit.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    capacity
+        Its figures under the timing model that decides.
+    """
+    network = network_of(profile)
+    behind = limits_behind(capacity)
+    broken = [one for one in bus_of(profile).limits if one.key in behind]
+    late: tuple[Failure, ...] = ()
+    if TIME in capacity.exceeded:
+        late = (Failure("required_us", capacity.required_us, capacity.available_us),)
+    elif not broken and capacity.verdict != FITS:
+        late = (Failure("safe_required_us", capacity.safe_required_us, capacity.available_us),)
+    return (
+        *(
+            Failure(
+                one.failure or one.key, existing(one.value(network)), existing(one.most(network)), one.words(network)
+            )
+            for one in broken
+        ),
+        *late,
+    )
+
+
+def circle_failures(profile: Profile, run: CircleRun, *, settled: bool) -> tuple[Failure, ...]:
+    """List the failures of a simulated circle: stability first, then settling, the turn, the margins and the contour.
+
+    Parameters
+    ----------
+    profile
+        The network and its tolerances.
+    run
+        The simulation.
+    settled
+        Whether the loops had settled when the measured turn began.
+    """
+    tolerance = profile.tolerance
+    late = _NEXT_SYNC if profile.servo.loop == "host" and profile.servo.update == "next_sync" else ""
+    if not (run.margins_x.stable and run.margins_y.stable):
+        return (Failure("stability", None, None, more=late),)
+    low = [
+        Failure(name, value, limit, is_default=name not in tolerance.model_fields_set)
+        for name, value in zip(MARGINS, tightest_margins(run), strict=False)
+        if value is not None and value < (limit := getattr(tolerance, name))
+    ]
+    if low:
+        low[-1] = low[-1]._replace(more=late)
+    return (
+        *(() if settled else (Failure("not_settled", None, LONGEST_SETTLING_US / 1e6),)),
+        # Radial errors do not show this: a table that stands still on the circle has none. Nothing is known of a turn
+        # before the loops have settled.
+        *(() if run.follows or not settled else (Failure("circle_not_followed", run.covered_deg, FULL_TURN_DEG),)),
+        *low,
+        *(_contour_failures(profile, run) if settled else ()),
+    )
+
+
+def _contour_failures(profile: Profile, run: CircleRun) -> Iterator[Failure]:
+    for name in CONTOUR_MEASURES:
+        limit, value = getattr(profile.tolerance, name), getattr(run.contour, name)
+        if limit is not None and (value is None or value > limit):
+            yield Failure(name, value, limit)

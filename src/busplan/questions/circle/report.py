@@ -1,0 +1,208 @@
+"""Answer of `busplan circle-test`."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
+
+from busplan.forms.blocks import (
+    Bar,
+    Block,
+    Chart,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    ShownValue,
+    Table,
+    TableColumn,
+    TableRow,
+    attribute_value,
+    joined,
+    sentence,
+)
+from busplan.forms.numbers import period
+from busplan.questions.circle.contour_profile import ContourProfile, drawn_profile
+from busplan.questions.circle.drawing import CircleDrawing
+from busplan.questions.circle.figures import CIRCLE_BY_KEY, JITTER
+from busplan.questions.circle.record import CircleFigures, CircleTest
+from busplan.questions.circle.sentences import (
+    circle_sentences,
+    failure_words,
+    servo_sentence,
+    setup_values,
+    source_words,
+)
+from busplan.questions.words.documents import document, with_profile
+from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.sections.profile import Profile
+
+_SHOWN: Final = (
+    *("mean_contour_error_mm", "max_contour_error_mm", "radial_deviation_min_mm", "radial_deviation_max_mm"),
+    *("circular_deviation_mm", "radius_deviation_mm", "phase_margin_deg", "gain_margin_db", "crossover_hz"),
+    *("path", "radius_mm", "feed_mm_per_min", "period_us", "step_us", "duration_s", "setpoints", "loop"),
+    *("update", "delay_us", "jitter_us"),
+    *("stable", "passed"),
+)
+"""Figures of the table, in order."""
+_OF_HOST: Final = ("update", "delay_us")
+"""Rows of the table for loops on the host."""
+ACT_TOGETHER: Final = Sentence(
+    ("Sources act together: what they take one by one need not add up. A negative one hides another.",)
+)
+NO_SOURCES: Final = Sentence(("The profile has no error source that could be removed.",))
+
+
+def circle_report(test: CircleTest) -> Report:
+    """Report of `circle-test`."""
+    return Report(
+        Sentence(("Circle test of ", Code(test.profile.name))),
+        lambda: tuple(_blocks(test)),
+        partial(circle_document, test),
+        lambda: with_profile(test.profile.name, circle_records(test)),
+    )
+
+
+def _blocks(test: CircleTest) -> Iterator[Block]:
+    """Verdict of each period, the periods side by side, and the error sources of each circle."""
+    for result in test.results:
+        yield from circle_sentences(test.profile, result)
+    simulated = (result for result in test.results if result.stable is not None)
+    yield from servo_sentence(test.profile, next(simulated, test.results[0]))
+    yield circle_table(test.results)
+    if test.with_contributions:
+        ranked = [result for result in test.results if result.contributions is not None]
+        yield from (contributions_table(one) for one in ranked if one.contributions)
+        if ranked:
+            yield ACT_TOGETHER if any(one.contributions for one in ranked) else NO_SOURCES
+    for result, run in zip(test.results, test.runs, strict=True):
+        # A cycle that does not fit has no circle; the verdict says why.
+        if result.stable is not None:
+            yield circle_drawing(drawn_profile(run), result, test.profile)
+
+
+def circle_drawing(contour: ContourProfile | None, result: CircleFigures, profile: Profile) -> Chart | Sentence:
+    """The circle with its error magnified, or the reason why it is not drawn.
+
+    Parameters
+    ----------
+    contour
+        Contour error around the circle; None if there is no circle.
+    result
+        The circle test at one period.
+    profile
+        The network and its tolerances.
+    """
+    if contour is None:
+        return Sentence(("Not drawn: ", *failure_words(result).parts, "."))
+    chart = circle_chart(contour, result, profile)
+    return chart or sentence("At {} and {} there is no contour error to draw.", *setup_values(result))
+
+
+def circle_table(results: Sequence[CircleFigures]) -> Table:
+    """Figures of the circle test, the periods side by side."""
+    owners = [Owner(TableColumn(period(result.period_us)), result) for result in results]
+    of_host = () if any(result.loop == "host" for result in results) else _OF_HOST
+    hidden = of_host if any(result.jitter_us for result in results) else (*of_host, JITTER.key)
+    rows = ((CIRCLE_BY_KEY[key], 0) for key in _SHOWN if key not in hidden)
+    return figure_table(rows, owners, caption=Sentence(("Figures of the circle test",)))
+
+
+def contributions_table(result: CircleFigures) -> Table:
+    """The error sources, ranked, each with a bar on a common scale.
+
+    Parameters
+    ----------
+    result
+        The circle test at one period, with contributions.
+    """
+    ranked = result.contributions or ()
+    removed = [one.removed_mm for one in ranked]
+    least, most = min((0.0, *removed)), max((0.0, *removed))
+    rows = []
+    for one in ranked:
+        takes = ShownValue(one.removed_mm, "removed_mm", "um", 3, signed=True)
+        left = (attribute_value(CIRCLE_BY_KEY[key], one) for key in ("max_contour_error_mm", "circular_deviation_mm"))
+        rows.append(TableRow((source_words(one.source), Bar(takes, least, most) if most > least else "", takes, *left)))
+    columns = (
+        TableColumn("source", kind="words"),
+        TableColumn("", kind="drawing"),
+        TableColumn("takes", "um"),
+        TableColumn("max", "um", group="without it"),
+        TableColumn("G", "um", group="without it"),
+    )
+    caption = sentence(
+        "Each error source removed in turn at {} and {}; what it takes from the largest contour error",
+        *setup_values(result),
+    )
+    return Table(columns, tuple(rows), caption)
+
+
+def circle_chart(contour: ContourProfile, result: CircleFigures, profile: Profile) -> Chart | None:
+    """The circle with its error magnified; None if there is no error to show.
+
+    Parameters
+    ----------
+    contour
+        Contour error around the circle.
+    result
+        The circle test at one period.
+    profile
+        The network and its tolerances.
+    """
+    tolerance_mm = profile.tolerance.max_contour_error_mm
+    drawing = CircleDrawing(contour, tolerance_mm=tolerance_mm, direction=profile.circle.direction)
+    scale = drawing.scale
+    if scale is None:
+        return None
+    part = "at constant speed" if result.path == "trapezoid" else "on the turn"
+    setup = setup_values(result)
+    caption = sentence(f"Contour error {part}, at {{}} and {{}}", *setup)
+    if result.max_contour_error_mm is not None:
+        largest = attribute_value(CIRCLE_BY_KEY["max_contour_error_mm"], result)
+        caption = sentence(f"The contour error {part} is {{}} or less, at {{}} and {{}}", largest, *setup)
+    tolerance = ShownValue(tolerance_mm, "max_contour_error_mm", "um")
+    limit = (
+        sentence("the profile has no tolerance of the largest contour error.")
+        if tolerance_mm is None
+        else sentence("the tolerance of {} lies outside the drawing.", tolerance)
+        if scale.tolerance_mm is None
+        else sentence("the tolerance of {} dashed.", tolerance)
+    )
+    magnified = sentence(
+        "Magnified {} times; {} from ring to ring, the nominal circle drawn strong; the dot is the start of "
+        "the turn, the arrow its direction; ",
+        ShownValue(scale.times(result.radius_mm), decimals=0),
+        ShownValue(scale.ring_um * scale.unit.per_um, unit=scale.unit.name),
+    )
+    return Chart(drawing, caption, joined(magnified, limit, by=""))
+
+
+def circle_records(test: CircleTest) -> list[Record]:
+    """One flat row for each period: the centre in two columns, failures by name, a column for each error source."""
+    sources = sorted({one.source for result in test.results for one in result.contributions or ()})
+    records = []
+    for result in test.results:
+        record = result._asdict()
+        offset = record.pop("centre_offset_mm") or (None, None)
+        record |= {"centre_offset_x_mm": offset[0], "centre_offset_y_mm": offset[1]}
+        record["failures"] = [failure.name for failure in result.failures]
+        removed = {one.source: one.removed_mm for one in record.pop("contributions") or ()}
+        if test.with_contributions:
+            record |= {f"removed_{source}_mm": removed.get(source) for source in sources}
+        records.append(record)
+    return records
+
+
+def circle_document(test: CircleTest) -> JsonDocument:
+    """Document of `busplan circle-test --format json`."""
+    results = []
+    for result in test.results:
+        record = result._asdict()
+        record["failures"] = [failure.document() for failure in result.failures]
+        record["centre_offset_mm"] = result.centre_offset_mm and list(result.centre_offset_mm)
+        ranked = record.pop("contributions")
+        if test.with_contributions:
+            record["contributions"] = None if ranked is None else [one._asdict() for one in ranked]
+        results.append(record)
+    return document("circle-test", profile=test.profile.name, results=results)

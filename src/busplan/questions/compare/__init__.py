@@ -1,0 +1,93 @@
+"""`busplan.compare`."""
+
+from collections.abc import Iterable
+
+from busplan.forms.blocks import Report
+from busplan.forms.columns import sentence_text
+from busplan.progress import Progress
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
+from busplan.questions.compare import kinds as analysis
+from busplan.questions.compare.kinds import KindComparison, MachineOnKind, NotOnKind
+
+
+class CompareAnswer(Answer, KindComparison):
+    """Answer of `compare`: a machine on several kinds of bus, whose most axes a notebook draws.
+
+    Each of its `kinds` has `figures` at the profile's period, its `smallest` period and its most `safe` axes, or the
+    reason why it has none.
+    """
+
+    __slots__ = ()
+
+    def on(self, kind: str) -> MachineOnKind | NotOnKind:
+        """The machine on one kind of bus.
+
+        Raises
+        ------
+        KeyError
+            The kind was not asked for.
+        """
+        return {one.kind if isinstance(one, NotOnKind) else one.figures.kind: one for one in self.kinds}[kind]
+
+    def _svg(self) -> str:
+        from busplan.questions.compare.report import headline, require_drawn
+        from busplan.questions.compare.svg import compare_svg
+
+        require_drawn(self)
+        return compare_svg(self, title=sentence_text(headline(self)))
+
+    def _repr_svg_(self) -> str | None:
+        return self._svg() if self.compared else None
+
+    def report(self) -> Report:
+        """The answer in blocks."""
+        from busplan.questions.compare.report import compare_report
+
+        return compare_report(self)
+
+
+def compare(
+    profile: ProfileLike,
+    *,
+    buses: str | Iterable[str] | None = None,
+    circle: bool = False,
+    progress: Progress | None = None,
+) -> CompareAnswer:
+    """Put the machine of a profile on each kind of bus: `busplan compare`.
+
+    Parameters
+    ----------
+    profile
+        The profile: a `Profile`, a path or a shipped name. On its own kind it stays as it is.
+    buses
+        Name of a kind of bus, or several; by default all, the profile's own first.
+    circle
+        Also run the circle test of each kind at its smallest period.
+    progress
+        Called from time to time with the steps simulated and the steps known to be needed.
+
+    Returns
+    -------
+    CompareAnswer
+        Periods are in us. In a notebook it is a picture.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, or an unknown kind of bus.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.compare("paper-4ms", buses=["ieee1394", "can"])
+    >>> [(one.figures.verdict, one.safe.axes, round(one.smallest.us)) for one in answer.kinds]
+    [('fits', 52, 552), ('fits', 16, 2126)]
+    >>> [one.key for one in answer.on("can").assumed if one.source == "new profile"]
+    ['bus.bit_rate_kbit_s', 'bus.pipeline_cycles']
+    """
+    network = load_profile(profile)
+    kinds = None
+    if buses is not None:
+        kinds = analysis.checked_kinds([str(one) for one in one_or_several(buses, name="buses")], option="buses")
+    return CompareAnswer(*analysis.compare(network, kinds=kinds, with_circle=circle, progress=progress))

@@ -1,0 +1,105 @@
+"""What a verdict rests on and nobody has measured: the assumed keys that carry much of the cycle or of its doubt."""
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+from busplan.buses.network import Group, Network
+from busplan.buses.rule import RuleFigures
+from busplan.elementwise import plain
+from busplan.questions.fit.inputs import given
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.base import value_at
+from busplan.sections.profile import Profile
+from busplan.sourced import Sourced
+
+_MUCH: Final = Sourced(
+    0.25,
+    unit="1",
+    grade="assumed",
+    source="chosen",
+    meaning="share of U squared, or of the required time, from which on a verdict rests on a key",
+)
+_EXECUTION: Final = "execution"
+_Share = tuple[tuple[str, ...], float, str]
+"""Keys, what they carry [1], and of what."""
+
+
+class HeavyAssumption(NamedTuple):
+    """An assumed key, or the assumed execution times together, which carry much of a cycle."""
+
+    keys: tuple[str, ...]
+    """Dotted keys: one, or the section of the execution time of each group, which are taken to err together."""
+    carries: str
+    """Its shares, in words that begin with the verb."""
+
+    @property
+    def is_execution(self) -> bool:
+        """Whether it is the execution times."""
+        return self.keys[0].endswith(f".{_EXECUTION}")
+
+    def covers(self, key: str) -> bool:
+        """Whether a key is one of these, or stands in one of these sections."""
+        return any(key == one or key.startswith(f"{one}.") for one in self.keys)
+
+
+def heavy_assumptions(figures: RuleFigures, profile: Profile) -> tuple[HeavyAssumption, ...]:
+    """The assumptions that carry more than a quarter of U squared or of the required time.
+
+    Parameters
+    ----------
+    figures
+        Figures under the timing model that decides.
+    profile
+        The network.
+    """
+    variance = sum(float(one.us) ** 2 for one in figures.doubts)
+    shares: list[_Share] = [
+        ((one.key,), float(one.us) ** 2 / variance, "U squared") for one in figures.doubts if variance
+    ]
+    shares += [((one.rests_on,), plain(one.us) / figures.required_us, "the required time") for one in figures.terms]
+    # What is no key has no grade, and execution times are no term or doubt of one key.
+    shares = [one for one in shares if one[1] > _MUCH and _is_assumed(profile, one[0][0])]
+    shares += _of_execution(figures, profile, variance)
+    said: dict[tuple[str, ...], list[str]] = {}
+    for keys, share, whole in shares:
+        if share > _MUCH:
+            said.setdefault(keys, []).append(f"{share:.0%} of {whole}")
+    verbs = {keys: "carries" if len(keys) == 1 else "together carry" for keys in said}
+    return tuple(HeavyAssumption(keys, f"{verbs[keys]} {' and '.join(carried)}") for keys, carried in said.items())
+
+
+def _is_assumed(profile: Profile, key: str) -> bool:
+    return isinstance(value_at(profile, key), int | float) and given(profile, key).grade == "assumed"
+
+
+def _of_execution(figures: RuleFigures, profile: Profile, variance: float) -> list[_Share]:
+    """The shares of the assumed execution times: what of its terms goes without them, and their part of U squared."""
+    network, bus = network_of(profile)._replace(period_us=figures.period_us), bus_of(profile)
+    assumed = [one for one in network.groups if _counts(one, network)]
+    if not assumed:
+        return []
+    without = network._replace(groups=tuple(_at_once(one) if one in assumed else one for one in network.groups))
+    cycle, keys = bus.cycle(without, model=figures.timing_model), tuple(one.key(_EXECUTION) for one in assumed)
+    whole_us, rest_us = (_doubt_us(each) for each in (figures.doubts, cycle.doubts()))
+    rest = {one.key: plain(one.us) for one in cycle.terms}
+    # A term that grows, as the wait for a gap does, is none of theirs.
+    carried_us = sum(max(0.0, plain(one.us) - rest[one.key]) for one in figures.terms)
+    of_time = (keys, carried_us / figures.required_us, "the required time")
+    return [(keys, whole_us * (whole_us - rest_us) / variance, "U squared"), of_time] if variance else [of_time]
+
+
+def _counts(group: Group, network: Network) -> bool:
+    is_assumed = group.node.execution.grade == "assumed"
+    return is_assumed and bus_of(network.profile).has_execution(network._replace(groups=(group,)))
+
+
+def _at_once(group: Group) -> Group:
+    """The same nodes, known to execute in no time."""
+    return group._replace(
+        read_execution_us=0.0, write_execution_us=0.0, read_uncertainty_us=0.0, write_uncertainty_us=0.0
+    )
+
+
+def _doubt_us(doubts: Sequence[Any]) -> float:
+    """The standard uncertainty that all execution times give a cycle [us]."""
+    return sum(float(one.us) for one in doubts if one.key.endswith(f".{_EXECUTION}"))

@@ -1,0 +1,236 @@
+"""Why the circle that a profile asks for cannot be run: the one place that says so, and nothing is simulated.
+
+Every command that gives a verdict asks here, so that all say the same of a profile, at the key that causes it.
+"""
+
+from collections.abc import Iterator, Sequence
+from math import inf
+from typing import Any, Final, Literal
+
+from busplan.questions.fit.cycle import available_us, cycle_of, fits_in
+from busplan.questions.fit.loop_delays import jitter_us, loop_delays_us, skew_us
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.base import Section, value_at
+from busplan.sections.profile import Profile
+from busplan.servo.checks import LARGEST, ParameterError, Refused, no_multiple, parameters
+from busplan.servo.parameters import LONGEST_DELAY_PERIODS, Axis, Delivery, LoopTiming
+from busplan.servo.runnable import (
+    LONGEST_SETTLING_US,
+    Move,
+    move_along,
+    out_of_reach,
+    unfit_delivery,
+    unfit_move,
+    unfit_steps,
+)
+
+AxisName = Literal["x", "y"]
+AXIS_NAMES: Final[tuple[AxisName, ...]] = ("x", "y")
+STEP: Final = "servo.step_us"
+
+
+def refusals(profile: Profile) -> tuple[Refused, ...]:
+    """Why the circle of a profile cannot be run, each cause by its dotted key; empty if it can.
+
+    Parameters
+    ----------
+    profile
+        The network, whatever it asks for.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> from busplan.profile.toml import override
+    >>> [one.name for one in refusals(override(load("paper-1ms").profile, {"servo.step_us": 300.0}))]
+    ['servo.step_us']
+    """
+    causes = loop_refusals(profile)
+    of_run = run_refusals(profile, causes)
+    return causes + of_run if of_run and _fits(profile) else causes
+
+
+def circle_refusals(profile: Profile) -> tuple[Refused, ...]:
+    """As `refusals`, of a profile that asks for a circle; empty for one that asks for none."""
+    return refusals(profile) if profile.asks_for_circle else ()
+
+
+def require_circle(profile: Profile) -> None:
+    """Refuse a circle that cannot be run.
+
+    Parameters
+    ----------
+    profile
+        The network, whatever it asks for.
+
+    Raises
+    ------
+    ParameterError
+        Its `refusals`.
+    """
+    found = refusals(profile)
+    if found:
+        raise ParameterError(*found)
+
+
+def loop_refusals(profile: Profile) -> tuple[Refused, ...]:
+    """Why the loops of a profile cannot be simulated, whether or not its cycle fits the bus."""
+    return (*step_refusals(profile, profile.cycle.period_us), *_loop_over_the_bus(profile))
+
+
+def run_refusals(profile: Profile, of_loop: tuple[Refused, ...]) -> tuple[Refused, ...]:
+    """Why the drives, the delivery or the move of a profile cannot be simulated.
+
+    A cycle that does not fit its bus has no circle, so that none of these is asked of it.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    of_loop
+        Its `loop_refusals`: without steps nobody can say how long a move is.
+    """
+    causes: list[Refused] = []
+    axes: list[Axis] = []
+    for name in AXIS_NAMES:
+        try:
+            axes.append(axis_of(profile, name))
+            found = [*out_of_reach(axes[-1], name=name, feed_mm_per_min=profile.circle.feed_mm_per_min)]
+        except ParameterError as error:
+            found = [*error.refused]
+        causes += (_at_key(cause, profile, name) for cause in found)
+    causes += _out_of_order(profile)
+    if not (causes or of_loop):
+        causes += _move(profile, axes)
+    # Both axes may refuse one key.
+    return tuple({cause.name: cause for cause in reversed(causes)}.values())[::-1]
+
+
+def _fits(profile: Profile) -> bool:
+    """Whether the cycle of a profile fits its bus."""
+    required_us = cycle_of(profile, model=bus_of(profile).deciding_model).required_us
+    network = network_of(profile)
+    return bool(fits_in(required_us, available_us=available_us(network))) and not bus_of(profile).broken(network)
+
+
+def step_refusals(profile: Profile, period_us: float) -> Iterator[Refused]:
+    """Refuse the step of a profile at a period that is no multiple of it.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    period_us
+        Communication period [us].
+    """
+    default = "" if "step_us" in profile.servo.model_fields_set else f"; it is the default of {STEP}"
+    for one in no_multiple(period_us=period_us, step_us=profile.servo.step_us):
+        yield one._replace(name=STEP, right=f"{one.right}{default}", beside=("cycle.period_us",))
+
+
+def _loop_over_the_bus(profile: Profile) -> Iterator[Refused]:
+    """Refuse a loop on the host with more of the bus in it than its controller is made for."""
+    period_us, delay_us = profile.cycle.period_us, max(loop_delays_us(profile))
+    most_us = LONGEST_DELAY_PERIODS * period_us
+    if delay_us > most_us:
+        known = f"the circle test knows {LONGEST_DELAY_PERIODS} periods"
+        why = f"the bus puts {delay_us:g} us into a loop over it, and {known}"
+        key = bus_of(profile).loop_key
+        less = f"less {key}, now {value_at(profile, key)}, or " if key and value_at(profile, key) else ""
+        right = f'{why}, {most_us:g} us, at most; {less}close the loop on the node, servo.loop = "node"'
+        yield Refused("servo.loop", '"host"', right)
+
+
+def _out_of_order(profile: Profile) -> Iterator[Refused]:
+    """Refuse set-points that would change their order: by what the bus adds, where only that does it."""
+    period_us = profile.cycle.period_us
+    own = Delivery(**parameters_in(profile.delivery, Delivery))
+    if any(unfit_delivery(own, period_us=period_us)):
+        yield from (_at_key(cause, profile) for cause in unfit_delivery(own, period_us=period_us))
+    elif any(unfit_delivery(delivery_of(profile), period_us=period_us)):
+        known = f"which the circle test knows up to half the period, {period_us / 2:g} us, with jitter and skew"
+        if apart_us := skew_us(profile):
+            right = f"the last axis then takes its set-points {apart_us:g} us behind the first, {known}"
+            yield Refused(bus_of(profile).clock_key, "false", f"{right}; set it true if the drives have a clock")
+        else:
+            added_us = jitter_us(profile) - own.jitter_us
+            right = f"the bus adds {added_us:g} us of jitter either way, {known}; a longer period has room"
+            yield Refused("cycle.period_us", period_us, right)
+
+
+def _move(profile: Profile, axes: Sequence[Axis]) -> list[Refused]:
+    """Refuse a move that is too short for its feed or too long for memory; a lead-in makes it longer."""
+    is_turn = profile.circle.path != "trapezoid"
+    least = [*_unfit(profile, axes, 0.0 if is_turn else None)]
+    if least or not is_turn or not any(_unfit(profile, axes, LONGEST_SETTLING_US)):
+        return least
+    from busplan.questions.fit.circle_move import path_settling_us  # only what the lead-in decides loads numpy
+
+    return [*_unfit(profile, axes, path_settling_us(profile))]
+
+
+def _unfit(profile: Profile, axes: Sequence[Axis], settling_us: float | None) -> Iterator[Refused]:
+    """What is wrong with the move of a lead-in."""
+    move, radius_mm = move_of(profile, settling_us), profile.circle.radius_mm
+    timing = LoopTiming(period_us=profile.cycle.period_us, step_us=profile.servo.step_us)
+    yield from (_at_key(cause, profile) for cause in unfit_move(move, radius_mm=radius_mm))
+    for name, axis in zip(AXIS_NAMES, axes, strict=True):
+        causes = unfit_steps(move.setpoints, reach_mm=radius_mm, axis=axis, timing=timing)
+        yield from (_at_key(cause, profile, name) for cause in causes)
+
+
+def _at_key(cause: Refused, profile: Profile, axis: AxisName | None = None) -> Refused:
+    """A cause by the dotted keys of its parameters: those of one axis, where the axis has its own."""
+
+    def key(parameter: str) -> str:
+        if axis is not None and parameter in getattr(profile.servo, axis).model_fields_set:
+            return f"servo.{axis}.{parameter}"
+        sections = ("servo", "circle", "delivery", "cycle")
+        return next(f"{name}.{parameter}" for name in sections if hasattr(getattr(profile, name), parameter))
+
+    return cause._replace(name=key(cause.name), beside=tuple(map(key, cause.beside)))
+
+
+# --- parts of the simulation that need no numpy -----------------------------------------------------------------
+
+
+def axis_of(profile: Profile, name: AxisName) -> Axis:
+    """One axis of a profile, without the delay of the bus.
+
+    Raises
+    ------
+    ParameterError
+        Its encoder is too fine.
+    """
+    return Axis(**profile.servo.axis_keys(name))
+
+
+def delivery_of(profile: Profile) -> Delivery:
+    """How set-points arrive, with the skew and the jitter that the bus adds."""
+    own = profile.delivery
+    late = {"skew_us": own.skew_us + skew_us(profile), "jitter_us": jitter_us(profile)}
+    return Delivery(**parameters_in(own, Delivery) | {key: max(-LARGEST, min(us, LARGEST)) for key, us in late.items()})
+
+
+def move_of(profile: Profile, settling_us: float | None) -> Move:
+    """The move of a profile's circle.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    settling_us
+        Time of its lead-in: None on a trapezoid; infinite if the loops do not settle, and none is waited for [us].
+    """
+    circle = profile.circle
+    return move_along(
+        circle.radius_mm,
+        feed_mm_per_min=circle.feed_mm_per_min,
+        period_us=profile.cycle.period_us,
+        ramp_periods=circle.ramp_periods,
+        settling_us=0.0 if settling_us == inf else settling_us,
+    )
+
+
+def parameters_in(section: Section, of: type) -> dict[str, Any]:
+    """The parameters of the servo core in a section, to which a kind of bus may have added keys."""
+    return section.model_dump(include={one.name for one in parameters(of)})

@@ -1,0 +1,144 @@
+"""Keys of a profile as inputs of a derivation, each with its grade and source."""
+
+from types import MappingProxyType
+from typing import Any, Final
+
+from busplan.elementwise import GivenTable, Traced
+from busplan.profile.graded import comment_grade
+from busplan.profile.kinds import cycle_keys, models_of
+from busplan.questions.fit.network import bus_of
+from busplan.sections.base import value_at, with_unchecked
+from busplan.sections.execution import TableExecution
+from busplan.sections.profile import Profile
+from busplan.sourced import SYMBOLS, Input
+
+_SYMBOLS: Final = MappingProxyType(
+    {
+        "payload.read_bytes": "P_read",
+        "payload.write_bytes": "P_write",
+        "node.axes": "axes_node",
+        "node.execution.base_us": "base",
+        "node.execution.per_byte_us": "per_byte",
+        "circle.feed_mm_per_min": "F",
+        "circle.radius_mm": "r",
+        "circle.ramp_periods": "ramp",
+        "servo.step_us": "h",
+        "servo.position_gain_per_s": "kp",
+        "servo.integral_gain_per_s2": "ki",
+        "servo.derivative_gain": "kd",
+        "servo.velocity_feedforward": "k_vff",
+        "servo.acceleration_feedforward_s": "k_aff",
+        "servo.drive_lag_us": "tau",
+    }
+)
+"""Symbol of a key in formulas, unless the equations or a kind of bus define it."""
+_TABLE: Final = "execution.time_us"
+
+
+def given(profile: Profile, key: str) -> Input:
+    """Make an input from a key of a profile.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    key
+        Dotted key, as "cycle.period_us".
+
+    Returns
+    -------
+    Input
+        Its grade is the one beside it, as bus.master_grade of bus.master_us; that of its section, if the section has
+        one, but a default of [servo] is assumed; that of a sourced figure, if the value is that figure; that of
+        its comment in the file; otherwise "given".
+    """
+    *sections, name = key.split(".")
+    section: Any = profile
+    is_set, own_grade, graded_by = True, None, ""
+    for number, part in enumerate(sections, start=1):
+        is_set = is_set and (isinstance(section, tuple) or part in section.model_fields_set)
+        section = value_at(profile, ".".join(sections[:number]))
+        if getattr(section, "grade", None):
+            own_grade, graded_by = section.grade, f"; graded by {'.'.join(sections[:number])}.grade"
+            grades = getattr(section, "grades", None)
+            if grades is not None and name not in type(grades).model_fields:
+                own_grade, graded_by = None, ""  # a choice
+            elif grades is not None and getattr(grades, name) is not None:
+                own_grade, graded_by = getattr(grades, name), f"; graded by {'.'.join(sections[:number])}.grades.{name}"
+            elif grades is not None and number == len(sections) and name not in section.model_fields_set:
+                own_grade, graded_by = "assumed", ""  # a default is busplan's, whatever is known of the others
+    beside = f"{name.removesuffix('_us')}_grade"
+    if getattr(section, beside, None):
+        own_grade, graded_by = getattr(section, beside), f"; graded by {'.'.join(sections)}.{beside}"
+    is_set = is_set and name in section.model_fields_set
+    description, _, unit = (type(section).model_fields[name].description or "").rstrip("]").partition(" [")
+    value = getattr(section, name)
+    bus = bus_of(profile)
+    # What is off by default is nobody's measurement, and a word that chooses is none.
+    is_no_measurement = (not is_set and not value) or _chooses(profile, key)
+    grade = "given" if own_grade is None or is_no_measurement else own_grade
+    source = f"{f'profile {profile.name}' if is_set else 'default'}{graded_by}"
+    alike_key, group = _of_one_table(profile, key)
+    default = bus.key_sources.get(alike_key)
+    if default is not None and value == default:
+        grade, source = default.grade, f"{source}, as {default.source}"
+    by_comment = comment_grade(profile, key) if is_set and grade == "given" else None
+    if by_comment is not None:
+        grade, source = by_comment, f"{source}; graded by its comment"
+    else:
+        grade = bus.key_grades.get(alike_key, grade)
+    # A plain number shows no unit.
+    unit = "" if unit == "1" else unit
+    symbol = _SYMBOLS.get(alike_key) or bus.key_symbols.get(alike_key) or SYMBOLS.get(name) or name
+    symbol = f"{symbol},{group}" if group else symbol
+    return Input(symbol, key, value, unit, grade, source, description)
+
+
+def traced(profile: Profile, key: str) -> Traced:
+    """Make a traced number from a key of a profile."""
+    one = given(profile, key)
+    return Traced(one.value, given=one)
+
+
+def traced_profile(profile: Profile) -> Profile:
+    """Return a copy with traced numbers in all keys that the cycle may depend on, unvalidated.
+
+    So are words that choose between numbers.
+    """
+    found = profile
+    for key in cycle_keys(profile):
+        value = value_at(profile, key)
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number or (isinstance(value, str) and _chooses(profile, key)):
+            found = with_unchecked(found, key, traced(profile, key))
+    for one in profile.alike_nodes:
+        execution, key = one.node.execution, one.node_key(_TABLE)
+        if isinstance(execution, TableExecution):
+            table = GivenTable(execution.time_us)
+            symbol = f"table,{one.name}" if one.name else "table"
+            table.given = given(profile, key)._replace(symbol=symbol, value=f"{len(execution.time_us)} points")
+            found = with_unchecked(found, key, table)
+    return found
+
+
+def _chooses(profile: Profile, key: str) -> bool:
+    """Whether the word of a key chooses between numbers."""
+    own = bus_of(profile).choosing_keys
+    return any(key == one.node_key(name) for one in profile.alike_nodes for name in own)
+
+
+def _of_one_table(profile: Profile, key: str) -> tuple[str, str]:
+    """The key without the name of its table, where a key has several, and that name.
+
+    That of a group is as it is where all nodes are alike.
+    """
+    section, _, rest = key.partition(".")
+    if not isinstance(getattr(profile, section), tuple):
+        return key, ""
+    group, _, name = rest.partition(".")
+    if section != "group":
+        return f"{section}.{name}", group
+    if name == "nodes":
+        return "bus.nodes", group
+    (payload,) = models_of(type(profile).model_fields["payload"].annotation)
+    return f"{'payload' if name in payload.model_fields else 'node'}.{name}", group

@@ -1,0 +1,63 @@
+"""The delay that a bus puts into the position loops; nothing is simulated."""
+
+from busplan.buses.cycle import BusCycle
+from busplan.elementwise import plain
+from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.profile import Profile
+
+
+def loop_delays_us(profile: Profile) -> tuple[float, float]:
+    """Bus delay inside the loops of x and y: none on a node [us].
+
+    On the host it is one period, for the synchronous packet triggers both the sample and the update with the last
+    command; more where the kind of bus says so. Where nodes apply their commands on arrival it lasts from the sample to
+    the end of the command's execution: x is taken to be on the first node of the cycle with axes and y on the last,
+    which differ most.
+
+    References
+    ----------
+    Paper, section III-C.
+    """
+    if profile.servo.loop == "node":
+        return 0.0, 0.0
+    own, network = bus_of(profile), network_of(profile)
+    at_sync = profile.servo.update == "next_sync"
+    whole_us = own.loop_periods(network, at_sync=at_sync) * profile.cycle.period_us
+    if at_sync:
+        return whole_us, whole_us
+    cycle = cycle_of(profile, model=own.deciding_model)
+    since_us = whole_us - own.sampled_us(cycle)
+    first_us, last_us = _first_and_last_us(cycle)
+    return since_us + first_us, since_us + last_us
+
+
+def skew_us(profile: Profile) -> float:
+    """How much later the last node with axes takes its set-point than the first, where no clock is common to them [us].
+
+    A loop on the host has it in its delays.
+    """
+    if profile.servo.loop == "host" or bus_of(profile).acts_at_once(network_of(profile)):
+        return 0.0
+    first_us, last_us = _first_and_last_us(cycle_of(profile, model=bus_of(profile).deciding_model))
+    return last_us - first_us
+
+
+def jitter_us(profile: Profile) -> float:
+    """Jitter of the synchronous packet, either way of its mean: the profile's own and what the bus adds [us]."""
+    return float(profile.delivery.jitter_us + plain(bus_of(profile).sync_jitter_us(network_of(profile))))
+
+
+def _first_and_last_us(cycle: BusCycle) -> tuple[float, float]:
+    """When the commands of the first and the last node with axes take effect, from the start of the cycle [us]."""
+    network = cycle.network
+    own = bus_of(network.profile)
+    arrived_us = own.arrivals_us(cycle)
+    groups = [group for group in network.groups for _ in range(int(group.nodes))]
+    moved = [node for node, group in enumerate(groups, start=1) if group.axes] or list(arrived_us)
+
+    def effect_us(node: int) -> float:
+        # A cycle that does not fit is never simulated; its delay must not stop the report that says so.
+        return min(arrived_us[node], plain(network.period_us)) + own.taking_us(groups[node - 1], network)
+
+    return effect_us(moved[0]), effect_us(moved[-1])

@@ -1,0 +1,125 @@
+"""Latency on the bus: the phases of each transaction under each timing model."""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+from busplan.buses.cycle import BusLatency
+from busplan.elementwise import Number, existing
+from busplan.errors import BusplanError
+from busplan.questions.fit.figure_values import FigureValues
+from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.sections.base import with_unchecked
+from busplan.sections.execution import TableExecution
+from busplan.sections.profile import Profile
+from busplan.sections.transactions import TRANSACTION_KINDS
+
+
+class Transaction(NamedTuple):
+    """The phases of a read or a write of the farthest node, or of a whole cycle."""
+
+    timing_model: str
+    transaction: str
+    group: str
+    """Of which group of nodes; empty where all are alike."""
+    payload_bytes: int | None
+    nodes: int
+    phases: FigureValues
+    """Figures by their key in the register of the bus."""
+
+    def __getattr__(self, key: str) -> Any:
+        # Called for missing attributes only.
+        if not key.startswith("_") and key in self.phases:
+            return self.phases[key]
+        raise AttributeError(f"{self.transaction} has no figure {key!r}")
+
+
+class LatencyResult(NamedTuple):
+    """Answer of `latency`."""
+
+    profile: Profile
+    transactions: tuple[Transaction, ...]
+    payloads_bytes: tuple[int, ...] = ()
+    """Payloads asked for [bytes]; empty for the profile's own."""
+
+
+def latency(
+    profile: Profile,
+    *,
+    payloads_bytes: Sequence[int] | None = None,
+    timing_models: Sequence[str] | None = None,
+) -> LatencyResult:
+    """Compute the phases of each transaction.
+
+    Parameters
+    ----------
+    profile
+        The network; a transaction is that of its farthest node.
+    payloads_bytes
+        Payloads of both read and write [bytes]; by default the profile's own.
+    timing_models
+        Timing models, in this order; by default all of the kind of bus.
+
+    Returns
+    -------
+    LatencyResult
+        One transaction for each payload, kind and model, nested in this order.
+
+    Raises
+    ------
+    BusplanError
+        The execution time of a payload is not known.
+
+    References
+    ----------
+    Paper, equations (3)-(10), (12)-(14).
+    """
+    models = model_names(profile) if timing_models is None else timing_models
+    nodes = int(network_of(profile).nodes)
+    _require_execution(profile, payloads_bytes or ())
+    variants = [profile] if payloads_bytes is None else [with_payload(profile, size) for size in payloads_bytes]
+    return LatencyResult(
+        profile,
+        tuple(
+            Transaction(model, one.name, one.group, one.payload_bytes, nodes, FigureValues(_whole_bytes(one.phases)))
+            for variant in variants
+            for alike in zip(*(_latencies(variant, model) for model in models), strict=True)
+            for model, one in zip(models, alike, strict=True)
+        ),
+        tuple(payloads_bytes or ()),
+    )
+
+
+def _whole_bytes(phases: Mapping[str, Number]) -> dict[str, float | None]:
+    """Phases with the sizes of packets as whole numbers; None for one that does not exist."""
+    numbers = {key: existing(value) for key, value in phases.items()}
+    return {
+        key: int(value) if value is not None and key.endswith("_bytes") else value for key, value in numbers.items()
+    }
+
+
+def with_payload(profile: Profile, size_bytes: int) -> Profile:
+    """Return a copy with the payload of both read and write replaced [bytes], unvalidated."""
+    sections = [f"group.{one.name}" for one in profile.group] or ["payload"]
+    for section, kind in product(sections, TRANSACTION_KINDS):
+        profile = with_unchecked(profile, f"{section}.{kind}_bytes", size_bytes)
+        profile = with_unchecked(profile, f"{section}.{kind}_bytes_per_axis", None)
+    return profile
+
+
+def _latencies(profile: Profile, model: str) -> tuple[BusLatency, ...]:
+    return bus_of(profile).cycle(network_of(profile), model=model).latencies()
+
+
+def _require_execution(profile: Profile, payloads_bytes: Sequence[int]) -> None:
+    """Refuse payloads whose execution time is not known, all in one error."""
+    unknown = dict.fromkeys(
+        f"payload {size} bytes: outside the execution table of {one.name or profile.name}, {execution.range_bytes}; "
+        "nothing is extrapolated"
+        for one in profile.alike_nodes
+        if isinstance(execution := one.node.execution, TableExecution)
+        for size in payloads_bytes
+        if not execution.covers(size)
+    )
+    if unknown:
+        raise BusplanError(*unknown)

@@ -1,0 +1,121 @@
+"""Answer of `busplan latency`."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import groupby
+
+from busplan.buses.figure import REQUIRED, Figure
+from busplan.forms.blocks import (
+    Block,
+    Code,
+    JsonDocument,
+    Record,
+    Report,
+    Sentence,
+    Table,
+    TableColumn,
+    TableRow,
+    attribute_value,
+)
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.latency.figures import LatencyResult, Transaction, with_payload
+from busplan.questions.words.documents import document, with_profile
+from busplan.questions.words.figure_tables import Owner, figure_table
+from busplan.questions.words.sentences import execution_sentence, not_applicable, warning_sentences
+
+
+def latency_report(result: LatencyResult) -> Report:
+    """Report of `latency`."""
+    return Report(
+        Sentence(("Latency of ", Code(result.profile.name))),
+        lambda: tuple(_blocks(result)),
+        partial(latency_document, result),
+        lambda: with_profile(result.profile.name, latency_records(result)),
+    )
+
+
+def _blocks(result: LatencyResult) -> Iterator[Block]:
+    """Phases of each transaction, the timing models side by side; one table for each payload."""
+    profile, network = result.profile, network_of(result.profile)
+    yield from latency_tables(result)
+    yield Sentence((Code(profile.name), f": {bus_of(profile).latency_subject(network)}."))
+    yield from not_applicable(profile)
+    yield from execution_sentence(profile, of_latency=True)
+    yield from (Sentence((f"Warning: {words}.",), "warns") for words in _over(result))
+    yield from warning_sentences(profile, nodes=int(network.nodes), most=0)
+
+
+def latency_tables(result: LatencyResult) -> Iterator[Table]:
+    """Phases of the transactions in us; one table for each payload, or, of many transactions, for each timing model."""
+    bus = bus_of(result.profile)
+    figures = (*bus.term_figures, REQUIRED) if bus.latency_table_figures is None else bus.latency_table_figures
+    figures = tuple(figure for figure in figures if all(figure.key in one.phases for one in result.transactions))
+    subject = bus.latency_subject(network_of(result.profile))
+    if bus.has_many_transactions:
+        yield from _by_transaction(result, figures, subject)
+        return
+    rows = [(figure, 0) for figure in figures]
+    caption = Sentence((f"Phases in us, {subject}",))
+    for _, group in groupby(_numbered(result.transactions), key=lambda one: one[0]):
+        owners = [Owner(_column(one), one.phases) for _, one in group]
+        yield figure_table(rows, owners, caption=caption, unit=False)
+
+
+def _by_transaction(result: LatencyResult, figures: Sequence[Figure], subject: str) -> Iterator[Table]:
+    """One row for each transaction; one table for each payload and timing model."""
+    columns = (TableColumn("message", kind="words"), *(TableColumn(figure.label) for figure in figures))
+    tables: dict[tuple[int, str], list[TableRow]] = {}
+    for number, one in _numbered(result.transactions):
+        values = (attribute_value(figure, one.phases) for figure in figures)
+        tables.setdefault((number, one.timing_model), []).append(TableRow((_name(one), *values)))
+    for (_, model), rows in tables.items():
+        yield Table(columns, tuple(rows), Sentence((f"By the {model} model in us, {subject}",)), heads=1)
+
+
+def _numbered(transactions: Sequence[Transaction]) -> Iterator[tuple[int, Transaction]]:
+    """Each transaction with the number of its table; a repeated one begins a new table."""
+    seen: set[tuple[str, str, str]] = set()
+    number = 0
+    for one in transactions:
+        key = (one.timing_model, one.transaction, one.group)
+        if key in seen:
+            number, seen = number + 1, set()
+        seen.add(key)
+        yield number, one
+
+
+def _column(one: Transaction) -> TableColumn:
+    return TableColumn(one.timing_model, group=_name(one))
+
+
+def _name(one: Transaction) -> str:
+    """What it is called: whose it is, what it is, and its payload."""
+    payload = "" if one.payload_bytes is None else f"{one.payload_bytes} B"
+    return " ".join(filter(None, (one.group, one.transaction, payload)))
+
+
+def _over(result: LatencyResult) -> list[str]:
+    """Limits of the bus that the profile breaks with any of the payloads asked for, or with its own."""
+    networks = [network_of(with_payload(result.profile, size)) for size in result.payloads_bytes]
+    networks = networks or [network_of(result.profile)]
+    broken = (limit.words(network) for network in networks for limit in bus_of(result.profile).broken(network))
+    return list(dict.fromkeys(broken))
+
+
+def latency_records(result: LatencyResult) -> list[Record]:
+    """One flat row for each transaction and its phases; all have a group where one has, None for what has none."""
+    has_groups = any(transaction.group for transaction in result.transactions)
+    return [_record(transaction, has_groups=has_groups) for transaction in result.transactions]
+
+
+def _record(transaction: Transaction, *, has_groups: bool) -> Record:
+    record = transaction._asdict()
+    phases = record.pop("phases")
+    group = record.pop("group")
+    named = {"timing_model": record.pop("timing_model"), "transaction": record.pop("transaction")}
+    return {**named, **({"group": group or None} if has_groups else {}), **record, **phases}
+
+
+def latency_document(result: LatencyResult) -> JsonDocument:
+    """Document of `busplan latency --format json`."""
+    return document("latency", profile=result.profile.name, transactions=latency_records(result))

@@ -1,0 +1,192 @@
+"""The map of a profile: a sweep over two keys, with the verdict and its limit in each cell."""
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, Final, NamedTuple
+
+from busplan.buses.parts import Value
+from busplan.errors import BusplanError
+from busplan.profile.toml import override
+from busplan.progress import Progress
+from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.network import bus_of
+from busplan.questions.map.cells import CELL_FIGURES, STATES, Cell, MapPoint, NotDrawn, Region, cell_of
+from busplan.questions.map.circles import Mapper, Place, judged
+from busplan.questions.map.direction import AXES, PERIOD, Direction, nodes_with, own_value, profile_key
+from busplan.questions.map.ranges import default_direction
+from busplan.questions.sweep.blocks import sweep
+from busplan.questions.sweep.grid import Grid, Listed
+from busplan.sections.profile import Profile
+
+MOST_CIRCLES: Final = 1000
+"""Most circle tests of a map."""
+
+
+class TradeOff(NamedTuple):
+    """Answer of `map`: the verdict over two keys of a profile."""
+
+    profile: Profile
+    x: Direction
+    y: Direction
+    rows: tuple[tuple[Cell | NotDrawn, ...], ...]
+    """A row for each value of `y`, a cell for each value of `x`."""
+    with_circle: bool
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Cells that are drawn, row by row."""
+        return tuple(one for row in self.rows for one in row if isinstance(one, Cell))
+
+    @property
+    def not_drawn(self) -> tuple[NotDrawn, ...]:
+        """Combinations of values that no profile can have, row by row."""
+        return tuple(one for row in self.rows for one in row if isinstance(one, NotDrawn))
+
+    @property
+    def own_place(self) -> Place | None:
+        """Row and column of the profile's own setting; None if it is not on the map."""
+        own_x, own_y = (own_value(one.key, self.profile) for one in (self.x, self.y))
+        if own_x not in self.x.values or own_y not in self.y.values:
+            return None
+        return self.y.values.index(own_y), self.x.values.index(own_x)
+
+    @property
+    def own(self) -> Cell | None:
+        """Cell of the profile's own setting; None if it is not on the map."""
+        if self.own_place is None:
+            return None
+        row, column = self.own_place
+        found = self.rows[row][column]
+        return found if isinstance(found, Cell) else None
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """Cells by state and limit: the states in the order of `STATES`, of each the largest region first."""
+        counts = Counter(map(_region, self.cells))
+        found = [one._replace(cells=number) for one, number in counts.items()]
+        return tuple(sorted(found, key=lambda one: (STATES.index(one.state), -one.cells)))
+
+
+def _region(cell: Cell) -> Region:
+    is_time = cell.limited_by == (TIME,)
+    return Region(cell.state, cell.limited_by, cell.binding_term if is_time else None, 0)
+
+
+def trade_off(
+    profile: Profile,
+    *,
+    x: Direction | None = None,
+    y: Direction | None = None,
+    with_circle: bool = False,
+    mapper: Mapper = map,
+    progress: Progress | None = None,
+) -> TradeOff:
+    """Tell where over two keys the cycle of a profile fits, and what limits it elsewhere.
+
+    Each cell is what `capacity` says of the setting under the timing model that decides.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    x, y
+        Its keys with their values, from `checked_direction`: what lies across, and what lies up. By default the axes of
+        all nodes, and the period.
+    with_circle
+        Run the circle test of every cell that fits.
+    mapper
+        How circle tests are run: the built-in `map`, or one that uses other processes.
+    progress
+        Called now and then with the circle tests that are done, and all of them.
+
+    Returns
+    -------
+    TradeOff
+        Rows of cells; combinations of values that no profile can have are no cells.
+
+    Raises
+    ------
+    BusplanError
+        Both directions are one key, no setting can exist, or there would be too many circle tests.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> found = trade_off(load("paper-4ms").profile, y=Direction("cycle.period_us", (500, 4000)))
+    >>> [[cell.state for cell in row[:3]] for row in found.rows]
+    [['fits', 'does not fit', 'does not fit'], ['fits', 'fits', 'fits']]
+    """
+    if x is None:
+        is_free = y is None or profile_key(y.key, profile) != profile_key(AXES, profile)
+        x = default_direction(AXES if is_free else PERIOD, profile, with_circle=with_circle)
+    if y is None:
+        y = default_direction(AXES if x.key == PERIOD else PERIOD, profile, with_circle=with_circle)
+    key_x, key_y = (profile_key(one.key, profile) for one in (x, y))
+    if key_x == key_y:
+        raise BusplanError(f"{x.key} across and {y.key} up both vary {key_x}; give two keys")
+    settings = {
+        (row, column): _setting(profile, (x.key, one_x), (y.key, one_y))
+        for row, one_y in enumerate(y.values)
+        for column, one_x in enumerate(x.values)
+    }
+    found = {place: one for place, one in settings.items() if isinstance(one, MapPoint)}
+    if not found:
+        reason = next(one for one in settings.values() if not isinstance(one, MapPoint))
+        raise BusplanError(f"no setting of this map can exist: {reason}")
+    cells = {
+        (row, column): cell_of(found[row, column], figures, x=x.values[column], y=y.values[row])
+        for (row, column), figures in _swept(profile, found)
+    }
+    if with_circle:
+        fitting = {place: (cell, found[place]) for place, cell in cells.items() if cell.state == "fits"}
+        if len(fitting) > MOST_CIRCLES:
+            raise BusplanError(
+                f"{len(fitting):,} settings fit, and a map runs up to {MOST_CIRCLES:,} circle tests; give fewer values"
+            )
+        cells |= judged(profile, fitting, mapper=mapper, progress=progress)
+    rows = tuple(
+        tuple(
+            cells[row, column] if (row, column) in cells else NotDrawn(one_x, one_y, str(settings[row, column]))
+            for column, one_x in enumerate(x.values)
+        )
+        for row, one_y in enumerate(y.values)
+    )
+    return TradeOff(profile, x, y, rows, with_circle)
+
+
+def _setting(profile: Profile, *along: tuple[str, Value]) -> MapPoint | str:
+    """The profile at a point of the map, or why there is none."""
+    changes: dict[str, Value] = {}
+    try:
+        # How many nodes some axes are is asked with the other direction's value.
+        for key, value in sorted(along, key=lambda one: one[0] == AXES):
+            own = profile_key(key, profile)
+            is_axes = key == AXES
+            changes[own] = nodes_with(value, override(profile, dict(changes)), nodes_key=own) if is_axes else value
+        return MapPoint(changes, override(profile, dict(changes)))
+    except BusplanError as error:
+        return error.problems[0]
+
+
+def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tuple[Place, Mapping[str, Any]]]:
+    """Figures of each setting, from sweeps over grids without any other setting."""
+    places: dict[tuple[object, ...], Place] = {tuple(one.changes.values()): at for at, one in settings.items()}
+    model = bus_of(profile).deciding_model
+    for grid in _grids(settings.values()):
+        for block in sweep(profile, grid, timing_models=[model]):
+            for index in range(block.chunk.points):
+                point = tuple(block.chunk.point(index).values())
+                yield places[point], block.row(index, CELL_FIGURES)
+
+
+def _grids(settings: Collection[MapPoint]) -> Iterator[Grid]:
+    """Full grids that have every setting once: lines with the same values along them are one grid."""
+    across_key, along_key = next(iter(settings)).changes
+    lines: dict[Value, list[Value]] = {}
+    for one in settings:
+        lines.setdefault(one.changes[across_key], []).append(one.changes[along_key])
+    alike: dict[tuple[Value, ...], list[Value]] = {}
+    for across, along in lines.items():
+        alike.setdefault(tuple(along), []).append(across)
+    for values, places in alike.items():
+        yield Grid({across_key: Listed(tuple(places)), along_key: Listed(values)})

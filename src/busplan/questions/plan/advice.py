@@ -1,0 +1,106 @@
+"""What to change in a profile: the one answer of `capacity` and of `check`, which is that of `plan`."""
+
+from typing import Final, NamedTuple
+
+from busplan.buses.parts import Value
+from busplan.profile.toml import override
+from busplan.questions.circle.check import failures_within, rests_on
+from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.network import bus_of
+from busplan.questions.plan.freedoms import freed
+from busplan.questions.plan.machine import with_nodes
+from busplan.questions.plan.search import Search
+from busplan.sections.base import MAX_COUNT
+from busplan.sections.profile import Profile
+
+UNTESTED_CIRCLE: Final = "the circle is another one then, and is not simulated here"
+"""What is said of a change whose circle nobody has tested."""
+
+
+class Change(NamedTuple):
+    """A change of a profile, and its effect."""
+
+    changes: dict[str, Value]
+    """New value by dotted key, the dearest change first."""
+    nodes: int
+    """Nodes that the change is made for."""
+    figures: CapacityFigures
+    """The capacity after it, under the model that decides."""
+    circle_is_untested: bool
+    """Whether the profile has another circle after it, which nobody has simulated."""
+
+
+class Cure(NamedTuple):
+    """What to change for a profile to hold every constraint."""
+
+    changes: dict[str, Value] | None
+    """New value by dotted key, the dearest change first; empty if nothing is to change, None if no change is enough."""
+    why: str = ""
+    """What stands in the way, if no change is enough."""
+    circle_failures: tuple[str, ...] | None = ()
+    """What the circle does not hold after it; None where it is another one then, and was not simulated."""
+
+
+def changeable(profile: Profile) -> tuple[str, ...]:
+    """What may be changed unless a user says otherwise, in words, the cheapest first."""
+    return tuple(one.label for one in freed(profile, None))
+
+
+def cure(profile: Profile, *, circle_steps: int | None = None) -> Cure:
+    """Find the least change after which a profile holds every constraint but its circle.
+
+    One circle at most is simulated: the one after the change, where that is another one.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    circle_steps
+        Most simulated steps of each axis of that circle; None for no simulation.
+    """
+    search, levels = Search(profile), freed(profile, None)
+    found = search.least(levels)
+    if found is None:
+        return Cure(None, search.binding(levels).why)
+    changes, after = dict(found), search.profile(found)
+    if not profile.asks_for_circle or rests_on(after) == rests_on(profile):
+        return Cure(changes)
+    failures = None if circle_steps is None else failures_within(after, most_steps=circle_steps)
+    return Cure(changes, circle_failures=failures)
+
+
+def advice(profile: Profile, now: CapacityFigures) -> tuple[Change | None, str]:
+    """Find the least change after which a profile fits as a plan does, or, where it does, has room for a node more.
+
+    No circle is simulated: that is another question.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    now
+        Its figures under the model that decides.
+
+    Returns
+    -------
+    tuple
+        The change, None if there is none; and if so, what stands in the way.
+    """
+    own = cure(profile)
+    if own.changes is None or own.changes:
+        return _change(profile, own, nodes=now.nodes), own.why
+    if now.safe_nodes is None:
+        return None, ""  # nodes differ, and nobody asked for more of which
+    nodes = now.safe_nodes + 1
+    if nodes > MAX_COUNT:
+        return None, f"{MAX_COUNT} nodes are the most of a profile"
+    more = cure(override(profile, dict(with_nodes(nodes))))
+    return _change(profile, more, nodes=nodes), more.why
+
+
+def _change(profile: Profile, found: Cure, *, nodes: int) -> Change | None:
+    if found.changes is None:
+        return None
+    after = override(profile, dict(found.changes))
+    decided = figures(after, model=bus_of(after).deciding_model)
+    return Change(found.changes, nodes, decided, circle_is_untested=found.circle_failures is None)

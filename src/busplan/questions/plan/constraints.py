@@ -1,0 +1,157 @@
+"""What a plan must hold: each constraint says what the slice must give, or that no slice is enough."""
+
+from collections.abc import Callable, Iterable, Iterator
+from math import inf
+from typing import Final, NamedTuple
+
+from busplan.buses.network import Network
+from busplan.elementwise import within
+from busplan.questions.fit.certainty import certainty
+from busplan.questions.fit.circle_refusal import circle_refusals, step_refusals
+from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.questions.plan.machine import rooms
+from busplan.sections.base import MIN_STEP_US
+from busplan.sections.profile import Profile
+
+CIRCLE: Final = "circle"
+_MOST_SLICE_US: Final = 1e12
+"""Longer than any slice of a profile: it keeps quotients finite."""
+
+
+class Need(NamedTuple):
+    """What one constraint asks of the slice, or of the period itself."""
+
+    slice_us: float
+    """What the slice must give; infinite where none is enough [us]."""
+    key: str
+    """What asks: time, the key of a limit of the bus, or a key of the profile."""
+    why: str = ""
+    """What no slice and no period mends, in words."""
+    least_us: float = 0.0
+    """The shortest period, whatever the slice ratio; 0 where any will do [us]."""
+
+    def period_us(self, ratio: float) -> float:
+        """The shortest period that gives what is asked, with a slice ratio [us]."""
+        return max(self.slice_us / ratio, self.least_us)
+
+    def words(self, *, ratio: float, most_us: float) -> str:
+        """Say what is asked, and the longest period there is.
+
+        Parameters
+        ----------
+        ratio
+            Slice ratio [1].
+        most_us
+            The longest period [us].
+        """
+        if self.least_us > self.slice_us / ratio:
+            needs = f"needs a period of {self.least_us:.3f} us"
+            return self.why or f"{self.key} {needs}, and {most_us:.3f} us is the longest"
+        needs = f"needs a slice of {self.slice_us:.3f} us"
+        who = f"the cycle {needs} to be shown to fit" if self.key == TIME else f"{self.key} {needs}"
+        return self.why or f"{who}, and at most {ratio * most_us:.3f} us can be given"
+
+
+def shown(network: Network) -> Iterator[Need]:
+    """What a network needs to be shown to fit, with bias, uncertainty and reserve, on a bus that is set safely.
+
+    Time first, and then each limit that asks for a longer period than all before it.
+    """
+    bus = bus_of(network.profile)
+    time = Need(float(certainty(bus.cycle(network, model=bus.deciding_model)).safe_required_us), TIME)
+    yield time
+    least_us = 0.0
+    for limit in bus.limits:
+        if limit.is_of_period:
+            continue
+        # A limit that a period cures is asked at the shortest one that the others allow with any slice ratio.
+        at_us = max(time.slice_us, least_us, MIN_STEP_US)
+        at = network if limit.kept_from_us is None else network._replace(period_us=at_us)
+        if limit.shown.is_broken(at):
+            kept_us = inf if limit.kept_from_us is None else limit.kept_from_us(at)
+            if kept_us == inf:
+                way_out = f" ({limit.way_out})" if limit.way_out else ""
+                yield Need(inf, limit.key, f"{limit.words(at)}{way_out}", inf)
+                return
+            least_us = max(least_us, kept_us)
+            yield Need(0.0, limit.key, least_us=kept_us)
+
+
+def most_asking(needs: Iterable[Need], *, ratio: float) -> Need:
+    """The need that asks for the longest period with a slice ratio, the first of equals."""
+    return max(needs, key=lambda need: need.period_us(ratio))
+
+
+def keeps_limits(network: Network) -> bool:
+    """Whether a network keeps the limits that its period plays a part in, at its own period and slice ratio."""
+    limits = bus_of(network.profile).limits
+    return not any(one.kept_from_us is not None and one.shown.is_broken(network) for one in limits)
+
+
+def verdict(profile: Profile) -> Iterator[Need]:
+    """The network itself."""
+    yield from shown(network_of(profile))
+
+
+def utilisation(profile: Profile) -> Iterator[Need]:
+    """[limits] max_utilisation: the share of the slice that may be used."""
+    most, key = profile.limits.max_utilisation, "limits.max_utilisation"
+    if most is not None:
+        bus = bus_of(profile)
+        required_us = float(bus.cycle(network_of(profile), model=bus.deciding_model).required_us)
+        us = required_us / most if most * _MOST_SLICE_US > required_us else inf
+        yield Need(us, key, f"{key} = {most:g} leaves no time" if us == inf else "")
+
+
+def spare(profile: Profile) -> Iterator[Need]:
+    """[limits] min_spare_nodes and min_spare_axes: more nodes must be shown to fit, too."""
+    for room in rooms(profile):
+        for found in shown(room.network):
+            why = found.why and f"{room.key} asks for room for {room.words}: {found.why}"
+            yield found._replace(key=room.key, why=why)
+
+
+CONSTRAINTS: Final[tuple[Callable[[Profile], Iterator[Need]], ...]] = (verdict, utilisation, spare)
+
+
+def missed_limits(profile: Profile) -> tuple[Need, ...]:
+    """What each key of [limits] asks that the slice of a profile does not give; the verdict is not among it."""
+    cycle = profile.cycle
+    asked = (need for constraint in CONSTRAINTS[1:] for need in constraint(profile))
+    missed = (need for need in asked if not within(need.period_us(cycle.slice_ratio), cycle.period_us))
+    return tuple({need.key: need for need in missed}.values())
+
+
+def needs(profile: Profile) -> list[Need]:
+    """What every constraint asks, those of the verdict first."""
+    return [need for constraint in CONSTRAINTS for need in constraint(profile)]
+
+
+def refused_period(profile: Profile) -> Need | None:
+    """Why a period is none of the bus, or why the circle that a profile asks for cannot be run, if so.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    """
+    network, bus = network_of(profile), bus_of(profile)
+    broken = next((one for one in bus.limits if one.is_of_period and one.is_broken(network)), None)
+    if broken is not None:
+        return Need(inf, broken.key, broken.words(network))
+    causes = circle_refusals(profile)
+    return Need(inf, causes[0].name, causes[0].message) if causes else None
+
+
+def goes_with_step(profile: Profile, period_us: float) -> bool:
+    """Whether a period goes with the step of the circle that a profile asks for, if it does.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    period_us
+        Communication period [us].
+    """
+    return not profile.asks_for_circle or not any(step_refusals(profile, period_us))

@@ -1,0 +1,102 @@
+"""`busplan.report`."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from busplan.errors import BusplanError
+from busplan.forms.blocks import Report
+from busplan.printable import has_controls
+from busplan.profile.changes import NO_CHANGES
+from busplan.progress import Progress
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import ProfileLike, load_profile, one_or_several
+from busplan.questions.base.origin import origin_of
+from busplan.questions.report.all_answers import AllAnswers, answers_of_each
+from busplan.questions.report.page import ReportedProfile, page_report
+from busplan.questions.words.documents import changed_report
+from busplan.sections.profile import Profile
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class ReportAnswer(Answer):
+    """Answer of `report`: a page. `html` is its text, `save(path)` writes it.
+
+    Parameters
+    ----------
+    profiles
+        Each profile with its `argument` in the page's commands, and all its answers.
+    title
+        Heading of the page; None for the profile's name or the number of profiles.
+    """
+
+    profiles: tuple[ReportedProfile, ...]
+    title: str | None
+
+    @property
+    def answers(self) -> tuple[AllAnswers, ...]:
+        """All answers for each profile."""
+        return tuple(one.answer for one in self.profiles)
+
+    def report(self) -> Report:
+        """The answer in blocks."""
+        page, changes = page_report(self.profiles, title=self.title), self.profiles[0].changes
+        # As on the command line, where all profiles have the same ones.
+        return changed_report(page, changes) if all(one.changes == changes for one in self.profiles) else page
+
+    def _headline(self) -> str:
+        return "; ".join(f"{one.profile.name}: {one.verdict.deciding.verdict}" for one in self.answers)
+
+
+def report(
+    profiles: ProfileLike | Iterable[ProfileLike],
+    *,
+    title: str | None = None,
+    circle: bool = True,
+    progress: Progress | None = None,
+) -> ReportAnswer:
+    """Put all that busplan says of one or several profiles on one page.
+
+    Parameters
+    ----------
+    profiles
+        One or several: a `Profile`, a path or a shipped name each. The page names commands that repeat its figures;
+        in those of a `Profile` stands the shipped one it was made from with its changes, else NAME.toml.
+    title
+        Heading of the page; by default the profile's name, or how many profiles.
+    circle
+        Run the circle test of profiles that ask for one.
+    progress
+        Called from time to time with the steps simulated and the steps known to be needed.
+
+    Returns
+    -------
+    ReportAnswer
+        Its `html` is the page, one file without network or script; `save("report.html")` writes it, and .md, .txt and
+        .json. A notebook shows it.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, or a title that is no words in one line.
+
+    Examples
+    --------
+    >>> import busplan
+    >>> page = busplan.report(["paper-4ms", "paper-1ms"], circle=False)
+    >>> page
+    <ReportAnswer: paper-4ms: fits; paper-1ms: fits>
+    >>> page.html.splitlines()[0], page.answers[0].verdict.deciding.safe_axes
+    ('<!DOCTYPE html>', 52)
+    """
+    if title is not None and (not isinstance(title, str) or has_controls(title) or not title.strip()):
+        raise BusplanError(f"title {title!r}: expected words in one line, without control characters")
+    # A profile is iterable, too: over its sections.
+    given = [profiles] if isinstance(profiles, Profile) else one_or_several(profiles, name="profiles")
+    loaded = [load_profile(one) for one in given]
+    origins = [origin_of(one) if isinstance(one, Profile) else (os.fspath(one), NO_CHANGES) for one in given]
+    found = answers_of_each(loaded, with_circle=circle, progress=progress)
+    return ReportAnswer(
+        tuple(ReportedProfile(argument, one, changes) for (argument, changes), one in zip(origins, found, strict=True)),
+        title,
+    )

@@ -1,0 +1,115 @@
+"""The shell commands that reproduce the figures of a page."""
+
+import os
+import shlex
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from busplan.forms.blocks import Command, JsonDocument
+from busplan.printable import has_controls
+from busplan.profile.changes import KeyChanges
+from busplan.questions.capacity.report import capacity_document
+from busplan.questions.capacity.sensitivity_report import sensitivity_document
+from busplan.questions.capacity.verdict import verdicts
+from busplan.questions.circle.report import circle_document
+from busplan.questions.explain.assumptions import assumptions_document
+from busplan.questions.latency.report import latency_document
+from busplan.questions.map.report import map_document
+from busplan.questions.report.all_answers import AllAnswers
+from busplan.questions.timeline.report import timeline_document
+from busplan.questions.words.documents import changed_document
+
+
+class Source(NamedTuple):
+    """A command and the JSON document that it writes."""
+
+    command: Command
+    document: JsonDocument
+
+    @property
+    def line(self) -> Command:
+        """The command without its purpose."""
+        return Command(self.command.line)
+
+
+Sources = Mapping[str, Source]
+"""The commands behind a profile's figures, by a short name."""
+
+
+def shell_word(text: str) -> str:
+    """Quote an argument for a shell.
+
+    Examples
+    --------
+    >>> shell_word("line 1.toml"), shell_word("-x.toml"), shell_word("-")
+    ("'line 1.toml'", './-x.toml', '-')
+    """
+    if text.startswith("-") and text != "-":
+        # The program would take it for an option, whatever the quotes.
+        text = f"./{text}"
+    if not has_controls(text):
+        return shlex.quote(text)
+    # Control characters need $'...', which bash, zsh and POSIX 2024 support.
+    return f"$'{''.join(map(_escaped, os.fsencode(text)))}'"
+
+
+def _escaped(byte: int) -> str:
+    character = chr(byte)
+    return character if character.isascii() and (character.isalnum() or character in "/._-+ ") else f"\\x{byte:02x}"
+
+
+def period_option(period_us: float) -> tuple[str, str]:
+    """The --period option for exactly this period.
+
+    Examples
+    --------
+    >>> period_option(500.0), period_option(0.1)
+    (('--period', '500us'), ('--period', '0.1us'))
+    """
+    return "--period", f"{repr(period_us).removesuffix('.0')}us"
+
+
+def change_options(changes: KeyChanges, *, period_us: float) -> Iterator[str]:
+    """Options of the changes, quoted for a shell; --period with the profile's period [us]."""
+    for one in changes.each:
+        yield from period_option(period_us) if one.option == "--period" else (one.option, shell_word(one.text))
+
+
+def sources(answer: AllAnswers, *, argument: str, changes: KeyChanges) -> dict[str, Source]:
+    """The commands behind one profile's figures, by a short name.
+
+    Parameters
+    ----------
+    answer
+        All answers of the profile.
+    argument
+        The PROFILE argument.
+    changes
+        KeyChanges of its file, which the commands repeat.
+    """
+    each = tuple(word for (one, *_) in answer.periods.periods for word in period_option(one.period_us))
+    found: dict[str, Source] = {}
+
+    def add(name: str, purpose: str, document: JsonDocument, *options: str, own: KeyChanges = changes) -> None:
+        changed = change_options(own, period_us=answer.profile.cycle.period_us)
+        words = ("busplan", str(document["command"]), shell_word(argument), *options, *changed, "--format", "json")
+        line = " ".join(words)
+        found[name] = Source(Command(line, purpose), changed_document(document, own))
+
+    # Neither latency nor the list of explain takes --period.
+    elsewhere = KeyChanges(tuple(one for one in changes.each if one.option != "--period"))
+    bus, periods = answer.capacity, answer.periods
+    document = sensitivity_document(bus, (answer.verdict,), (answer.sensitivity,))
+    add("capacity", "verdict, timing models, terms, what moves the margin", document, "--sensitivity")
+    add("latency", "latencies, part by part", latency_document(answer.latency), own=elsewhere)
+    if answer.schedule is not None:
+        add("timeline", "the cycle event by event", timeline_document(answer.schedule))
+    others = changes.without(key="cycle.period_us")
+    add("axes", "axes against period", capacity_document(periods, verdicts(periods)), *each, own=others)
+    add("map", "period against axes, cell by cell", map_document(answer.trade_off))
+    if answer.circle is not None:
+        document = circle_document(answer.circle)
+        add("circle", "the circle and its error sources", document, "--contributions")
+    document = assumptions_document(answer.profile, answer.assumptions)
+    add("explain", "what the figures rest on", document, own=elsewhere)
+    return found

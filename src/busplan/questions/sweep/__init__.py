@@ -1,0 +1,253 @@
+"""`busplan.sweep`."""
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import numpy as np
+
+from busplan.errors import BusplanError
+from busplan.forms import ROWS_ENDINGS, RowsForm
+from busplan.forms.blocks import Report
+from busplan.forms.csv_rows import spelled
+from busplan.profile.kinds import words_of
+from busplan.questions.base.answer import Answer
+from busplan.questions.base.inputs import Models, ProfileLike, checked_models, items, load_profile
+from busplan.questions.sweep import blocks as analysis
+from busplan.questions.sweep.asked import Names, Sweep, checked_sweep
+from busplan.questions.sweep.blocks import Column, SweepBlock
+from busplan.questions.sweep.circle_run import circle_blocks, require_circles
+from busplan.questions.sweep.execution import Here
+from busplan.questions.sweep.grid import Array, Grid, Values
+from busplan.questions.sweep.plot import FigureData, require_drawable
+from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
+from busplan.questions.sweep.values import listed, parse_values, stepped
+from busplan.questions.sweep.writers import rows_writer
+from busplan.sections.profile import Profile
+
+MOST_POINTS: Final = 2_000_000
+"""Most points, about half a gigabyte of memory. The command line has no such limit."""
+_NAMES: Final = Names("vary", "timing_model", "circle=True", "summary=True", "force=True")
+_SHOWN: Final = 20
+"""Rows of the report."""
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class SweepAnswer(Answer):
+    """Answer of `sweep`: a table with a row for each point and timing model, in the order of the grid.
+
+    `answer["max_axes"]` is a new array of shape (rows,): numbers (NaN if missing) or words. Iterating gives the names
+    of the columns, `len(answer)` the number of rows.
+
+    Parameters
+    ----------
+    sweep
+        What was asked.
+    blocks
+        The figures, block by block.
+    """
+
+    sweep: Sweep
+    blocks: tuple[SweepBlock, ...]
+
+    @property
+    def profile(self) -> Profile:
+        """The network."""
+        return self.sweep.profile
+
+    @property
+    def grid(self) -> Grid:
+        """The varied keys and their values."""
+        return self.sweep.grid
+
+    @property
+    def timing_models(self) -> tuple[str, ...]:
+        """The timing models, in the order of the rows of a point."""
+        return self.sweep.timing_models
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns: the varied keys, the figures of `capacity`, and those of circle tests."""
+        return self.sweep.columns
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self.columns:
+            raise KeyError(f"no column {name!r}; there are {', '.join(self.columns)}")
+        return np.concatenate(
+            [block.interleaved([_spelled(column) for column in block.columns(name)]) for block in self.blocks]
+        )
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return self.grid.points * len(self.timing_models)
+
+    def keys(self) -> tuple[str, ...]:
+        """Names of all columns; `dict(answer)` is a table."""
+        return self.columns
+
+    def to_json(self) -> str:
+        """Write the document of `busplan sweep --format json`."""
+        return self._rows_in("json").decode()
+
+    def _contents(self) -> Mapping[str, Callable[[], str | bytes]]:
+        rows = {ending: partial(self._rows_in, form) for ending, form in ROWS_ENDINGS.items()}
+        return {**Answer._contents(self), **rows}  # noqa: SLF001 - super() knows no class with slots made anew
+
+    def _svg(self) -> str:
+        """The picture of `busplan sweep --plot`."""
+        require_drawable(self.grid, option="the picture of a sweep")
+        drawn = FigureData(self.sweep)
+        for block in self.blocks:
+            drawn.add(block)
+        return drawn.svg(self.profile.name)
+
+    def _rows_in(self, form: RowsForm) -> bytes:
+        """Every row in a form."""
+        written: list[bytes] = []
+        writer = rows_writer(form, self.sweep, written.append)
+        for block in self.blocks:
+            writer.add(block)
+        writer.finish(complete=True)
+        return b"".join(written)
+
+    def report(self) -> Report:
+        """The answer in blocks."""
+        shown = dict.fromkeys((*self.grid.axes, "timing_model", *default_columns(self.sweep)))
+        top = TopRows(tuple(shown), sort_by=None, ascending=False, top=_SHOWN)
+        tally = Tally(self.sweep)
+        for block in self.blocks:
+            top.add(block)
+            tally.add(block)
+        return sweep_report(top, tally, document=lambda: json.loads(self.to_json()))
+
+
+def _spelled(column: Column) -> Array:
+    if column.words is None:
+        return column.values
+    if any(isinstance(word, bool) for word in column.words):
+        return np.array(column.words, dtype=object)[column.values]
+    words: Array = np.array([str(spelled(word)) for word in column.words])
+    return words[column.values]
+
+
+def sweep(
+    profile: ProfileLike,
+    *,
+    vary: Mapping[str, str | Iterable[object]],
+    timing_model: Models | None = None,
+    circle: bool = False,
+    summary: bool = False,
+    force: bool = False,
+    executor: Executor | None = None,
+) -> SweepAnswer:
+    """Compute capacity over a grid: any keys of the profile, every combination.
+
+    Parameters
+    ----------
+    profile
+        The network: a `Profile`, a path or a shipped name.
+    vary
+        Values by dotted key, in the key's unit: a list, range or array of shape (n,), or text as on the command line:
+        "250:8000:250". They may include words that a key takes, such as "optimal". The last key changes fastest.
+    timing_model
+        Name of a timing model, or several in this order; by default all of the kind of bus. IEEE 1394 has "paper" for
+        the paper's equations as published, and "standard" for the standard's clock and packets.
+    circle
+        Also run the circle test of every point, and add its columns (errors in mm, margins).
+    summary
+        With `circle` and values of delivery.seed: a row for each point of the other keys, with mean, sample standard
+        deviation, 95 % quantile and worst of each figure of the circle over the seeds, and the share that failed.
+    force
+        Allow more than 1,000 circle tests.
+    executor
+        With `circle`: where the tests run, in chunks of about a second; by default in this thread. Any
+        `concurrent.futures.Executor` gives the same answer, and is not shut down. Worker processes must have this
+        version of busplan.
+
+    Returns
+    -------
+    SweepAnswer
+        Columns by name, each an array of shape (points * timing models,), point by point, and for each point timing
+        model by timing model.
+
+    Raises
+    ------
+    BusplanError
+        Not a profile, an invalid key or value, a point whose circle test cannot be run, or too many points.
+    Exception
+        What `executor` raises.
+
+    References
+    ----------
+    Paper, equations (1)-(11).
+
+    Examples
+    --------
+    >>> import busplan
+    >>> answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": [500, 1000, 4000]}, timing_model="standard")
+    >>> answer["safe_axes"]
+    array([ 4, 12, 52])
+    >>> answer["limited_by"].tolist(), len(answer)
+    (['time', 'time', 'time'], 3)
+    """
+    if executor is not None and not (circle and isinstance(executor, Executor)):
+        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
+        raise BusplanError(f"executor{wrong}")
+    network = load_profile(profile)
+    models = None if timing_model is None else checked_models(timing_model, network)
+    if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):
+        raise BusplanError(
+            f'vary {vary!r}: expected keys of the profile and their values, as {{"bus.nodes": range(1, 17)}}'
+        )
+    if summary and not circle:
+        raise BusplanError("summary=True: goes with circle=True")
+    axes = {key: axis_values(network, key, given, name="vary") for key, given in vary.items()}
+    asked = checked_sweep(
+        network, axes, timing_models=models, circle=circle, summary=summary, force=force, names=_NAMES
+    )
+    if asked.grid.points > MOST_POINTS:
+        raise BusplanError(
+            f"vary: {asked.grid.points:,} points are more than the {MOST_POINTS:,} that are kept in memory; vary less, "
+            "or write them with busplan sweep -o FILE.csv"
+        )
+    if circle:
+        where = executor or Here()
+        blocks = circle_blocks(asked, where, cost=require_circles(asked, where))
+    else:
+        blocks = analysis.sweep(network, asked.grid, timing_models=asked.timing_models)
+    return SweepAnswer(asked, tuple(blocks))
+
+
+def axis_values(profile: Profile, key: str, given: str | Iterable[object], *, name: str) -> Values:
+    """Values of a key: text as on the command line, a range, or several values.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    key
+        Dotted key.
+    given
+        The values.
+    name
+        Name of the argument in messages.
+
+    Raises
+    ------
+    BusplanError
+        Not values of the key.
+    """
+    words = words_of(profile, key)
+    if isinstance(given, str):
+        return parse_values(given, name=f"{name} {key}={given}", words=words)
+    name = f"{name} {key}"
+    return (
+        stepped(given, name=name)
+        if isinstance(given, range)
+        else listed(items(given, name=name), name=name, words=words)
+    )

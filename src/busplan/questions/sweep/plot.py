@@ -1,0 +1,123 @@
+"""A figure of a sweep as a picture: curves over one key, heat maps over two."""
+
+from typing import Final
+
+import numpy as np
+
+from busplan.errors import BusplanError
+from busplan.questions.fit.network import bus_of
+from busplan.questions.sweep.asked import Sweep
+from busplan.questions.sweep.blocks import SweepBlock
+from busplan.questions.sweep.grid import Grid
+from busplan.questions.sweep.panels import sweep_svg
+from busplan.questions.sweep.scales import key_label, plot_scale, plotted_figure
+from busplan.questions.sweep.words import Panel, Plotted
+from busplan.sections.base import value_at
+from busplan.sections.profile import Profile
+
+MAX_DRAWN: Final = 250_000
+"""Most points of a figure: more would not be visible."""
+_MAX_KEYS: Final = 2
+
+
+def _default_figure(profile: Profile) -> str:
+    """Column that is drawn if none is asked for; of groups, the most axes are no single number."""
+    return "margin_corrected_us" if profile.group else "safe_axes"
+
+
+def require_drawable(grid: Grid, *, option: str) -> None:
+    """Refuse a grid that cannot be drawn.
+
+    Parameters
+    ----------
+    grid
+        The grid.
+    option
+        What asks for the picture, for messages.
+
+    Raises
+    ------
+    BusplanError
+        More than two keys vary, or there are too many points.
+    """
+    varied = [key for key, axis in grid.axes.items() if axis.size > 1]
+    if not grid.axes:
+        raise BusplanError(f"{option}: draws figures over one or two keys, and none varies but the seed; vary another")
+    if len(varied) > _MAX_KEYS:
+        raise BusplanError(f"{option}: draws one or two keys, and {', '.join(varied)} vary; give the others one value")
+    if grid.points > MAX_DRAWN:
+        raise BusplanError(f"{option}: {grid.points:,} points; a figure shows at most {MAX_DRAWN:,}")
+
+
+class FigureData:
+    """One figure over the whole grid under each timing model, collected block by block.
+
+    Parameters
+    ----------
+    sweep
+        The sweep; its profile is this design, which the picture marks.
+    figure
+        Name of the column; by default the safe axes, or of groups the margin.
+    """
+
+    def __init__(self, sweep: Sweep, *, figure: str | None = None) -> None:
+        self._profile, self._grid, self._models = sweep.profile, sweep.grid, sweep.timing_models
+        self._name = figure or _default_figure(sweep.profile)
+        points = self._grid.points, len(self._models)
+        self._values, self._unsafe = np.full(points, np.nan), np.zeros(points, dtype=bool)
+
+    def add(self, block: SweepBlock) -> None:
+        """Add a block."""
+        points = slice(block.chunk.start, block.chunk.start + block.chunk.points)
+        self._values[points] = block.rows(self._name).reshape(-1, len(self._models))
+        safety = bus_of(self._profile).safety_figure
+        for number, safe in enumerate(block.columns(safety.key) if safety else ()):
+            unsafe = ~safe.are_true.astype(bool) & ~safe.are_missing.astype(bool)
+            self._unsafe[points, number] = np.broadcast_to(unsafe, block.chunk.shape).ravel()
+
+    def svg(self, title: str) -> str:
+        """Draw the collected values; the same sweep gives the same SVG.
+
+        Parameters
+        ----------
+        title
+            Name of the profile, and what was set.
+        """
+        plotted = self.plotted()
+        return sweep_svg(plotted, title=f"{title}: {plotted.label}{self._fixed()}")
+
+    def plotted(self) -> Plotted:
+        """What is drawn, in words and in its unit."""
+        keys = self._varied()
+        figure, factor = plotted_figure(self._profile, self._name)
+        shape = tuple(self._grid.axes[key].size for key in keys)
+        panels = tuple(
+            Panel(model, number, factor * values.reshape(shape), unsafe.reshape(shape))
+            for number, (model, values, unsafe) in enumerate(
+                zip(self._models, self._values.T, self._unsafe.T, strict=True)
+            )
+            if not np.isnan(values).all()  # a figure that the model does not have
+        )
+        as_cells = len(keys) == _MAX_KEYS
+        scales = tuple(plot_scale(self._profile, key, self._grid.axes[key], as_cells=as_cells) for key in keys)
+        if not self._is_own():
+            scales = tuple(one._replace(own=None) for one in scales)
+        bus = bus_of(self._profile)
+        return Plotted(figure, scales, panels, bus.deciding_model, bus.safety)
+
+    def _varied(self) -> list[str]:
+        """Keys with several values; the only key if none has."""
+        varied = [key for key, axis in self._grid.axes.items() if axis.size > 1]
+        return varied or [next(iter(self._grid.axes))]
+
+    def _single(self) -> dict[str, object]:
+        """Keys with one value."""
+        varied = self._varied()
+        return {key: axis.part(0, 1).tolist()[0] for key, axis in self._grid.axes.items() if key not in varied}
+
+    def _is_own(self) -> bool:
+        """Whether the keys with one value have that of this design."""
+        return all(value_at(self._profile, key) == value for key, value in self._single().items())
+
+    def _fixed(self) -> str:
+        return "".join(f"; {key_label(self._profile, key)}: {value}" for key, value in self._single().items())

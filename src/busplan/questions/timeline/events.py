@@ -1,0 +1,215 @@
+"""One communication cycle as a schedule: each event begins where the one before it ends.
+
+This is an independent way to the time that a cycle needs: `capacity` has a closed form, here the events of the bus are
+added one by one, and the end of the last one must be the same.
+"""
+
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from math import fsum
+from typing import Final, NamedTuple
+
+from busplan.buses.cycle import BusEvent
+from busplan.buses.figure import Figure
+from busplan.buses.parts import IDLE
+from busplan.errors import BusplanError
+from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.network import bus_of, leading_model, network_of
+from busplan.sections.profile import Profile
+
+MOST_NODES: Final = 1000
+"""Most nodes laid out one by one: far more than a bus may have, so that a profile beyond its limit can be shown."""
+MOST_EVENTS: Final = 50_000
+"""Most events: those of so many nodes, and more retries or cycle starts than anyone can look at."""
+
+EVENTS: Final = Figure("events", "n", "schedule", "events of one kind in the window", "events", sort="count")
+TOTAL: Final = Figure("total_us", "t", "schedule", "what the events of one kind take together", "time")
+SHARE: Final = Figure("share", "s", "schedule", "share of the window that they take, 0..1", "share", "%", decimals=2)
+
+
+class Event(NamedTuple):
+    """One event of the cycle."""
+
+    kind: str
+    """Key of its kind, defined by the bus."""
+    node: int | None
+    """Node of its transaction, from 1; None for an event of the whole bus."""
+    transaction: str | None
+    packet: str | None
+    """Packet of the transaction, if it belongs to one."""
+    start_us: float
+    end_us: float
+    term: str
+    """Key of the term that it is a part of; empty for idle time."""
+    label: str
+    """What happens, and who does it."""
+
+    @property
+    def duration_us(self) -> float:
+        """Duration, clipped to the window [us]."""
+        return self.end_us - self.start_us
+
+
+class Schedule(NamedTuple):
+    """A cycle, or the part of it inside a window."""
+
+    profile: Profile
+    figures: CapacityFigures
+    """Closed form: time needed, time available, and whether the cycle fits."""
+    cycle_events: tuple[Event, ...]
+    """Events of the whole cycle, and the idle rest of its slice."""
+    from_us: float
+    """Start of the window [us]."""
+    to_us: float
+    """End of the window [us]."""
+
+    @property
+    def end_us(self) -> float:
+        """End of the cycle or of its slice, whichever is later [us]."""
+        return self.cycle_events[-1].end_us
+
+    @property
+    def used_us(self) -> float:
+        """End of the last event that is not idle: the required time as a sum of events [us]."""
+        last = self.cycle_events[-1]
+        return last.start_us if last.kind == IDLE.key else last.end_us
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the window is the whole cycle."""
+        return self.from_us == 0 and self.to_us == self.end_us
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Events inside the window, clipped to it."""
+        return tuple(
+            event._replace(start_us=max(event.start_us, self.from_us), end_us=min(event.end_us, self.to_us))
+            for event in self.cycle_events
+            if event.start_us < self.to_us and event.end_us > self.from_us
+        )
+
+
+class Total(NamedTuple):
+    """Sum of the events of one kind in a window."""
+
+    kind: str
+    events: int
+    total_us: float
+    share: float
+    """Share of the window, 0..1."""
+
+
+def schedule(profile: Profile, *, model: str | None = None) -> Schedule:
+    """Lay out one communication cycle, node by node.
+
+    The events of the bus, then the idle rest of the slice. There are no events of zero duration.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    model
+        Timing model; without it the one whose figures lead.
+
+    Raises
+    ------
+    BusplanError
+        More nodes or events than can be laid out one by one.
+
+    References
+    ----------
+    Paper, section III-C and equation (2), Figs. 4, 5 and 7.
+
+    Examples
+    --------
+    >>> from busplan.profile.shipped import load
+    >>> plan = schedule(load("paper-two-node").profile)
+    >>> [event.kind for event in plan.events][2:5]
+    ['request_data', 'acknowledge', 'execution']
+    >>> abs(plan.used_us - plan.figures.required_us) < 1e-9
+    True
+    """
+    network, bus = network_of(profile), bus_of(profile)
+    nodes = int(network.nodes)
+    if nodes > MOST_NODES:
+        limit = bus.limit("nodes")
+        carries = "" if limit is None else f"; one bus carries {limit.most(network):g}"
+        where = "bus.nodes" if network.is_uniform else "nodes of all groups"
+        raise BusplanError(f"{where} = {nodes}: a timeline shows up to {MOST_NODES} nodes{carries}")
+    model = leading_model(profile) if model is None else model
+    closed = figures(profile, model=model)
+    events = list(islice(_laid_out(cycle_of(profile, model=model).events()), MOST_EVENTS + 1))
+    if len(events) > MOST_EVENTS:
+        raise BusplanError(f"a timeline shows up to {MOST_EVENTS:,} events, and this cycle has more")
+    end_us = events[-1].end_us
+    # A rest that is only float rounding is no idle time.
+    if not fits_in(closed.available_us, available_us=end_us):
+        events.append(Event(IDLE.key, None, None, None, end_us, closed.available_us, "", IDLE.label))
+    return Schedule(profile, closed, tuple(events), from_us=0.0, to_us=events[-1].end_us)
+
+
+def zoom(
+    plan: Schedule,
+    *,
+    from_us: float | None = None,
+    to_us: float | None = None,
+    transaction: tuple[str, int] | None = None,
+) -> Schedule:
+    """Narrow the window of a schedule to the intersection of all given limits.
+
+    Parameters
+    ----------
+    plan
+        The schedule.
+    from_us, to_us
+        Start and end of the window, from the start of the cycle [us]; by default the schedule's own.
+    transaction
+        One transaction with its gaps: ("read", 1).
+
+    Raises
+    ------
+    BusplanError
+        The window is empty.
+    """
+    start_us = max(plan.from_us, plan.from_us if from_us is None else from_us)
+    end_us = min(plan.to_us, plan.to_us if to_us is None else to_us)
+    span = f"the cycle runs from 0 to {plan.end_us:.12g} us"
+    if transaction is not None:
+        own = [event for event in plan.cycle_events if (event.transaction, event.node) == transaction]
+        if not own:
+            raise BusplanError(f"{transaction[0]}:{transaction[1]}: no such transaction in this cycle")
+        start_us, end_us = max(start_us, own[0].start_us), min(end_us, own[-1].end_us)
+        owner = f"the {transaction[0]} of node {transaction[1]}"
+        span = f"{owner} runs from {own[0].start_us:.12g} to {own[-1].end_us:.12g} us"
+    if not start_us < end_us:
+        shown = " ".join(
+            f"{word} {value:.12g} us" for word, value in (("from", from_us), ("to", to_us)) if value is not None
+        )
+        raise BusplanError(f"the window {shown} shows nothing: {span}")
+    return plan._replace(from_us=start_us, to_us=end_us)
+
+
+def totals(plan: Schedule) -> tuple[Total, ...]:
+    """Sum the events of a window by kind, in order of first appearance."""
+    sums: dict[str, list[float]] = {}
+    for event in plan.events:
+        sums.setdefault(event.kind, []).append(event.duration_us)
+    window_us = plan.to_us - plan.from_us
+    return tuple(Total(kind, len(parts), fsum(parts), fsum(parts) / window_us) for kind, parts in sums.items())
+
+
+def _laid_out(parts: Iterable[BusEvent]) -> Iterator[Event]:
+    """Place events one after the other.
+
+    Compensated summation (Neumaier) keeps rounding from growing with the number of events.
+    """
+    total_us = lost_us = start_us = 0.0
+    for one in parts:
+        larger_us, smaller_us = max(total_us, one.us), min(total_us, one.us)
+        total_us = larger_us + smaller_us
+        lost_us += (larger_us - total_us) + smaller_us
+        end_us = total_us + lost_us
+        if end_us > start_us:
+            yield Event(one.kind, one.node, one.transaction, one.packet, start_us, end_us, one.term, one.label)
+            start_us = end_us

@@ -1,0 +1,87 @@
+"""The whole period with its slice, and what each timing model leaves of the slice: what all drawings of it share."""
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from busplan.buses.figure import MARGIN, REQUIRED
+from busplan.forms.blocks import figure_value
+from busplan.forms.numbers import with_unit
+from busplan.questions.fit.figures import CapacityFigures, figures
+from busplan.questions.fit.network import model_names
+from busplan.questions.timeline.events import Event, Schedule
+from busplan.questions.timeline.lanes import overruns, time_text
+
+REST: Final = "rest of the period"
+NEEDED: Final = "needed"
+LEFT: Final = "margin"
+BEYOND: Final = "beyond the slice"
+
+
+class PeriodPart(NamedTuple):
+    """A part of the period."""
+
+    label: str
+    start_us: float
+    end_us: float
+
+
+class ModelBar(NamedTuple):
+    """What one timing model needs of the slice."""
+
+    timing_model: str
+    figures: CapacityFigures
+
+    @property
+    def words(self) -> str:
+        """Time needed and margin, as "207.117 us needed, margin 1792.883 us"."""
+        needed = with_unit(figure_value(REQUIRED, self.figures.required_us))
+        if self.figures.margin_us < 0:
+            return f"{needed} needed, {with_unit(figure_value(MARGIN, -self.figures.margin_us))} short"
+        return f"{needed} needed, margin {with_unit(figure_value(MARGIN, self.figures.margin_us))}"
+
+    @property
+    def spans(self) -> Iterator[PeriodPart]:
+        """The time needed, what is left of the slice or goes beyond it, and the rest of the period."""
+        needed_us, slice_us = self.figures.required_us, self.figures.available_us
+        yield PeriodPart(NEEDED, 0.0, min(needed_us, slice_us))
+        used_us = max(needed_us, slice_us)
+        if used_us > min(needed_us, slice_us):
+            yield PeriodPart(LEFT if slice_us > needed_us else BEYOND, min(needed_us, slice_us), used_us)
+        if self.figures.period_us > used_us:
+            yield PeriodPart(REST, used_us, self.figures.period_us)
+
+
+def model_bars(plan: Schedule) -> tuple[ModelBar, ...]:
+    """What each timing model that can express the profile needs of its slice.
+
+    Parameters
+    ----------
+    plan
+        The schedule, under one of them.
+    """
+    drawn = plan.figures
+    return tuple(
+        ModelBar(model, drawn if model == drawn.timing_model else figures(plan.profile, model=model))
+        for model in model_names(plan.profile)
+    )
+
+
+def period_end_us(plan: Schedule, bars: tuple[ModelBar, ...]) -> float:
+    """End of the period, or of a cycle that takes longer [us]."""
+    return max(plan.figures.period_us, plan.end_us, *(one.figures.required_us for one in bars))
+
+
+def rest(plan: Schedule) -> Event | None:
+    """The part of the period behind slice and cycle; None if there is none."""
+    if plan.end_us >= plan.figures.period_us:
+        return None
+    return plan.cycle_events[-1]._replace(start_us=plan.end_us, end_us=plan.figures.period_us)
+
+
+def period_title(plan: Schedule) -> str:
+    """Title of the strip above the lanes."""
+    figures = plan.figures
+    period, slice_ = time_text(figures.period_us), time_text(figures.available_us)
+    if overruns(plan):
+        return f"The period of {period} us: its cycle of {time_text(plan.end_us)} us is beyond its slice of {slice_} us"
+    return f"The period of {period} us and its slice of {slice_} us"

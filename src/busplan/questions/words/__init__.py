@@ -1,0 +1,1 @@
+"""Sentences, tables and drawings that several questions share."""

@@ -1,0 +1,171 @@
+"""Sentences that several answers share: what refuses a circle, warns, is unknown or is not tested."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from busplan.buses.figure import (
+    AVAILABLE,
+    MARGIN,
+    MARGIN_CORRECTED,
+    REQUIRED,
+    UNCERTAINTY,
+    UTILISATION,
+)
+from busplan.buses.published import parts_tested
+from busplan.forms.blocks import (
+    Code,
+    Part,
+    Record,
+    Sentence,
+    ShownValue,
+    attribute_value,
+    joined,
+    sentence,
+)
+from busplan.forms.numbers import period_value
+from busplan.questions.fit.certainty import limits_behind
+from busplan.questions.fit.circle_refusal import circle_refusals
+from busplan.questions.fit.cycle import TIME
+from busplan.questions.fit.figures import CapacityFigures
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.profile import Profile
+
+if TYPE_CHECKING:
+    from busplan.buses.bus import Bus
+
+
+def refused_circle(profile: Profile) -> Iterator[Sentence]:
+    """Say why the circle that a profile asks for cannot be run; nothing where it can.
+
+    It stands first in every answer with a verdict: a plan whose circle nobody can run is none.
+    """
+    causes = circle_refusals(profile)
+    if causes:
+        subject = ("The circle of ", Code(profile.name), " cannot be run at ", period_value(profile.cycle.period_us))
+        yield Sentence((*subject, ": ", ", and ".join(cause.message for cause in causes), "."), "fails")
+
+
+def warnings(profile: Profile, *, nodes: int, most: int) -> list[str]:
+    """Warnings, whatever the verdict.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    nodes
+        Nodes on the bus [1].
+    most
+        Largest number of nodes in the report [1]; 0 if it has none.
+    """
+    return bus_of(profile).warnings(network_of(profile), nodes=[number for number in (nodes, most) if number])
+
+
+def warning_sentences(profile: Profile, *, nodes: int, most: int) -> Iterator[Sentence]:
+    """Warnings as sentences; see `warnings`."""
+    return (Sentence((words,), "warns") for words in warnings(profile, nodes=nodes, most=most))
+
+
+def execution_sentence(profile: Profile, *, of_latency: bool = False) -> Iterator[Sentence]:
+    """Say how the execution time behind the figures is known; nothing without a grade, or where none is in them.
+
+    Parameters
+    ----------
+    profile
+        The network.
+    of_latency
+        Whether the figures are latencies, and not those of the cycle.
+    """
+    grades, bus, network = execution_grades(profile), bus_of(profile), network_of(profile)
+    has_execution = bus.latency_has_execution(network) if of_latency else bus.has_execution(network)
+    if grades is not None and has_execution:
+        text = f"The execution time behind these figures is {grades}."
+        yield sentence(text, state="warns" if "assumed" in grades else "neutral")
+
+
+def execution_grades(profile: Profile) -> str | None:
+    """Grade of the execution time; where groups differ, each with the groups that have it. None without a grade."""
+    names: dict[str, list[str]] = {}
+    for one in profile.alike_nodes:
+        names.setdefault(one.node.execution.grade or "without a grade", []).append(one.name)
+    if len(names) == 1:
+        return profile.alike_nodes[0].node.execution.grade  # type: ignore[no-any-return]
+    return ", ".join(f"{grade} of {' and '.join(each)}" for grade, each in names.items())
+
+
+def broken_limits(figures: CapacityFigures, profile: Profile) -> list[str]:
+    """Say by how much each limit of the bus is broken, or why it is not shown to be kept."""
+    broken = map(bus_of(profile).limit, limits_behind(figures))
+    network = network_of(profile)._replace(period_us=figures.period_us)
+    return [limit.words(network) for limit in broken if limit is not None]
+
+
+def evidence_sentence(bus: "Bus") -> Iterator[Sentence]:
+    """Say by part what of a kind figures of others set and test; nothing where they test all of it."""
+    found = parts_tested(bus.evidence_data)
+    kind = f"{bus.title} (kind {bus.kind})"
+    if not found.parts:
+        yield Sentence((f"No figure that others have published or measured tests the model of {kind}.",))
+    elif found.untested:
+        said = {"set by figures of others": found.set_by, "tested by others": found.parts}
+        each = (
+            f"{how}: {', '.join(f'{part} ({by})' for part, by in parts.items())}"
+            for how, parts in said.items()
+            if parts
+        )
+        yield Sentence((f"Of {kind} {'; '.join(each)}; not tested: {', '.join(found.untested)}.",))
+
+
+def not_applicable(profile: Profile) -> Iterator[Sentence]:
+    """Say which timing models cannot express a profile, and why."""
+    bus = bus_of(profile)
+    for model in bus.timing_models:
+        keys = bus.cannot_express(network_of(profile), model=model.name)
+        if keys:
+            yield Sentence((f"The {model.name} model is not applicable: it has no {', '.join(keys)}.",))
+
+
+def reset_sentence(after: CapacityFigures | None, profile: Profile) -> Iterator[Sentence]:
+    """Say that a plan stops fitting at a bus reset; nothing if it does not."""
+    if after is not None:
+        keys = ", ".join(f"{key} = {value}" for key, value in bus_of(profile).reset_changes.items())
+        text = f"After a bus reset, with {keys} until it is set again, the verdict is: {after.verdict}."
+        yield sentence(text, state="warns")
+
+
+def story(figures: CapacityFigures, profile: Profile) -> tuple[Part, ...]:
+    """Say what a cycle leaves of its slice under one timing model, or what it lacks; no verdict.
+
+    Parameters
+    ----------
+    figures
+        The figures.
+    profile
+        The network.
+    """
+    available = attribute_value(AVAILABLE, figures)
+    if figures.fits:
+        used = attribute_value(UTILISATION, figures)._replace(decimals=1)
+        return sentence("{} to spare, {} of {} used", attribute_value(MARGIN, figures), used, available).parts
+    short = ShownValue(-figures.margin_us, MARGIN.key, "us", 3)
+    reasons = [Sentence((words,)) for words in broken_limits(figures, profile)]
+    if TIME in figures.exceeded:
+        reasons.append(sentence("{} short, {} needed of {}", short, attribute_value(REQUIRED, figures), available))
+    return joined(*reasons, by=", and ").parts
+
+
+def margin_parts(figures: CapacityFigures) -> tuple[Part, ...]:
+    """A corrected margin with its uncertainty, as far as that is known.
+
+    Parameters
+    ----------
+    figures
+        Figures under the timing model that decides.
+    """
+    margin, doubt = (attribute_value(one, figures) for one in (MARGIN_CORRECTED, UNCERTAINTY))
+    return (margin,) if figures.uncertainty_us is None else (margin, " +/- ", doubt)
+
+
+def safety_record(figures: CapacityFigures, profile: Profile) -> Record:
+    """Whether the settings of the bus are safe, by the key of its kind; empty if the kind has none."""
+    safety = bus_of(profile).safety_figure
+    return {} if safety is None else {safety.key: figures.safe}

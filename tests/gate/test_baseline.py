@@ -1,0 +1,244 @@
+"""The baseline: what is a regression, what is none, and what is no baseline."""
+
+import json
+from collections.abc import Callable
+
+import pytest
+
+from busplan.errors import BusplanError
+from busplan.gate.baseline import MODELS, Baseline, Record, read_baseline, write_baseline
+from busplan.gate.gate import FileResult, check_document
+from busplan.gate.regression import fallen
+from busplan.profile.document import Document
+from busplan.profile.shipped import load
+
+Changed = Callable[..., str]
+Check = Callable[..., FileResult]
+
+
+def record(result: FileResult, *, keys: bool = True) -> Record:
+    """What a baseline holds of a result; an older one has no keys."""
+    return Record(result.figures, result.keys if keys else None)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"),
+    [
+        ("axes = 4", "axes = 3", "node.axes", "3, was 4: safe axes fell from 56 to 42, most axes from 60 to 45"),
+        (
+            "nodes = 2",
+            "nodes = 3",
+            "bus.nodes",
+            "3, was 2: corrected margin fell from 1806.3 to 1704.4 us, margin from ",
+        ),
+        # A hundredth of a microsecond has two decimals.
+        (
+            "period_us = 4000",
+            "period_us = 3999.98",
+            "cycle.period_us",
+            "corrected margin fell from 1806.28 to 1806.27 us",
+        ),
+        ("period_us = 4000", "period_us = 3000", "cycle.period_us", "3000, was 4000: safe axes fell from 56 to "),
+        ("base_us = 30", "base_us = 31", "node.execution.base_us", "31, was 30: corrected margin fell from "),
+    ],
+)
+def test_a_loss_of_axes_or_margin_is_one_error_at_the_key_that_costs_it(
+    old: str, new: str, key: str, words: str, clean: str, changed: Changed, check: Check
+) -> None:
+    (finding,) = check(changed((old, new)), baseline=record(check(clean))).findings
+    assert (finding.code, finding.severity, finding.key) == ("BP301", "error", key)
+    assert words in finding.problem
+    assert finding.help == "if that is meant, record it with --update-baseline"
+    # An older baseline does not know the key, and says the same figures at the name.
+    (older,) = check(changed((old, new)), baseline=record(check(clean), keys=False)).findings
+    assert (older.code, older.key, older.line) == ("BP301", "name", 2)
+    assert older.problem.removeprefix("name: ") == finding.problem.rpartition(": ")[2]
+
+
+def test_keys_that_cost_nothing_are_not_blamed(clean: str, changed: Changed, check: Check) -> None:
+    others = (('name = "example"', 'name = "other"'), ("read_bytes = 12", "read_bytes = 8"), ("axes = 4", "axes = 5"))
+    text = changed(*others, ("period_us = 4000", "period_us = 3000"), more="\n[tolerance]\nmax_contour_error_mm = 1\n")
+    (finding,) = check(text, baseline=record(check(clean)), with_circle=False).findings
+    assert finding.problem.startswith("cycle.period_us: 3000, was 4000: safe axes fell ")
+
+
+def test_several_keys_that_cost_something_are_one_finding(clean: str, changed: Changed, check: Check) -> None:
+    pairs = [('gap_count = "optimal"', "gap_count = 10"), ("nodes = 2", "nodes = 3"), ("base_us = 30", "base_us = 40")]
+    text = changed(*pairs, ("period_us = 4000", "period_us = 3900  # busplan: ignore[BP301] meant"))
+    found = check(text, baseline=record(check(clean))).findings
+    (finding,) = [one for one in found if one.code == "BP301"]
+    assert finding.key == "bus.gap_count"
+    assert '10, was "optimal"; bus.nodes = 3, was 2; cycle.period_us = 3900, was 4000; and 1 more: ' in finding.problem
+
+
+def test_a_key_that_is_no_longer_said_has_its_default(clean: str, changed: Changed, check: Check) -> None:
+    (finding,) = [
+        one
+        for one in check(changed(('gap_count = "optimal"\n', "")), baseline=record(check(clean))).findings
+        if one.code == "BP301"
+    ]
+    assert finding.problem.startswith('bus.gap_count: 63, was "optimal": ')
+    assert finding.line == 4  # [bus], which has it no more
+    # And one that is said for the first time was its default before.
+    before = record(check(changed(('gap_count = "optimal"', "gap_count = 63"))))
+    assert before.keys is not None
+    unsaid = Record(before.figures, {key: one for key, one in before.keys.items() if key != "bus.gap_count"})
+    text = changed(('gap_count = "optimal"', "gap_count = 63"), ("nodes = 2", "nodes = 3"))
+    (finding,) = [one for one in check(text, baseline=unsaid).findings if one.code == "BP301"]
+    assert finding.problem.startswith("bus.nodes: 3, was 2: ")
+
+
+def test_changes_that_go_together_are_all_named(clean: str, changed: Changed, check: Check) -> None:
+    # Neither key of the new kind can be taken back alone, so nobody can tell which of them it was.
+    linear = 'kind = "linear"\ngrade = "measured"\nbase_us = 30\nper_byte_us = 0.35'
+    table = 'kind = "table"\ngrade = "measured"\npayload_bytes = [8, 16]\ntime_us = [90, 91]'
+    (finding,) = check(changed((linear, table)), baseline=record(check(clean))).findings
+    assert finding.problem.startswith('node.execution.kind: "table", was "linear"; ')
+    assert "node.execution.payload_bytes = [8, 16], was not set" in finding.problem
+
+
+def test_figures_that_fell_with_no_key_changed_stand_at_the_name(clean: str, check: Check) -> None:
+    before = record(check(clean))
+    more = Record({**before.figures, "standard.safe_axes": 60}, before.keys)
+    (finding,) = check(clean, baseline=more).findings
+    assert finding.problem == "name: safe axes fell from 60 to 56"
+
+
+def test_a_group_is_named_in_its_key_and_its_figures() -> None:
+    document = load("gantry-24").document
+    before = record(check_document(document))
+    name = next(key for key in before.keys or {} if key.endswith(".nodes"))
+    group = name.split(".")[1]
+    text = document.text.replace("slice_ratio = 0.8", "slice_ratio = 0.7")
+    (finding,) = [one for one in check_document(Document("a", text), baseline=before).findings if one.code == "BP301"]
+    assert finding.problem.startswith("cycle.slice_ratio: 0.7, was 0.8: safe nodes of ")
+    assert f"nodes of {group} " in finding.problem
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("axes = 4", "axes = 5"), ("period_us = 4000", "period_us = 4001"), ("nodes = 2", "nodes = 1")],
+)
+def test_a_gain_is_fine(old: str, new: str, clean: str, changed: Changed, check: Check) -> None:
+    assert check(changed((old, new)), baseline=record(check(clean))).findings == ()
+
+
+def test_the_same_is_fine_and_a_profile_without_a_record_too(clean: str, check: Check) -> None:
+    assert check(clean, baseline=record(check(clean))).findings == ()
+    assert check(clean, baseline=Record({})).findings == ()
+
+
+def test_it_goes_by_figure_and_not_by_line(clean: str, changed: Changed, check: Check) -> None:
+    recorded = record(check(clean))
+    moved = "# one\n\n# two\n" + clean.replace("[bus]", "# three\n[bus] # four")
+    assert check(moved, baseline=recorded).findings == ()
+    before = check(changed(("nodes = 2", "nodes = 3")), baseline=recorded)
+    after = check("# one\n\n" + changed(("nodes = 2", "nodes = 3")), baseline=recorded)
+    assert [one.line + 2 for one in before.findings] == [one.line for one in after.findings]
+    assert [one.message for one in before.findings] == [one.message for one in after.findings]
+
+
+def test_both_timing_models_are_held() -> None:
+    now = {"paper.margin_us": 10.0, "standard.margin_us": 5.0}
+    assert fallen(now, {"paper.margin_us": 10.0, "standard.margin_us": 6.0}) == {"standard.margin_us": (6.0, 5.0)}
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "lost"),
+    [
+        (100.0, 100.0 * (1 - 1e-12), False),
+        (100.0, 100.0 * (1 - 1e-6), True),
+        (0.0, -1e-12, False),
+        (0.0, -1e-6, True),
+        (-5.0, -5.1, True),
+        (-5.0, -4.9, False),
+    ],
+)
+def test_rounding_is_no_loss(before: float, now: float, lost: bool) -> None:
+    assert bool(fallen({"paper.margin_us": now}, {"paper.margin_us": before})) is lost
+
+
+def test_what_is_written_can_be_read_and_is_sorted_by_path(check: Check, clean: str) -> None:
+    figures, each = check(clean).figures, record(check(clean))
+    text = write_baseline({"b.toml": each, "a.toml": each, "ü\udc80.toml": Record({})})
+    assert list(json.loads(text)["profiles"]) == ["a.toml", "b.toml", "ü\udc80.toml"]
+    assert list(json.loads(text)["keys"]) == ["a.toml", "b.toml"]
+    assert read_baseline(text, name="b.json") == Baseline(
+        {"a.toml": each, "b.toml": each, "ü\udc80.toml": Record({})}, MODELS
+    )
+    # What the file says, and no words that change no figure.
+    assert each.keys is not None
+    assert each.keys["bus.gap_count"] == "optimal"
+    assert not {"name", "description", "schema_version", "bus.max_hops"} & set(each.keys)
+    # What a user may rely on is the verdict's: the closed forms of the paper have no such figures.
+    assert set(figures) == {
+        *("paper.max_axes", "paper.margin_us", "standard.max_axes", "standard.margin_us"),
+        *("standard.safe_axes", "standard.margin_corrected_us"),
+    }
+
+
+GOOD = {"schema": 1, "command": "baseline", "profiles": {"a.toml": {"paper.max_axes": 4}}}
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        "",
+        "{",
+        "[]",
+        "null",
+        '"text"',
+        "[" * 100_000,
+        "1" * 5_000,
+        json.dumps(GOOD)[:-1],
+        json.dumps({**GOOD, "schema": 2}),
+        json.dumps({**GOOD, "schema": None}),
+        json.dumps({**GOOD, "command": "check"}),
+        json.dumps({**GOOD, "models": "2"}),
+        json.dumps({**GOOD, "models": True}),
+        json.dumps({**GOOD, "models": 2.0}),
+        json.dumps({**GOOD, "models": None}),
+        json.dumps({**GOOD, "keys": []}),
+        json.dumps({**GOOD, "keys": {"a.toml": [1]}}),
+        json.dumps({**GOOD, "keys": {"a.toml": {"bus.nodes": None}}}),
+        json.dumps({**GOOD, "keys": {"a.toml": {"bus.nodes": {"a": 1}}}}),
+        json.dumps({**GOOD, "keys": {"a.toml": {"bus.nodes": [[1]]}}}),
+        json.dumps({**GOOD, "keys": {"a.toml": {"bus.nodes": float("nan")}}}),
+        json.dumps({**GOOD, "profiles": []}),
+        json.dumps({**GOOD, "profiles": {"a.toml": []}}),
+        json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": "4"}}}),
+        json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": True}}}),
+        json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": None}}}),
+        json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": float("nan")}}}),
+        json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": float("inf")}}}),
+        json.dumps({**GOOD, "profiles": {"a.toml": {"paper.max_axes": 10**400}}}),
+    ],
+    ids=lambda text: text[:60],
+)
+def test_what_is_no_baseline_is_refused_in_one_message(document: str) -> None:
+    with pytest.raises(BusplanError, match="remove it, and record one with --update-baseline") as caught:
+        read_baseline(document, name="b.json")
+    assert len(caught.value.problems) == 1
+    assert str(caught.value).startswith("b.json: ")
+
+
+def test_a_good_one_is_read() -> None:
+    (one,) = read_baseline(json.dumps(GOOD), name="b.json").profiles.values()
+    assert one == Record({"paper.max_axes": 4})
+
+
+@pytest.mark.parametrize(("models", "is_current"), [(None, False), (1, False), (MODELS, True), (MODELS + 1, False)])
+def test_a_record_of_other_timing_models_is_read_and_known_for_it(models: int | None, is_current: bool) -> None:
+    document = GOOD if models is None else {**GOOD, "models": models}
+    found = read_baseline(json.dumps(document), name="b.json")
+    assert (found.models, found.is_current) == (models or 1, is_current)
+
+
+def test_safe_axes_are_held_where_the_closed_form_still_has_them(clean: str, check: Check) -> None:
+    # 2097.465 us make 15 nodes safe and 1942.386 us are needed: a reserve takes safe nodes, and no others.
+    before = record(check(clean))
+    now = check(f"{clean}\n[limits]\nreserve = 0.1\n", baseline=before)
+    assert [(one.code, one.key) for one in now.findings] == [("BP301", "limits.reserve")]
+    # 1911.497 us for 14 nodes, and 1737.510 us for 13, of 1800 us.
+    assert now.findings[0].problem.endswith("0.1, was 0: safe axes fell from 56 to 52")
+    assert now.figures["standard.max_axes"] == before.figures["standard.max_axes"] == 60

@@ -1,0 +1,622 @@
+"""The gate's formats: each is what the programs that read it expect, whatever a file or key is called."""
+
+import csv
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote_to_bytes, urlsplit
+from xml.etree import ElementTree as ET
+
+import jsonschema
+import pytest
+from pydantic import ValidationError
+from pydantic_sarif.model import StaticAnalysisResultsFormatSarifVersion210JsonSchema as SarifLog
+
+from busplan.buses.rule import RuleProblem
+from busplan.forms import csv_rows, html, markdown, terminal
+from busplan.forms.blocks import Sentence
+from busplan.gate.answer import check_report
+from busplan.gate.finding import Finding, finding_of
+from busplan.gate.formats import FORMATS, GateFormat, gate_format
+from busplan.gate.formats.full import Full
+from busplan.gate.formats.plain import Concise
+from busplan.gate.gate import FileResult, check_document
+from busplan.gate.registry import all_rules
+from busplan.gate.report import CheckReport
+from busplan.profile.document import Document, Spot
+from busplan.profile.schema import profile_schema
+from busplan.profile.shipped import load, shipped_names
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "tests" / "gate" / "examples"
+CLEAN = (EXAMPLES / "BP001" / "valid.toml").read_text(encoding="utf-8")
+WARNS = CLEAN.replace('"optimal"', "63")
+FAILS = WARNS.replace("period_us = 4000", "period_us = 300")
+
+HOSTILE = (
+    "plain.toml",
+    "100% of, it: a\r\nb.toml",
+    "::error::a.toml",
+    "a b/ü/日本.toml",
+    "a<b>&\"'.toml",
+    "\x00\x07\x1b[31m\x85\u2028\ufffe.toml",
+    "\udcff.toml",
+    "]]>.toml",
+    "#?;.toml",
+    "C:\\a.toml",
+)
+
+
+def checked(text: str, *, path: str = "p/a.toml") -> FileResult:
+    return check_document(Document(path, text))
+
+
+def report(*files: FileResult) -> CheckReport:
+    return CheckReport(files)
+
+
+def render(found: CheckReport, *, file_format: str) -> str:
+    return gate_format(file_format).write(found)
+
+
+def finding_at(spot: Spot, *, words: str = "message", code: str = "BP002", **mending: Any) -> Finding:
+    rule = all_rules()[code]
+    return finding_of(rule, RuleProblem("key", words, **mending), spot, words=words)
+
+
+def hostile() -> Iterator[FileResult]:
+    for number, name in enumerate(HOSTILE):
+        code, cure = ("BP002" if number % 2 else "BP110"), (f"{name} = 1",)
+        finding = finding_at(Spot(1, 1, 1, 2), words=name, code=code, help=name, cure=cure)
+        yield FileResult(name, name, (finding, finding), {}, (name, name))
+    yield FileResult("gone\n.toml", None, (), {}, failure="gone\n.toml: no\x1bsuch, file: 100 %")
+
+
+@pytest.fixture
+def mixed() -> CheckReport:
+    return report(
+        checked(CLEAN, path="p/clean.toml"),
+        checked(FAILS, path="p/fails.toml"),
+        checked("a =", path="p/broken.toml"),
+        FileResult("gone.toml", None, (), {}, failure="gone.toml: no such file"),
+    )
+
+
+# The register
+
+
+def test_a_format_is_a_class_of_its_own_and_loads_alone() -> None:
+    made = [gate_format(name) for name in FORMATS]
+    assert all(isinstance(one, GateFormat) for one in made)
+    # The old name of concise is the one name too many.
+    assert type(gate_format("text")) is type(gate_format("concise"))
+    assert len({type(one) for one in made}) == len(made) - 1 == 8
+    assert [name for name, one in FORMATS.items() if one.reader == "people"] == ["concise", "full", "text"]
+    # Each in a process of its own, which has loaded what none of them goes without.
+    code = (
+        "import os, sys; from busplan.gate.formats import FORMATS, gate_format\n"
+        "for name in FORMATS:\n"
+        "    if not os.fork():\n"
+        "        gate_format(name)\n"
+        "        print(*(one for one in sys.modules if one.startswith('busplan.gate.formats.')), flush=True)\n"
+        "        os._exit(0)\n"
+        "    assert os.wait()[1] == 0\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    for line, one in zip(run.stdout.splitlines(), FORMATS.values(), strict=True):
+        # GitHub's log has the plain lines, JUnit their words, and our own document those of the answer.
+        assert set(line.split()) <= {f"busplan.gate.formats.{module}" for module in (one.module, "plain")}
+        assert f"busplan.gate.formats.{one.module}" in line.split()
+
+
+# The answer in blocks
+
+
+def test_the_answer_says_findings_failures_and_what_they_add_up_to(mixed: CheckReport) -> None:
+    answer = check_report(mixed)
+    assert terminal.text(answer).splitlines() == [
+        *render(mixed, file_format="concise").splitlines(),
+        "gone.toml: no such file",
+        "checked 3 profiles: 2 errors, 1 warning; 1 could not be checked",
+    ]
+    states = [block.state for block in answer.blocks() if isinstance(block, Sentence)]
+    assert states == ["warns", "fails", "fails", "fails", "fails"]
+    clean = check_report(report(checked(CLEAN)))
+    assert [block.state for block in clean.blocks() if isinstance(block, Sentence)] == ["passes"]
+    *_, warned = check_report(report(checked(WARNS))).blocks()
+    assert isinstance(warned, Sentence)
+    assert warned.state == "warns"
+
+
+def test_the_answer_takes_every_name_in_every_form() -> None:
+    found = report(*hostile())
+    answer = check_report(found)
+    assert len(terminal.text(answer).splitlines()) == 2 * len(HOSTILE) + 2
+    rows = list(csv.DictReader(io.StringIO(csv_rows.text(answer), newline="")))
+    assert len(rows) == 2 * len(HOSTILE)
+    assert {row["code"] for row in rows} == {"BP002", "BP110"}
+    assert "<b>&" not in html.page(answer)
+    assert "::error::a.toml:1:1:" in markdown.text(answer)
+
+
+# JSON
+
+
+def test_json_holds_the_contract(mixed: CheckReport) -> None:
+    document = json.loads(render(mixed, file_format="json"))
+    assert list(document) == ["schema", "command", "files", "summary"]
+    assert (document["schema"], document["command"]) == (1, "check")
+    assert document["summary"] == {"files": 4, "errors": 2, "warnings": 1}
+    assert [(one["path"], one["profile"], one["status"]) for one in document["files"]] == [
+        ("p/clean.toml", "example", "ok"),
+        ("p/fails.toml", "example", "findings"),
+        ("p/broken.toml", None, "findings"),
+        ("gone.toml", None, "error"),
+    ]
+    for one in document["files"]:
+        own = {"path", "profile", "status", "verdict", "margin_corrected_us", "uncertainty_us", "findings"}
+        assert set(one) - {"failure"} == own
+        assert (one["verdict"] is None) == (one["profile"] is None) == (one["uncertainty_us"] is None)
+    assert [one["verdict"] for one in document["files"][:2]] == ["fits", "does not fit"]
+    (first, second) = document["files"][1]["findings"]
+    assert list(first) == [
+        *("code", "rule", "severity", "message", "key", "line", "column", "marked_column", "marked_end_column"),
+        *("problem", "help", "cure"),
+    ]
+    assert (first["code"], first["key"], first["line"], first["column"]) == ("BP110", "bus.gap_count", 7, 1)
+    assert (first["marked_column"], first["marked_end_column"]) == (13, 15)  # gap_count = 63
+    assert (first["help"], first["cure"]) == (None, None)
+    assert first["message"] == first["problem"]
+    assert second["cure"].endswith("\nbus.gap_count = 7")
+    joined = second["cure"].replace("\n", ", ")
+    assert second["message"] == f"{second['problem']}; cheapest cure: {joined}"
+    assert (second["rule"], second["severity"]) == ("slice-overrun", "error")
+    assert document["files"][3]["failure"] == "gone.toml: no such file"
+
+
+# Every format takes everything
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_no_name_breaks_a_format(format_: str) -> None:
+    text = render(report(*hostile()), file_format=format_)
+    # As the command writes it: what is no UTF-8 as an escape.
+    written = text.encode("utf-8", "backslashreplace").decode("utf-8")
+    assert written.endswith("\n")
+    assert not re.search(r"[\x00-\x09\x0b-\x1f]", written)
+    if format_ in ("json", "gitlab", "sarif"):
+        json.loads(written)
+    else:
+        assert not re.search(r"[\x7f-\x9f\u2028]", written)
+    if format_ == "junit":
+        ET.fromstring(written)
+    if format_ in ("concise", "text", "github"):
+        assert len(written.splitlines()) == 2 * len(HOSTILE)
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_nothing_at_all_is_still_a_document(format_: str) -> None:
+    text = render(report(), file_format=format_)
+    assert (text == "") == (format_ in ("concise", "text", "full", "github"))
+
+
+# concise and full
+
+
+def full_of(source: str, column: int, end: int | None = None, **mending: Any) -> list[str]:
+    finding = finding_at(Spot(12, column, column, end or column + 1), **mending)
+    return render(report(FileResult("a.toml", None, (finding,), {}, (source,))), file_format="full").split("\n")
+
+
+def test_full_underlines_the_value_and_says_the_cure_on_a_line_of_its_own() -> None:
+    cure = ("bus.gap_count = 7", "cycle.slice_ratio = 0.7417")
+    assert full_of("nodes = 24", 9, 11, help="mend it", cure=cure) == [
+        "a.toml:12:9: BP002 error: message",
+        "   |",
+        "12 | nodes = 24",
+        "   |         ^^ unknown-key",
+        "help: mend it",
+        "cheapest cure:",
+        "    bus.gap_count = 7",
+        "    cycle.slice_ratio = 0.7417",
+        "",
+        "",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "marked"),
+    [
+        (WARNS, "63"),  # the value, not the key
+        (CLEAN.replace("axes = 4", "axes = 0"), "0"),
+        (CLEAN.replace("axes = 4", 'axes = "a  b"'), '"a  b"'),
+        (CLEAN.replace("axes = 4", "axis = 4"), "axis"),  # what is no key has no value that counts
+        (CLEAN.replace("axes = 4\n", ""), "node"),  # the table that lacks it
+        (CLEAN.replace('gap_count = "optimal"\n', ""), "bus"),
+        (CLEAN.replace("axes = 4", "axes = [\n4,\n5]"), "["),  # the first line of several
+        (CLEAN.replace("nodes = 2", "nodes = 2  # busplan: ignore[BP110]  "), "# busplan: ignore[BP110]"),
+        (CLEAN.replace("nodes = 2", "nodes = "), ""),  # the end of a line
+    ],
+)
+def test_what_is_marked_is_what_is_wrong(text: str, marked: str) -> None:
+    result = checked(text)
+    for finding, source in zip(result.findings, result.source, strict=True):
+        if source[finding.marked_column - 1 : finding.marked_end_column - 1] == marked:
+            return
+    raise AssertionError(result.findings)
+
+
+@pytest.mark.parametrize(
+    ("source", "column", "shown", "indent"),
+    [
+        ("\t\tnodes = 2", 3, "        nodes = 2", "        "),
+        ("a\tb = 2", 3, "a    b = 2", "     "),
+        ("日本 = 2", 3, "日本 = 2", "    "),
+        ("e\u0301 = 2", 3, "e\u0301 = 2", " "),
+        ("ü = 2", 3, "ü = 2", "  "),
+        ("\x1b[31m = 2", 3, " [31m = 2", "  "),
+        ("", 1, "", ""),
+        ("abc", 4, "abc", "   "),
+    ],
+)
+def test_the_caret_stands_below_its_column(source: str, column: int, shown: str, indent: str) -> None:
+    _, _, line, caret, *_ = full_of(source, column)
+    assert line == f"12 | {shown}".rstrip()
+    assert caret == f"   | {indent}^ unknown-key"
+
+
+@pytest.mark.parametrize("column", [1, 50, 5_000, 99_990, 100_001])
+def test_a_very_long_line_is_shown_around_its_column(column: int) -> None:
+    source = "".join(chr(ord("a") + number % 26) for number in range(100_000))
+    _, _, line, caret, *_ = full_of(source, column)
+    assert len(line) <= 100
+    at = caret.index("^")
+    assert line[at : at + 3] == source[column - 1 : column + 2][: len(line) - at]
+    assert line.removeprefix("12 | ").strip(".") in source
+    assert line.startswith("12 | ...") == (column > 40)
+    assert line.endswith("...") == (column < 99_000)
+
+
+def test_a_very_long_value_is_marked_as_far_as_it_is_shown() -> None:
+    source = f"x = [{'1, ' * 500}]"
+    _, _, line, caret, *_ = full_of(source, 5, len(source) + 1)
+    assert len(line) <= 100 >= len(caret)
+    assert caret.count("^") > 50
+    assert line[caret.index("^")] == "["
+
+
+LONG = "the cycle needs 348.5 us of 250.0 us, corrected margin -98.5 +/- 6.3 us, " * 3
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 300])
+def test_full_keeps_to_the_width_and_breaks_no_figure(width: int) -> None:
+    finding = finding_at(Spot(12, 1, 1, 2), words=LONG, help=LONG)
+    found = report(FileResult("a.toml", None, (finding,), {}, ("nodes = 2  # " + "x" * 200,)))
+    shown = without_colours(Full().on_terminal(found, width=width)).splitlines()
+    assert max(map(len, shown)) <= min(width, 100)
+    assert shown[0].startswith("a.toml:12:1: BP002 error: the")
+    assert not any(
+        re.search(r"[0-9]$", line) or re.match(r" +(us|\+/-)", line) for line in shown[:-5] if "|" not in line
+    )
+    if width == 100:
+        assert shown == render(found, file_format="full").splitlines()
+
+
+def without_colours(text: str) -> str:
+    return re.sub(r"\x1b\[[0-9;]*m", "", text)
+
+
+def test_a_terminal_has_severities_in_colour_and_in_words(mixed: CheckReport, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("NO_COLOR", "COLORTERM"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("TERM", "xterm-256color")
+    for made in (Concise(), Full()):
+        coloured = made.on_terminal(mixed, width=100)
+        assert without_colours(coloured) == made.write(mixed)
+        assert "\x1b[33mBP110 warning\x1b[0m" in coloured
+        assert "\x1b[1;31mBP101 error\x1b[0m" in coloured
+        assert "\x1b[1mp/fails.toml:7:1: \x1b[0m" in coloured
+    assert "\x1b[33m^^ gap-count-wasteful\x1b[0m" in Full().on_terminal(mixed, width=100)
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert not re.search(
+        r"\x1b\[(?:1;)?3", Full().on_terminal(mixed, width=100) + Concise().on_terminal(mixed, width=80)
+    )
+
+
+def test_concise_is_a_line_a_finding_whatever_the_width(mixed: CheckReport) -> None:
+    lines = without_colours(Concise().on_terminal(mixed, width=40)).splitlines()
+    assert len(lines) == len(mixed.located)
+    for line in lines:
+        assert re.match(r"[^:]+:\d+:\d+: BP\d+ (?:error|warning): ", line)
+
+
+# Markdown
+
+
+def test_markdown_has_a_verdict_for_each_profile(mixed: CheckReport) -> None:
+    lines = render(mixed, file_format="markdown").splitlines()
+    assert lines[:8] == [
+        "### Check of profiles",
+        "",
+        "checked 3 profiles\\: 2 errors, 1 warning; 1 could not be checked",
+        "",
+        "| profile | result | verdict | corrected margin, us |",
+        "| :--- | :--- | :--- | ---: |",
+        "| `p/clean.toml` | passes | fits | 1806.3 +/- 11.4 |",
+        "| `p/fails.toml` | **1 error, 1 warning** | does not fit | -109.8 +/- 4.3 |",
+    ]
+    assert lines[8:10] == [
+        "| `p/broken.toml` | **1 error** | - | - |",
+        "| `gone.toml` | **could not be checked**: gone.toml\\: no such file | - | - |",
+    ]
+    assert lines[11] == "| place | rule | severity | what is wrong | how to mend it |"
+    assert lines[13].startswith("| `p/fails.toml:7:1` | BP110 gap-count-wasteful | warning | bus.gap\\_count\\: ")
+    assert lines[13].endswith(" |  |")
+    assert lines[14].endswith(" | `cycle.slice_ratio = 0.69`<br>`bus.gap_count = 7` |")
+
+
+def test_markdown_of_hostile_names_is_a_table_still() -> None:
+    lines = render(report(*hostile()), file_format="markdown").splitlines()
+    for line in lines:
+        if line.startswith("|"):
+            assert len(re.findall(r"(?<!\\)\|", line)) in (5, 6)
+    assert not any("<b>" in line.replace("`a<b>", "") and "`" not in line for line in lines)
+
+
+# GitHub
+
+
+def github_command(line: str) -> tuple[str, dict[str, str], str]:
+    """Read a workflow command as the runner does."""
+    match = re.fullmatch(r"::(\w+) ([^:]*)::(.*)", line)
+    assert match is not None, line
+
+    def plain(text: str, *escapes: tuple[str, str]) -> str:
+        for escaped, character in (("%0D", "\r"), ("%0A", "\n"), *escapes, ("%25", "%")):
+            text = text.replace(escaped, character)
+        return text
+
+    properties = dict(one.split("=", 1) for one in match[2].split(","))
+    escapes = (("%3A", ":"), ("%2C", ","))
+    return match[1], {key: plain(value, *escapes) for key, value in properties.items()}, plain(match[3])
+
+
+def test_github_commands_say_file_line_and_message(mixed: CheckReport) -> None:
+    commands = [github_command(line) for line in render(mixed, file_format="github").splitlines()]
+    assert [(level, one["file"], one["line"], one["col"]) for level, one, _ in commands] == [
+        ("warning", "p/fails.toml", "7", "1"),
+        ("error", "p/fails.toml", "11", "1"),
+        ("error", "p/broken.toml", "1", "4"),
+    ]
+    assert commands[0][1]["title"] == "BP110 gap-count-wasteful"
+    assert commands[0][2] == mixed.files[1].findings[0].message
+
+
+@pytest.mark.parametrize("name", ["100% of, it: a\r\nb.toml", "::error::a.toml", "%0A.toml", "a,line=9.toml"])
+def test_github_reads_hostile_names_as_they_are(name: str) -> None:
+    finding = finding_at(Spot(3, 4, 4, 5), words=f"{name}: unknown")
+    text = render(report(FileResult(name, None, (finding,), {}, ("",))), file_format="github")
+    assert text.count("\n") == 1
+    level, properties, message = github_command(text.removesuffix("\n"))
+    assert level == "error"
+    assert properties == {"file": name, "line": "3", "col": "4", "title": "BP002 unknown-key"}
+    assert message == f"{name}: unknown"
+
+
+# GitLab
+
+
+def test_gitlab_issues_have_what_its_report_needs(mixed: CheckReport) -> None:
+    issues = json.loads(render(mixed, file_format="gitlab"))
+    assert [(one["check_name"], one["severity"], one["location"]) for one in issues] == [
+        ("gap-count-wasteful", "minor", {"path": "p/fails.toml", "lines": {"begin": 7}}),
+        ("slice-overrun", "major", {"path": "p/fails.toml", "lines": {"begin": 11}}),
+        ("syntax", "major", {"path": "p/broken.toml", "lines": {"begin": 1}}),
+    ]
+    assert all(set(one) == {"description", "check_name", "fingerprint", "severity", "location"} for one in issues)
+    assert issues[1]["description"].startswith("BP101 cycle.period_us: ")
+
+
+def test_gitlab_fingerprints_are_unique() -> None:
+    issues = json.loads(render(report(*hostile(), checked(FAILS)), file_format="gitlab"))
+    assert len({one["fingerprint"] for one in issues}) == len(issues) == 2 * len(HOSTILE) + 2
+
+
+# JUnit
+
+
+def test_junit_has_one_case_a_profile_also_when_clean(mixed: CheckReport) -> None:
+    root = ET.fromstring(render(mixed, file_format="junit"))
+    assert root.tag == "testsuites"
+    (suite,) = root
+    assert suite.tag == "testsuite"
+    assert {key: suite.attrib[key] for key in ("tests", "failures", "errors")} == {
+        "tests": "4", "failures": "2", "errors": "1",
+    }  # fmt: skip
+    cases = suite.findall("testcase")
+    assert [case.attrib["name"] for case in cases] == ["p/clean.toml", "p/fails.toml", "p/broken.toml", "gone.toml"]
+    assert [[one.tag for one in case] for case in cases] == [[], ["failure", "system-out"], ["failure"], ["error"]]
+    failure = cases[1].find("failure")
+    assert failure is not None
+    assert failure.attrib["type"] == "BP101"
+    assert failure.attrib["message"].startswith("cycle.period_us: the cycle needs")
+    assert (failure.text or "").startswith("p/fails.toml:11:1: BP101 ")
+    assert (cases[1].findtext("system-out") or "").startswith("p/fails.toml:7:1: BP110 ")
+
+
+def test_junit_of_clean_and_of_warned_profiles_has_no_failures() -> None:
+    text = render(report(checked(CLEAN, path="a.toml"), checked(WARNS, path="b.toml")), file_format="junit")
+    (suite,) = ET.fromstring(text)
+    assert (suite.attrib["tests"], suite.attrib["failures"], suite.attrib["errors"]) == ("2", "0", "0")
+    assert [len(case.findall("failure")) for case in suite] == [0, 0]
+
+
+# SARIF
+
+
+def sarif(found: CheckReport) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(render(found, file_format="sarif"))
+    SarifLog.model_validate(document)
+    return document
+
+
+def test_sarif_is_valid_by_the_published_schema(mixed: CheckReport) -> None:
+    document = sarif(mixed)
+    assert (document["version"], document["$schema"]) == ("2.1.0", "https://json.schemastore.org/sarif-2.1.0.json")
+    for one in (report(), report(checked(CLEAN)), report(*hostile())):
+        sarif(one)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("runs", 0, "results", 0, "message", "text"),
+        ("runs", 0, "results", 0, "level"),
+        ("runs", 0, "results", 0, "locations", 0, "physicalLocation", "region", "startLine"),
+        ("runs", 0, "columnKind"),
+        ("runs", 0, "tool", "driver", "name"),
+        ("runs", 0, "invocations", 0, "executionSuccessful"),
+    ],
+)
+def test_the_schema_check_can_fail(mixed: CheckReport, path: tuple[str | int, ...]) -> None:
+    document = deepcopy(sarif(mixed))
+    *outer, last = path
+    at: Any = document
+    for part in outer:
+        at = at[part]
+    at[last] = -1
+    with pytest.raises(ValidationError):
+        SarifLog.model_validate(document)
+    at[f"{last}s"] = at.pop(last)
+    with pytest.raises(ValidationError):
+        SarifLog.model_validate(document)
+
+
+def test_sarif_results_point_to_their_rules(mixed: CheckReport) -> None:
+    (run,) = sarif(mixed)["runs"]
+    rules = run["tool"]["driver"]["rules"]
+    assert [rule["id"] for rule in rules] == list(all_rules())
+    assert len({rule["name"] for rule in rules}) == len(rules)
+    for result in run["results"]:
+        assert rules[result["ruleIndex"]]["id"] == result["ruleId"]
+        assert result["level"] == all_rules()[result["ruleId"]].severity
+    assert run["invocations"] == [
+        {
+            "executionSuccessful": False,
+            "toolExecutionNotifications": [{"level": "error", "message": {"text": "gone.toml: no such file"}}],
+        }
+    ]
+    region = run["results"][0]["locations"][0]["physicalLocation"]["region"]
+    assert region == {"startLine": 7, "startColumn": 1, "endColumn": 15}
+    assert [result.get("properties") for result in run["results"]] == [
+        None,
+        {"cure": "cycle.slice_ratio = 0.69\nbus.gap_count = 7"},
+        None,
+    ]
+    page = rules[run["results"][0]["ruleIndex"]]["help"]
+    assert page["text"].startswith("BP110 gap-count-wasteful (warning): ")
+    assert page["markdown"].startswith("### `BP110` gap-count-wasteful\n")
+    assert "ignore[BP110] reason" in page["text"]
+    assert "ignore[BP110] reason" in page["markdown"]
+    assert run["columnKind"] == "unicodeCodePoints"
+
+
+def artifacts(*names: str) -> list[dict[str, str]]:
+    files = (FileResult(name, None, checked(WARNS).findings, {}, ("",)) for name in names)
+    results = sarif(report(*files))["runs"][0]["results"]
+    return [one["locations"][0]["physicalLocation"]["artifactLocation"] for one in results]
+
+
+@pytest.mark.parametrize(
+    ("name", "uri"),
+    [
+        ("p/a.toml", "p/a.toml"),
+        ("a b/ü.toml", "a%20b/%C3%BC.toml"),
+        ("100%.toml", "100%25.toml"),
+        ("a:b.toml", "a%3Ab.toml"),
+        ("#?.toml", "%23%3F.toml"),
+        ("\udcff.toml", "%FF.toml"),
+        ("<stdin>", "%3Cstdin%3E"),
+    ],
+)
+def test_sarif_paths_below_the_working_folder_are_relative(name: str, uri: str) -> None:
+    (artifact,) = artifacts(name)
+    assert artifact == {"uri": uri, "uriBaseId": "%SRCROOT%"}
+    parts = urlsplit(uri)
+    assert (parts.scheme, parts.netloc, parts.query, parts.fragment) == ("", "", "", "")
+    assert unquote_to_bytes(uri) == os.fsencode(name)
+
+
+def test_sarif_paths_elsewhere_are_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = tmp_path.resolve() / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    assert artifacts("../a b.toml", "/etc/ü.toml") == [
+        {"uri": f"{here.parent.as_uri()}/a%20b.toml"},
+        {"uri": "file:///etc/%C3%BC.toml"},
+    ]
+
+
+def test_sarif_fingerprints_stay_when_lines_are_inserted_above() -> None:
+    def prints(text: str) -> list[str]:
+        results = sarif(report(checked(text)))["runs"][0]["results"]
+        return [one["partialFingerprints"]["busplanFinding/v1"] for one in results]
+
+    before = prints(FAILS)
+    assert len(set(before)) == len(before) == 2
+    assert prints("# one\n\n" + FAILS.replace("[cycle]", "# two\n[cycle]")) == before
+    assert prints(FAILS.replace("[bus]", "[limits]\nmin_spare_axes = 99\n[bus]"))[1:] == before
+
+
+# The profile's own schema
+
+
+@pytest.fixture(scope="module")
+def validator() -> Any:
+    schema = profile_schema()
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def test_the_profile_schema_accepts_what_is_shipped(validator: Any) -> None:
+    for name in shipped_names():
+        validator.validate(load(name).document.data())
+
+
+@pytest.mark.parametrize("code", [code for code in all_rules() if not code.startswith("BP0")])
+def test_the_profile_schema_accepts_what_only_the_gate_finds(validator: Any, code: str) -> None:
+    for path in (EXAMPLES / code).glob("*.toml"):
+        validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+
+
+@pytest.mark.parametrize("code", ["BP002", "BP003", "BP004", "BP005"])
+def test_the_profile_schema_refuses_what_has_another_shape(validator: Any, code: str) -> None:
+    for path in (EXAMPLES / code).glob("invalid*.toml"):
+        with pytest.raises(jsonschema.ValidationError):
+            validator.validate(Document(path.name, path.read_text(encoding="utf-8")).data())
+
+
+def test_every_key_of_the_profile_schema_is_described_with_its_unit() -> None:
+    schema = profile_schema()
+    units = {
+        "per_byte_us": "[us/byte]", "um_per_m": "[um/m]", "mm_per_min": "[mm/min]", "per_s2": "[1/s^2]",
+        "per_s": "[1/s]", "mm_s": "[mm/s]", "us": "[us]", "mm": "[mm]", "bytes": "[bytes]", "deg": "[deg]",
+        "db": "[dB]", "m": "[m]", "ppm": "[um/m]", "bits": "[bits]", "kbit_s": "[kbit/s]",
+        "mbit_s": "[Mbit/s]", "s": "[s]",
+    }  # fmt: skip
+    # A grade has the name of the value that it grades, and no unit.
+    sections = [schema, *(section for name, section in schema["$defs"].items() if name != "ServoGrades")]
+    keys = [(name, key) for section in sections for name, key in section.get("properties", {}).items()]
+    assert len(keys) > 60
+    for name, key in keys:
+        assert key.get("description"), name
+        unit = next((unit for ending, unit in units.items() if f"_{name}".endswith(f"_{ending}")), "")
+        assert unit in key["description"], name

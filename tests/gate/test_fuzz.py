@@ -1,0 +1,245 @@
+"""Whatever a file holds, the gate says something of it, soon, and at a place inside the file.
+
+A few hundred inputs in a normal run. For many more: BUSPLAN_FUZZ_EXAMPLES=10000 pytest tests/rules/test_fuzz.py
+"""
+
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from time import process_time
+
+from hypothesis import HealthCheck, event, given, settings
+from hypothesis import strategies as st
+
+from busplan.errors import PlacedError
+from busplan.gate.baseline import Record
+from busplan.gate.finding import Finding
+from busplan.gate.formats import gate_format
+from busplan.gate.gate import FileResult, check_document, unreadable
+from busplan.gate.registry import all_rules
+from busplan.gate.report import CheckReport
+from busplan.profile.shipped import shipped_folder
+from busplan.profile.toml import decode
+
+EXAMPLES = int(os.environ.get("BUSPLAN_FUZZ_EXAMPLES", "150"))
+LONGEST_S = 1.0
+MOST_BYTES = 120_000
+"""A little more than a profile may have, so that the limit is crossed too."""
+
+SEEDS = [
+    path.read_bytes()
+    for folder, pattern in ((shipped_folder(), "*.toml"), (Path(__file__).parent / "examples", "*/*.toml"))
+    for path in sorted(folder.glob(pattern))
+]
+KEY = re.compile(rb"^([ \t]*[\w.]+[ \t]*=[ \t]*)([^#\n]*)", re.MULTILINE)
+VALUES = [
+    *("0", "-1", "1.5", "1e308", "1e999", "-inf", "nan", "9" * 30, "9" * 400, "9" * 5_000, "0x7fffffffffffffff"),
+    *("-9223372036854775809", "1_000_000", "1e-320", "0.1", "63", "64", "62", "16", "17", "512", "2048", "1_000_001"),
+    *("true", "false", '""', '"S100"', '"optimal"', '"standard"', "'\\'", '"\\u0000"', '"\\U0010ffff"', '"日本"'),
+    *('"""\n"""', "'''\n\n'''", '"' + "x" * 3_000 + '"', "1979-05-27", "1979-05-27T07:32:00Z", "07:32:00"),
+    *("[]", "[1, 'a', []]", "{}", "{ a = 1 }", "{ kind = 'linear' }", "[{}, {}]", "[4, 3, 2, 1]", "[[1], [2]]"),
+    *("[" * 50 + "]" * 50, "[" * 3_000 + "]" * 3_000, "{a=" * 200 + "1" + "}" * 200, "[" * 90_000, "[1," * 20_000),
+    *("[" + "1," * 20_000 + "]", "{" + ",".join(f"k{number}=1" for number in range(3_000)) + "}"),
+]
+LINES = [
+    *("[bus]", "[[bus]]", "[bus.extra]", "[node.execution]", "[[node.execution]]", "[servo.x]", "[limits]", "[circle]"),
+    *("bus = 1", "a.b.c = 1", "bus.nodes = 3", '"" = 1', '"schema_version" = 1', "= 1", "[", "]", "[]", "[[]]", "{"),
+    *("[a]" * 3, "a" * 5_000 + " = 1", "a." * 19 + "a = 1", "a." * 2_000 + "a = 1", "[" + "a." * 2_000 + "a]"),
+    *("# busplan: ignore[BP110] why", "# busplan: ignore[", "#" * 3_000, "# busplan: ignore[" + "BP110," * 500 + "] x"),
+    *('x = """', "x = '''", 'x = "\\', "\t\t", "\f", "\v", "\x00", "\x7f", "\u2028", "\u0085", "\ufeff", "🙂 = 1"),
+    *("min_spare_nodes = 1000000", "max_utilisation = 1e-300", "min_spare_axes = 0", "max_utilisation = 0"),
+]
+
+Mutation = Callable[[random.Random, bytes], bytes]
+
+
+def flip(rng: random.Random, content: bytes) -> bytes:
+    at = rng.randrange(len(content) + 1)
+    return content[:at] + rng.randbytes(rng.choice((0, 1, 1, 2, 9))) + content[at + rng.randrange(4) :]
+
+
+def cut(rng: random.Random, content: bytes) -> bytes:
+    at = rng.randrange(len(content) + 1)
+    return content[:at] if rng.random() < 0.5 else content[at:]
+
+
+def delete_line(rng: random.Random, content: bytes) -> bytes:
+    lines = content.split(b"\n")
+    del lines[rng.randrange(len(lines))]
+    return b"\n".join(lines)
+
+
+def double_line(rng: random.Random, content: bytes) -> bytes:
+    lines = content.split(b"\n")
+    lines.insert(rng.randrange(len(lines)), rng.choice(lines))
+    return b"\n".join(lines)
+
+
+def swap_lines(rng: random.Random, content: bytes) -> bytes:
+    lines = content.split(b"\n")
+    one, other = rng.randrange(len(lines)), rng.randrange(len(lines))
+    lines[one], lines[other] = lines[other], lines[one]
+    return b"\n".join(lines)
+
+
+def insert_line(rng: random.Random, content: bytes) -> bytes:
+    lines = content.split(b"\n")
+    lines.insert(rng.randrange(len(lines) + 1), rng.choice(LINES).encode())
+    return b"\n".join(lines)
+
+
+def other_value(rng: random.Random, content: bytes) -> bytes:
+    found = list(KEY.finditer(content))
+    if not found:
+        return content
+    match = rng.choice(found)
+    return content[: match.end(1)] + rng.choice(VALUES).encode() + content[match.end() :]
+
+
+def other_number(rng: random.Random, content: bytes) -> bytes:
+    found = list(re.finditer(rb"(?<![\w.])\d+(?:\.\d+)?", content))
+    if not found:
+        return content
+    match = rng.choice(found)
+    number = rng.choice((rng.randrange(100), rng.randrange(2_000_000), rng.random(), 10 ** rng.uniform(-9, 12)))
+    return content[: match.start()] + str(number).encode() + content[match.end() :]
+
+
+def other_ends(rng: random.Random, content: bytes) -> bytes:
+    return content.replace(b"\n", rng.choice((b"\r\n", b"\r", b"\n\r", b"\n\n", b"\x85", b"")))
+
+
+def mark(rng: random.Random, content: bytes) -> bytes:
+    return rng.choice((b"\xef\xbb\xbf", b"\xff\xfe", b"\xef\xbb\xbf" * 2, b"\xef\xbb")) + content
+
+
+def other_encoding(rng: random.Random, content: bytes) -> bytes:
+    text = content.decode("utf-8", "replace")
+    return text.encode(rng.choice(("utf-16", "utf-32-le", "utf-8-sig", "utf-7")), "replace")
+
+
+def not_utf_8(rng: random.Random, content: bytes) -> bytes:
+    at = rng.randrange(len(content) + 1)
+    return content[:at] + rng.choice((b"\xff", b"\xc3", b"\xe2\x82", b"\xed\xa0\x80", b"\xf8")) + content[at:]
+
+
+def repeated(rng: random.Random, content: bytes) -> bytes:
+    return content * rng.choice((2, 3, 200))
+
+
+MUTATIONS: list[Mutation] = [
+    *(flip, cut, delete_line, double_line, swap_lines, insert_line, insert_line, other_value, other_value, other_value),
+    *(other_number, other_number, other_ends, mark, other_encoding, not_utf_8, repeated),
+]
+
+
+CLEAN = check_document(decode((Path(__file__).parent / "examples/BP001/valid.toml").read_bytes(), name="clean.toml"))
+RECORD = Record({"paper.margin_us": 1e6, "standard.safe_axes": 1e6}, CLEAN.keys)
+"""Of another profile, so that any key may have changed."""
+
+
+def mutated(seed: int, *, files: Sequence[bytes] = SEEDS) -> bytes:
+    rng = random.Random(seed)
+    content = rng.choice(files)
+    for _ in range(rng.choice((1, 1, 2, 3, 8))):
+        content = rng.choice(MUTATIONS)(rng, content)[:MOST_BYTES]
+    return content
+
+
+def gate(content: bytes) -> tuple[FileResult, list[str]]:
+    """Check a file as the command does, without the circle; with its lines, as far as they are text."""
+    lines = content.decode("utf-8-sig", "replace").replace("\r\n", "\n").split("\n")
+    try:
+        document = decode(content, name="a.toml")
+    except PlacedError as error:
+        return unreadable("a.toml", error, content), lines
+    return check_document(document, with_circle=False, baseline=RECORD), lines
+
+
+def hold(content: bytes) -> FileResult:
+    """What must hold for every file there is."""
+    start = process_time()
+    result, lines = gate(content)
+    seconds = process_time() - start
+    assert seconds < LONGEST_S
+    assert result.status == ("findings" if result.findings else "ok")
+    assert result.findings or result.profile is not None
+    for finding, source in zip(result.findings, result.source, strict=True):
+        assert 1 <= finding.line <= len(lines)
+        assert 1 <= finding.column <= len(lines[finding.line - 1]) + 1
+        assert 1 <= finding.marked_column < finding.marked_end_column <= len(lines[finding.line - 1]) + 2
+        assert source.rstrip("\r") == lines[finding.line - 1].rstrip("\r")
+        assert finding.message
+        assert finding.code in all_rules()
+    assert list(result.findings) == sorted(result.findings, key=lambda one: (one.line, one.column, one.code))
+    for format_ in ("concise", "full", "github", "markdown"):
+        assert gate_format(format_).write(CheckReport((result,))).count("\n") >= len(result.findings)
+    return result
+
+
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 2**63).map(mutated))
+def test_a_mutated_profile_is_judged(content: bytes) -> None:
+    result = hold(content)
+    event(" ".join(sorted({one.code for one in result.findings})) or "ok")
+
+
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    st.binary(max_size=300)
+    | st.text(max_size=300).map(str.encode)
+    | st.text("[]{}=.,\"'#\n\\ a1-", max_size=60).map(str.encode)
+)
+def test_anything_at_all_is_judged(content: bytes) -> None:
+    hold(content)
+
+
+def test_hundreds_of_nasty_files_in_one_call(tmp_path: Path) -> None:
+    contents = [mutated(seed) for seed in range(150)]
+    contents += [value.encode() for value in (*VALUES, *LINES)] + [b"", b"\n", b"\r\n", b"\xef\xbb\xbf"]
+    names = []
+    for number, content in enumerate(contents):
+        names.append(f"{number}.toml")
+        (tmp_path / names[-1]).write_bytes(content)
+    run = subprocess.run(
+        [sys.executable, "-m", "busplan", "check", "--no-circle", "--format", "json", *names],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        cwd=tmp_path,
+        check=False,
+        timeout=120,
+    )
+    assert run.returncode == 1
+    assert re.fullmatch(rf"checked {len(names)} profiles: \d+ errors, \d+ warnings?\n", run.stderr)
+    document = json.loads(run.stdout)
+    assert [one["path"] for one in document["files"]] == names
+    for one, content in zip(document["files"], contents, strict=True):
+        assert one["findings"] == [finding._asdict() for finding in check_again(content, name=one["path"])]
+
+
+def check_again(content: bytes, *, name: str) -> tuple[Finding, ...]:
+    try:
+        return check_document(decode(content, name=name), with_circle=False).findings
+    except PlacedError as error:
+        return unreadable(name, error, content).findings
+
+
+def test_the_fuzz_reaches_every_rule_of_file_and_bus() -> None:
+    # Every rule has files of its own among those that are mutated, and some mutation leaves its finding in them.
+    files: dict[str, list[bytes]] = {}
+    for content in SEEDS:
+        for code in codes(content):
+            files.setdefault(code, []).append(content)
+    for rule in (code for code in all_rules() if code < "BP2"):
+        own = files.get(rule, SEEDS)
+        assert any(rule in codes(mutated(seed, files=own)) for seed in range(1000)), rule
+
+
+def codes(content: bytes) -> set[str]:
+    return {one.code for one in gate(content)[0].findings}

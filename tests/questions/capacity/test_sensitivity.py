@@ -1,0 +1,261 @@
+"""What moves the margin: each row is the capacity of the profile with that change written in."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from busplan.profile.shipped import load, shipped_names
+from busplan.profile.toml import override
+from busplan.questions.capacity.sensitivity import Effect, sensitivities, sensitivity, standing
+from busplan.questions.fit.bottleneck import next_bottleneck
+from busplan.questions.fit.certainty import certainty
+from busplan.questions.fit.cycle import cycle_of
+from busplan.questions.fit.figures import capacity, figures
+from busplan.questions.fit.network import bus_of, network_of
+from busplan.sections.profile import Profile
+
+Maker = Callable[..., Profile]
+SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+TABLE = {"kind": "table", "payload_bytes": [4, 12, 14], "time_us": [30.0, 34.0, 40.0]}
+
+
+def with_longer_execution(profile: Profile) -> dict[str, Any]:
+    execution: Any = profile.alike_nodes[0].node.execution
+    if execution.kind == "table":
+        return {"node.execution.time_us": [1.1 * us for us in execution.time_us]}
+    return {
+        "node.execution.base_us": 1.1 * execution.base_us,
+        "node.execution.per_byte_us": 1.1 * execution.per_byte_us,
+    }
+
+
+WRITTEN: dict[str, Callable[[Profile], dict[str, Any]]] = {
+    "execution time +10%": with_longer_execution,
+    "one node more": lambda one: {"bus.nodes": one.alike_nodes[0].nodes + 1},
+    "one axis more per node": lambda one: {"node.axes": one.alike_nodes[0].node.axes + 1},
+    "payload +4 bytes": lambda one: {
+        f"payload.{kind}_bytes": 4 + (getattr(one.payload, f"{kind}_bytes") or 0) for kind in ("read", "write")
+    },
+    "one hop more": lambda one: {"bus.max_hops": one.bus.max_hops + 1},
+    "one busy retry more": lambda one: {"cycle.retries": one.cycle.retries + 1},
+    "host time +10 us": lambda one: {"host.transaction_us": one.host.transaction_us + 10},  # type: ignore[attr-defined]
+    "a bus reset": lambda _one: {"bus.gap_count": 63},
+}
+"""Each change as a user would write it into the file."""
+
+
+def effects(profile: Profile) -> dict[str, Effect]:
+    return {one.change: one for one in sensitivity(profile).effects}
+
+
+@SOME
+@given(data=st.data(), per_axis=st.sampled_from([None, 1, 8]), reserve=st.sampled_from([0.0, 0.2]))
+def test_each_row_is_the_capacity_of_the_profile_with_that_change(
+    data: st.DataObject, per_axis: int | None, reserve: float, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    changes: dict[str, object] = {"payload.read_bytes_per_axis": per_axis, "limits.reserve": reserve}
+    profile = override(data.draw(any_profile), changes)
+    before, found = figures(profile, model="standard"), effects(profile)
+    assert set(found) == set(WRITTEN)
+    for change, one in found.items():
+        if change == "one hop more" and profile.bus.max_hops is None:
+            assert (one.margin_change_us, one.then) == (None, None)
+            continue
+        after = figures(override(profile, WRITTEN[change](profile)), model="standard")
+        assert one.then is not None
+        assert one.then.margin_corrected_us == pytest.approx(after.margin_corrected_us, rel=1e-9, abs=1e-6)
+        assert one.then.uncertainty_us == pytest.approx(after.uncertainty_us, rel=1e-9, abs=1e-6)
+        assert one.margin_change_us == pytest.approx(
+            (after.margin_corrected_us or 0) - (before.margin_corrected_us or 0), rel=1e-9, abs=1e-6
+        )
+        assert (one.then.verdict, one.then.safe, one.then.exceeded) == (after.verdict, after.safe, after.exceeded)
+
+
+@SOME
+@given(data=st.data())
+def test_where_a_network_stands_is_what_its_capacity_says(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    one, now = figures(profile, model="standard"), standing(network_of(profile))
+    assert now == tuple(getattr(one, key) for key in now._fields)
+
+
+@SOME
+@given(data=st.data())
+def test_the_largest_effect_comes_first_and_what_cannot_be_made_last(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    found = sensitivity(data.draw(any_profile)).effects
+    sizes = [-1.0 if one.margin_change_us is None else abs(one.margin_change_us) for one in found]
+    assert sizes == sorted(sizes, reverse=True)
+    assert all(one.note for one in found if one.then is None)
+
+
+def test_what_adds_to_the_margin_has_its_place_by_its_size(make: Maker) -> None:
+    # Table I has such a fall between 4 and 16 bytes, of 0.1 us.
+    falling = {"kind": "table", "payload_bytes": [4, 8], "time_us": [200.0, 100.0]}
+    found = sensitivity(make(node__execution=falling, payload__read_bytes=4, payload__write_bytes=4)).effects
+    assert [one.change for one in found[:3]] == ["one node more", "payload +4 bytes", "execution time +10%"]
+    assert [(one.margin_change_us or 0) > 0 for one in found[:3]] == [False, True, False]
+
+
+def test_a_change_that_changes_nothing_gives_0_and_says_why(make: Maker) -> None:
+    found = effects(make())
+    for change, note in (
+        ("a bus reset", "it is set so already"),
+        ("one axis more per node", "no payload follows the axes"),
+        ("host time +10 us", "the gaps behind the transactions hide it"),
+    ):
+        assert (found[change].margin_change_us, found[change].note) == (0.0, note)
+    assert (found["a bus reset"].before, found["a bus reset"].after) == (63, 63)
+    off = effects(make(node__read_response="concatenated", node__write_response="unified"))
+    execution = off["execution time +10%"]
+    assert (execution.margin_change_us, execution.note) == (0.0, "no execution time is on the bus")
+    moved = effects(make(bus__gap_count=8, payload__read_bytes_per_axis=8))
+    assert [moved[change].note for change in ("a bus reset", "one axis more per node", "host time +10 us")] == [""] * 3
+
+
+def test_a_payload_outside_the_table_is_not_known(make: Maker) -> None:
+    found = effects(make(node__execution=TABLE, payload__read_bytes_per_axis=None))
+    one = found["payload +4 bytes"]
+    assert (one.margin_change_us, one.then, one.before, one.after) == (None, None, 12, 16)
+    assert one.note == "not known: 16 bytes is outside the execution table, 4 to 14 bytes"
+    data = {"node__execution": TABLE, "payload__write_bytes": 4, "payload__read_bytes": 2}
+    axis = effects(make(**data, payload__read_bytes_per_axis=3))["one axis more per node"]
+    assert (axis.then, axis.note) == (None, "not known: 17 bytes is outside the execution table, 4 to 14 bytes")
+    # Between its points it is as known as before.
+    known = override(make(node__execution=TABLE), {"payload.read_bytes": 4, "payload.write_bytes": 8})
+    after = figures(override(known, {"payload.read_bytes": 8, "payload.write_bytes": 12}), model="standard")
+    then = effects(known)["payload +4 bytes"].then
+    assert then is not None
+    assert then.margin_corrected_us == after.margin_corrected_us
+
+
+def test_hops_follow_the_nodes_in_a_chain_and_not_in_a_tree(make: Maker) -> None:
+    chain, tree = effects(make(bus__nodes=4)), effects(make(bus__nodes=4, bus__max_hops=4))
+    assert chain["one hop more"].note == "in a chain the hops follow the nodes"
+    assert (tree["one hop more"].before, tree["one hop more"].after) == (4, 5)
+    hop_us, node_us = tree["one hop more"].margin_change_us, tree["one node more"].margin_change_us
+    assert hop_us is not None
+    assert node_us is not None
+    # Another node of the chain brings its hop, too, which all five are then charged.
+    assert chain["one node more"].margin_change_us == pytest.approx(node_us + hop_us * 62 / 50, rel=1e-3)
+
+
+def test_what_changes_has_its_values_where_they_are_one(make: Maker) -> None:
+    same, other = effects(make()), effects(make(payload__write_bytes=16))
+    assert (same["execution time +10%"].before, same["execution time +10%"].key) == (
+        pytest.approx(34.2),
+        "execution_us",
+    )
+    assert (same["payload +4 bytes"].before, same["payload +4 bytes"].after) == (12, 16)
+    for change in ("execution time +10%", "payload +4 bytes"):
+        assert (other[change].before, other[change].after) == (None, None)
+        assert other[change].margin_change_us
+
+
+def test_a_change_that_the_profile_refuses_is_said_so(make: Maker) -> None:
+    one = effects(make(cycle__retries=1_000_000))["one busy retry more"]
+    assert one.then is None
+    assert one.note == "cycle.retries 1000001: must be 1,000,000 or less"
+
+
+def test_each_group_has_a_node_and_an_axis_more_in_turn() -> None:
+    gantry = load("gantry-24").profile
+    rows, now = effects(gantry), figures(gantry, model="standard")
+    for one in gantry.group:
+        for change, key, more in (
+            (f"one node more in {one.name}", "nodes", one.nodes + 1),
+            (f"one axis more per node in {one.name}", "axes", one.axes + 1),
+        ):
+            row = rows[change]
+            assert (row.key, row.before, row.after) == (f"group.{one.name}.{key}", more - 1, more)
+            then = figures(override(gantry, {row.key: more}), model="standard")
+            assert row.then is not None
+            assert row.then.margin_corrected_us == then.margin_corrected_us
+            assert now.margin_corrected_us is not None
+            assert row.margin_change_us == row.then.margin_corrected_us - now.margin_corrected_us
+    assert rows["one axis more per node in io"].note == "no payload follows the axes"
+    assert [one.group for one in next_bottleneck(gantry).limits] == ["drives", "tool", "io"]
+
+
+def test_each_period_has_its_margins_and_the_same_changes_of_them(make: Maker) -> None:
+    one, other = sensitivities(capacity(make(bus__nodes=9), periods_us=[4000.0, 2000.0]))
+    changes = [[effect.margin_change_us for effect in found.effects] for found in (one, other)]
+    assert changes[0] == pytest.approx(changes[1], nan_ok=False, abs=1e-9)
+    assert one.now.margin_corrected_us == pytest.approx(other.now.margin_corrected_us + 1000)
+    assert (one.now.verdict, other.now.verdict) == ("fits", "does not fit")
+
+
+# --- the next bottleneck ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_without_execution_the_cycle_is_that_of_nodes_that_need_no_time(name: str) -> None:
+    profile = load(name).profile
+    found = next_bottleneck(profile)
+    execution = {"kind": "linear", "base_us": 0, "per_byte_us": 0, "grade": "derived"}
+    idle: dict[str, object] = {one.node_key("execution"): execution for one in profile.alike_nodes}
+    without = cycle_of(override(profile, idle), model="standard")
+    largest = max(without.terms, key=lambda term: float(term.us))
+    if found.binding_term.name == "execution":
+        assert found.is_gone
+        assert found.next_binding_term == largest
+        assert found.next_margin_corrected_us == certainty(without).margin_corrected_us
+    elif found.is_gone:  # a key takes the term away: of every kind the first, of this kind the others
+        own = bus_of(profile)
+        removals: list[dict[str, object]] = [{"cycle.nonperiodic_us": 0}]
+        removals += [{**one} for one in own.term_removals]
+        cycles = [cycle_of(override(profile, one), model=own.deciding_model) for one in removals]
+        assert found.next_margin_corrected_us in [certainty(one).margin_corrected_us for one in cycles]
+    else:
+        assert found.next_margin_corrected_us is None
+
+
+def test_less_execution_leaves_the_bus_idle_for_longer() -> None:
+    # The bench of Table I: 73.6 us of execution gone make 10.5 us of margin.
+    profile = load("paper-two-node").profile
+    found, now = next_bottleneck(profile), standing(network_of(profile))
+    assert found.binding_term.us == pytest.approx(73.6)
+    assert (found.next_margin_corrected_us or 0) - now.margin_corrected_us == pytest.approx(10.51, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("changes", "binding", "is_gone"),
+    [
+        ({"cycle__nonperiodic_us": 900.0}, "nonperiodic_us", True),
+        ({"cycle__retries": 60}, "retries_us", True),
+        ({"host": {"transaction_us": 300.0}}, "cycle_host_us", True),
+        ({"bus__cycle_master": True, "bus__isochronous_us": 80.0}, "cycle_starts_us", True),
+        ({"node__execution__base_us": 0.0, "node__execution__per_byte_us": 0.0}, "cycle_idle_us", False),
+    ],
+)
+def test_a_term_goes_with_its_cause(make: Maker, changes: dict[str, Any], binding: str, is_gone: bool) -> None:
+    found = next_bottleneck(make(**changes))
+    assert (found.binding_term.key, found.is_gone) == (binding, is_gone)
+    assert found.next_binding_term.key != binding
+
+
+@SOME
+@given(data=st.data())
+def test_without_the_limit_the_next_one_keeps_one_node_more_off(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    (found,), bus = next_bottleneck(profile).limits, bus_of(profile)
+
+    def is_kept(nodes: int) -> bool:
+        one = figures(override(profile, {"bus.nodes": nodes}), model="standard")
+        network = network_of(override(profile, {"bus.nodes": nodes}))
+        broken = {limit.key for limit in bus.limits if limit.is_broken(network)}
+        late = (one.safe_required_us or 0) > one.available_us * (1 + 1e-12)
+        return not (broken | ({"time"} if late else set())) - {found.limited_by}
+
+    assert found.next_safe_nodes == 0 or is_kept(found.next_safe_nodes)
+    assert not is_kept(found.next_safe_nodes + 1)
+    assert found.next_safe_nodes >= found.safe_nodes
+    assert found.next_limited_by != found.limited_by

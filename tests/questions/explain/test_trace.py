@@ -1,0 +1,161 @@
+"""Traced numbers: what they write down is what was computed."""
+
+import inspect
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from busplan.buses import time_slice
+from busplan.buses.ieee1394 import equations
+from busplan.elementwise import Traced, choose, plain, total
+from busplan.questions.explain.formulas import formula_of, formula_text
+from busplan.questions.explain.trace import inputs, lines
+from busplan.sourced import EQUATIONS, Input
+
+# As the paper prints them, in this program's symbols; hop and the delay of a PHY, which the paper writes out in each,
+# are equations of their own. The sum in (2) is one quantity here: a bus of another kind has other terms.
+PRINTED = {
+    "time_slice_us": "alpha T_s / N",
+    "required_time_slice_us": "T_need / N",
+    "transaction_latency_us": "T_req + T_ack1 + T_exec + T_resp + T_ack2",
+    "phy_delay_us": "14 / C",
+    "hop_delay_us": "0.023 L / 4.5 + T_phy",
+    "arbitration_phase_us": "hop H + 4 g / C + 1.63",
+    "data_phase_us": "hop H + 8 B / R",
+    "acknowledge_phase_us": "hop H + 0.25",
+    "request_us": "ArbP + DTP",
+    "response_us": "ArbP + DTP",
+    "acknowledge_us": "AckP",
+    "subaction_gap_us": "(29 + 16 g) / C",
+    "arbitration_reset_gap_us": "(53 + 32 g) / C",
+    "gaps_us": "(82 + 48 g) / C",
+    "published_nodes": "(alpha T_s - CTS) / (2 (T_lant + T_sum))",
+    "interval_latency_us": "T1 + T2 + T3 + T4 + T5",
+    "request_and_acknowledge_us": "T_req + T_ack",
+    "response_and_acknowledge_us": "T_resp + T_ack",
+    "published_request_and_acknowledge_us": "3.11 + 8 P / 393.216",
+}
+
+
+def number(value: float, symbol: str = "x") -> Traced:
+    return Traced(value, given=Input(symbol, symbol, value, "1", "given", "test", "a number"))
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_every_equation_writes_itself_down_as_printed(name: str) -> None:
+    assert formula_of(EQUATIONS[name]) == PRINTED[name]
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_the_formula_in_a_docstring_is_the_one_that_is_computed(name: str) -> None:
+    equation = EQUATIONS[name]
+    assert f"{equation.symbol} = {PRINTED[name]} [" in str(equation.function.__doc__)
+    assert f"References\n    ----------\n    {equation.source}." in str(equation.function.__doc__)
+
+
+def test_the_registry_holds_equations_1_to_15() -> None:
+    whole = [equation.numbers for equation in EQUATIONS.values() if not equation.part]
+    # Each module enters its own when it is loaded.
+    assert sorted(whole) == [(number,) for number in range(1, 16)]
+    assert [one for one in whole if one > (2,)] == [(number,) for number in range(3, 16)]
+    functions = {
+        name
+        for module in (time_slice, equations)
+        for name, one in vars(module).items()
+        if inspect.isfunction(one) and one.__module__ == module.__name__
+    }
+    assert set(EQUATIONS) == functions
+
+
+LEAF = st.integers(1, 9).map(lambda value: number(float(value), f"x{value}"))
+OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
+    "+": lambda left, right: left + right,
+    "-": lambda left, right: left - right,
+    "*": lambda left, right: left * right,
+    "/": lambda left, right: left / right if right != 0 else left,
+}
+
+
+def applied(operation: str, left: Any, right: Any) -> Any:
+    """Compute with traced numbers; plain ones alone stay whole, for a fraction is written with seven digits."""
+    return OPERATIONS[operation](left, right) if isinstance(left, Traced) or isinstance(right, Traced) else left
+
+
+EXPRESSION = st.recursive(
+    LEAF | st.integers(2, 9),
+    lambda inner: st.tuples(st.sampled_from(sorted(OPERATIONS)), inner, inner).map(lambda one: applied(*one)),
+    max_leaves=8,
+)
+
+
+@given(EXPRESSION)
+def test_any_expression_reads_back_as_its_value_in_numbers_and_in_symbols(expression: Any) -> None:
+    if not isinstance(expression, Traced):
+        return
+    in_numbers = formula_text(expression, in_numbers=True)
+    if expression.operation:
+        assert eval(in_numbers) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
+        symbols = {f"x{value}": float(value) for value in range(1, 10)}
+        in_symbols = re.sub(r"(?<=[\w)]) (?=[\w(])", "*", formula_text(expression, in_numbers=False))
+        assert eval(in_symbols, symbols) == pytest.approx(expression.value, rel=1e-5, abs=1e-9)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
+def test_it_compares_as_its_value_does(one: float, other: float) -> None:
+    left, right = number(one), number(other)
+    found = [left < right, left <= right, left > right, left >= right, left == right, left < other, one < right]
+    expected = [one < other, one <= other, one > other, one >= other, one == other, one < other, one < other]
+    assert [(type(truth), truth.value) for truth in found] == [(Traced, truth) for truth in expected]
+    assert list(map(bool, found)) == expected
+
+
+def test_it_is_no_plain_number() -> None:
+    for taken in (plain, float, int, lambda one: -one, lambda one: one // 2):
+        with pytest.raises(TypeError):
+            taken(number(2.0))
+
+
+def test_a_choice_is_written_as_what_was_chosen_and_rests_on_what_decided() -> None:
+    x, y = number(3.0, "x"), number(2.0, "y")
+    for chosen in (choose(y > 1, x, 9.0), choose(y > 2, 9.0, x)):
+        assert isinstance(chosen, Traced)
+        assert (formula_text(chosen, in_numbers=False), chosen.value) == ("x", 3.0)
+        assert [one.symbol for one in inputs(chosen)] == ["x", "y"]
+    plain = choose(x > 2, 9.0, x)
+    assert isinstance(plain, Traced)
+    assert (formula_text(plain, in_numbers=False), plain.value) == ("9", 9.0)
+    assert [one.symbol for one in inputs(plain)] == ["x"]
+
+
+def test_switches_leave_no_trace() -> None:
+    x = number(3.0)
+    assert x * True is x
+    assert x * False == 0.0
+    assert x + 0 is x
+    assert x - 0 is x
+    assert 0 + x is x
+
+
+def test_lines_and_inputs_are_listed_once_and_in_order() -> None:
+    x, y = number(2.0, "x"), number(3.0, "y")
+    first = (x * y).named("first_us", "A")
+    second = (first + first * x).named("second_us", "B")
+    assert [one.key for one in lines(second)] == ["first_us", "second_us"]
+    assert [one.symbol for one in inputs(second)] == ["x", "y"]
+    assert formula_text(second, in_numbers=False) == "A + A x"
+    assert math.isclose(second.value, 18.0)
+
+
+def test_a_sum_of_thousands_is_short_and_has_all_its_inputs() -> None:
+    each = [Traced(float(n), given=Input(f"x{n}", f"key{n}", n, "", "given", "", "")) for n in range(5000)]
+    whole = 2 * total(one * 3 for one in each)
+    assert isinstance(whole, Traced)
+    text = formula_text(whole, in_numbers=False)
+    assert text == "2 (x0 * 3 + x1 * 3 + x2 * 3 + ... 4996 more ... + x4999 * 3)"
+    assert len(list(inputs(whole))) == 5000
+    assert list(lines(whole)) == [whole]

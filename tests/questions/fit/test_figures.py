@@ -1,0 +1,296 @@
+"""Capacity against an exact second implementation, brute force, and the limits of the standard."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import ulp
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.buses.ieee1394.timing import TIMING_MODELS, TimingModelName
+from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.figures import CapacityFigures, capacity, figures
+from busplan.questions.fit.network import model_names, network_of
+from busplan.questions.fit.node_limit import largest_nodes
+from busplan.sections.profile import Profile
+
+Make = Callable[..., Profile]
+Exact = Callable[[Profile, str, int], Fraction]
+Start = Callable[[Profile, int], Fraction]
+
+MODELS = st.sampled_from(sorted(TIMING_MODELS))
+
+Carries = Callable[[Profile, int], bool]
+Around = Callable[[int, Callable[[int], bool]], list[int]]
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data())
+def test_max_nodes_is_the_largest_that_fits_in_exact_arithmetic(
+    data: st.DataObject,
+    any_profile: st.SearchStrategy[Profile],
+    exact: Exact,
+    start: Start,
+    carries: Carries,
+    around: Around,
+) -> None:
+    profile = data.draw(any_profile)
+    model = data.draw(st.sampled_from(model_names(profile)))
+    limit = {"S100": 512, "S200": 1024, "S400": 2048}[profile.bus.speed]
+    available = Fraction(profile.cycle.slice_ratio) * Fraction(profile.cycle.period_us)
+
+    def good(nodes: int) -> bool:
+        hops = nodes if profile.bus.max_hops is None else profile.bus.max_hops
+        # A float's rounding in the product of two floats is no reason to refuse an exact fit.
+        return (
+            bool(network_of(profile).largest_payload_bytes <= limit)
+            and hops <= 16
+            and carries(profile, nodes)
+            and start(profile, nodes) <= 124
+            and exact(profile, model, nodes) <= available * (1 + Fraction(1, 10**12))
+        )
+
+    found, _ = largest_nodes(profile, model=model)
+    assert around(found, good) == [found][:found]
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data(), model=MODELS, nodes=st.integers(1, 62))
+def test_a_cycle_that_fits_exactly_fits(
+    data: st.DataObject, model: TimingModelName, nodes: int, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    drawn = data.draw(any_profile)
+    required_us = cycle_of(drawn, model=model, nodes=nodes).required_us
+    exact_fit = drawn.model_copy(
+        update={"cycle": drawn.cycle.model_copy(update={"period_us": required_us / drawn.cycle.slice_ratio})}
+    )
+    found, limit = largest_nodes(exact_fit, model=model)
+    if limit == "time":
+        # One node more needs at least the time of its transactions: nothing rounds up to it.
+        assert found == nodes
+    else:
+        assert found <= nodes
+    short = exact_fit.model_copy(
+        update={"cycle": exact_fit.cycle.model_copy(update={"period_us": exact_fit.cycle.period_us * (1 - 1e-9)})}
+    )
+    assert largest_nodes(short, model=model)[0] < nodes
+
+
+@settings(max_examples=200, deadline=None)
+@given(data=st.data())
+def test_required_time_equals_the_exact_one(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile], exact: Exact
+) -> None:
+    profile = data.draw(any_profile)
+    model = data.draw(st.sampled_from(model_names(profile)))
+    found_us = cycle_of(profile, model=model).required_us
+    assert found_us == pytest.approx(float(exact(profile, model, profile.alike_nodes[0].nodes)), rel=1e-13)
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data())
+def test_the_figures_of_a_profile_agree_with_each_other(
+    data: st.DataObject, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    model = data.draw(st.sampled_from(model_names(profile)))
+    found = figures(profile, model=model)
+    parts_us = (
+        found.cycle_starts_us
+        + found.sync_us
+        + found.cycle_arbitration_us
+        + found.cycle_data_us
+        + found.cycle_acknowledge_us
+        + found.cycle_hold_us
+        + found.cycle_execution_us
+        + found.cycle_worst_extra_us
+        + found.cycle_idle_us
+        + found.cycle_host_us
+        + found.retries_us
+        + found.nonperiodic_us
+    )
+    assert parts_us == pytest.approx(found.required_us, rel=1e-12)
+    assert found.required_us == cycle_of(profile, model=model).required_us
+    assert found.required_time_slice_us * found.nodes == pytest.approx(found.required_us, rel=1e-13)
+    assert found.max_nodes is not None
+    assert found.fits == (found.nodes <= found.max_nodes) == (not found.exceeded)
+    assert ("time" in found.exceeded) == (found.margin_us < 0)
+    assert found.margin_us == pytest.approx(found.available_us - found.required_us, abs=1e-9 * found.required_us)
+    assert found.utilisation == pytest.approx(found.required_us / found.available_us)
+    assert found.max_axes == profile.alike_nodes[0].node.axes * found.max_nodes
+    assert found.axes == profile.alike_nodes[0].node.axes * found.nodes
+    assert found.time_slice_us * found.nodes == pytest.approx(found.available_us)
+    assert found.gaps_us == pytest.approx(found.subaction_gap_us + found.arbitration_reset_gap_us)
+    assert found.min_period_us is not None
+    assert found.min_period_us * profile.cycle.slice_ratio == pytest.approx(found.required_us)
+    assert found.min_slice_ratio * profile.cycle.period_us == pytest.approx(found.required_us)
+    if model == "paper":
+        assert {found.bias_us, found.safe_required_us, found.safe_nodes, found.verdict, found.doubts} == {None, ()}
+        return
+    assert found.bias_us is not None
+    assert found.safe_required_us is not None
+    assert found.safe_nodes is not None
+    corrected_us = found.available_us - found.required_us - found.bias_us
+    assert found.margin_corrected_us == pytest.approx(corrected_us, abs=1e-9 * found.required_us)
+    shown_us = found.required_us + found.bias_us + (found.uncertainty_us or 0)
+    assert found.safe_required_us == pytest.approx(shown_us)
+    assert found.safe_min_period_us == pytest.approx(found.safe_required_us / profile.cycle.slice_ratio)
+    assert found.safe_axes == profile.alike_nodes[0].node.axes * found.safe_nodes
+    assert (found.verdict == "fits" and found.safe) == (found.nodes <= found.safe_nodes)
+
+
+@settings(max_examples=50, deadline=None)
+@given(data=st.data(), model=MODELS)
+def test_the_smallest_period_fits_and_nothing_below_it(
+    data: st.DataObject, model: TimingModelName, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    profile = data.draw(any_profile)
+    smallest_us = figures(profile, model=model).min_period_us
+    assert smallest_us is not None
+    at, below = (
+        figures(result, model=model)
+        for result in (
+            profile.model_copy(update={"cycle": profile.cycle.model_copy(update={"period_us": period_us})})
+            for period_us in (smallest_us, smallest_us * (1 - 1e-9))
+        )
+    )
+    assert "time" not in at.exceeded
+    assert at.margin_us == pytest.approx(0.0, abs=1e-9 * at.required_us)
+    assert "time" in below.exceeded
+
+
+GROWING = {
+    "bus__gap_count": st.integers(0, 63),
+    "payload__read_bytes": st.integers(1, 2048),
+    "payload__write_bytes": st.integers(5, 2048),
+    "payload__overhead_bytes": st.integers(0, 100),
+    "node__execution__base_us": st.floats(0, 100),
+    "node__execution__per_byte_us": st.floats(0, 1),
+    "cycle__nonperiodic_us": st.floats(0, 1000),
+    "cycle__sync__ping_us": st.floats(0, 100),
+    "cycle__sync__ping_per_node_us": st.floats(0, 100),
+    "bus__cable_length_m": st.floats(0.1, 100),
+}
+
+
+@pytest.mark.parametrize("key", GROWING)
+@settings(max_examples=30, deadline=None)
+@given(data=st.data(), model=MODELS, period_us=st.floats(50, 20_000))
+def test_max_nodes_never_grows_with_what_costs_time(
+    key: str, data: st.DataObject, model: TimingModelName, period_us: float, make: Make
+) -> None:
+    small, large = sorted((data.draw(GROWING[key]), data.draw(GROWING[key])))
+    few, many = (
+        largest_nodes(make(cycle__period_us=period_us, **{key: value}), model=model)[0] for value in (large, small)
+    )
+    assert few <= many
+
+
+def test_a_payload_of_exactly_a_quadlet_is_cheaper_than_a_smaller_one(make: Make) -> None:
+    # The one place where the standard model is not monotone: 4 bytes travel as a quadlet, 1 to 3 as a block.
+    small, quadlet = (
+        figures(make(payload__write_bytes=size, node__execution__per_byte_us=0.0), model="standard").required_us
+        for size in (3, 4)
+    )
+    assert quadlet < small
+
+
+@given(data=st.data(), model=MODELS, periods=st.lists(st.floats(1, 50_000), min_size=2, max_size=2))
+@settings(max_examples=100, deadline=None)
+def test_max_nodes_never_shrinks_with_the_period(
+    data: st.DataObject, model: TimingModelName, periods: list[float], any_profile: st.SearchStrategy[Profile]
+) -> None:
+    drawn = data.draw(any_profile)
+    few, many = (
+        largest_nodes(
+            drawn.model_copy(update={"cycle": drawn.cycle.model_copy(update={"period_us": period_us})}), model=model
+        )[0]
+        for period_us in sorted(periods)
+    )
+    assert few <= many
+
+
+def only(profile: Profile, model: TimingModelName = "standard") -> CapacityFigures:
+    return capacity(profile, timing_models=[model]).results[0]
+
+
+@pytest.mark.parametrize(("speed", "limit_bytes"), [("S100", 512), ("S200", 1024), ("S400", 2048)])
+def test_a_payload_over_the_speeds_limit_carries_no_node(make: Make, speed: str, limit_bytes: int) -> None:
+    at, over = (
+        only(make(bus__speed=speed, payload__write_bytes=size, cycle__period_us=1e6))
+        for size in (limit_bytes, limit_bytes + 1)
+    )
+    assert at.fits
+    assert (over.max_nodes, over.limited_by, over.exceeded, over.fits) == (0, "payload", ("payload",), False)
+
+
+def test_a_chain_ends_at_16_hops(make: Make) -> None:
+    at, over = (only(make(bus__nodes=nodes, cycle__period_us=1e6)) for nodes in (16, 17))
+    assert (at.fits, at.max_nodes, at.limited_by) == (True, 16, "hops")
+    assert (over.fits, over.max_nodes, over.exceeded) == (False, 16, ("hops",))
+
+
+def test_a_tree_ends_at_62_nodes(make: Make) -> None:
+    at, over = (only(make(bus__nodes=nodes, bus__max_hops=4, cycle__period_us=1e6)) for nodes in (62, 63))
+    assert (at.fits, at.max_nodes, at.limited_by) == (True, 62, "nodes")
+    assert (over.fits, over.max_nodes, over.exceeded) == (False, 62, ("nodes",))
+
+
+def test_a_tree_of_more_than_16_hops_carries_no_node(make: Make) -> None:
+    found = only(make(bus__max_hops=17, cycle__period_us=1e6))
+    assert (found.max_nodes, found.limited_by, found.exceeded) == (0, "hops", ("hops",))
+
+
+def test_every_broken_limit_is_named(make: Make) -> None:
+    found = only(make(bus__nodes=70, payload__read_bytes=3000))
+    assert found.exceeded == ("payload", "nodes", "hops", "time")
+
+
+def test_a_period_too_short_for_anything_carries_no_node(make: Make) -> None:
+    found = only(make(cycle__period_us=1e-3))
+    assert (found.max_nodes, found.limited_by, found.fits) == (0, "time", False)
+
+
+def test_optimal_gap_count_follows_the_chain(make: Make) -> None:
+    three, ten = (only(make(bus__gap_count="optimal", bus__nodes=nodes)) for nodes in (3, 10))
+    assert (three.gap_count, ten.gap_count) == (8, 26)
+    assert three.gap_count == three.safe_gap_count
+
+
+def test_the_paper_promises_half_as_many_nodes_again(make: Make) -> None:
+    # With execution out of the way and a tree that holds the hops, the gap terms decide.
+    profile = make(bus__max_hops=1, node__execution__base_us=0.0, node__execution__per_byte_us=0.0)
+    paper, standard = (only(profile, model).required_us for model in ("paper", "standard"))
+    assert standard / paper > 1.5
+
+
+def test_results_nest_periods_then_models_as_asked(make: Make) -> None:
+    result = capacity(make(), periods_us=[1000.0, 500.0, 1000.0], timing_models=["standard", "paper"])
+    assert [(one.period_us, one.timing_model) for one in result.results] == [
+        (1000.0, "standard"),
+        (1000.0, "paper"),
+        (500.0, "standard"),
+        (500.0, "paper"),
+        (1000.0, "standard"),
+        (1000.0, "paper"),
+    ]
+
+
+def test_the_binding_term_is_the_largest(make: Make) -> None:
+    assert only(make()).binding_term == "execution"
+    assert only(make(node__execution__base_us=0.0, node__execution__per_byte_us=0.0)).binding_term == "idle"
+    assert only(make(host={"transaction_us": 200.0})).binding_term == "host"
+    assert only(make(cycle__nonperiodic_us=900.0)).binding_term == "nonperiodic"
+
+
+def test_rounding_allowance_is_rounding_and_no_more() -> None:
+    assert fits_in(100.0 + ulp(100.0), available_us=100.0)
+    assert not fits_in(100.0 + 1e-8, available_us=100.0)
+
+
+def test_equation_11_as_published_at_the_profiles_own_nodes(make: Make) -> None:
+    found = only(make(), "paper")
+    by_hand = (found.available_us - 0.4) / (2 * (found.read_latency_us + found.gaps_us))
+    assert found.read_latency_us == found.write_latency_us
+    assert found.nodes_eq11 == pytest.approx(by_hand, rel=1e-14)

@@ -1,0 +1,428 @@
+"""Groups of unlike nodes: equal ones are a uniform bus, unlike ones add up, and each is counted for itself."""
+
+from collections import defaultdict
+from collections.abc import Callable
+from math import fsum
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from busplan.buses.ieee1394.constants import PHY_DELAY_HALF_WIDTH_US
+from busplan.buses.ieee1394.section import Ieee1394Profile
+from busplan.elementwise import plain, value_of
+from busplan.errors import BusplanError
+from busplan.gate.gate import check_document
+from busplan.profile.keys import dotted_keys
+from busplan.profile.shipped import load
+from busplan.profile.toml import decode, override, validate
+from busplan.profile.write import profile_text
+from busplan.questions.explain.capacity import capacity_figures
+from busplan.questions.fit.certainty import certainty
+from busplan.questions.fit.cycle import cycle_of, fits_in
+from busplan.questions.fit.figures import COUNTS, figures
+from busplan.questions.fit.loop_delays import loop_delays_us
+from busplan.questions.fit.network import bus_of, model_names, network_of
+from busplan.questions.plan.machine import nodes_for_axes, rooms
+from busplan.questions.plan.planning import plan
+from busplan.questions.sweep.blocks import figure_names, sweep
+from busplan.questions.sweep.grid import checked_grid
+from busplan.questions.sweep.values import listed
+from busplan.sections.profile import Profile
+
+SOME = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+GANTRY = load("gantry-24").profile
+
+
+def profile_of(data: dict[str, Any]) -> Profile:
+    return Ieee1394Profile.model_validate(data)
+
+
+def in_groups(profile: Profile, parts: list[int]) -> Profile:
+    """The same nodes in groups of these sizes."""
+    data = profile.model_dump(exclude_unset=True)
+    node, payload = data.pop("node"), data.pop("payload")
+    del data["bus"]["nodes"]
+    names = "abcdef"
+    data["group"] = [{**node, **payload, "name": names[place], "nodes": nodes} for place, nodes in enumerate(parts)]
+    return profile_of(data)
+
+
+@st.composite
+def groups(draw: st.DrawFn, name: str) -> dict[str, Any]:
+    axes = draw(st.integers(0, 6))
+    payload: dict[str, int] = {}
+    for kind in ("read", "write"):
+        each = draw(st.none() | st.integers(1, 100)) if axes else None
+        if each is not None:
+            payload[f"{kind}_bytes_per_axis"] = each
+        if each is None or draw(st.booleans()):
+            payload[f"{kind}_bytes"] = draw(st.integers(1, 600))
+    return {
+        "name": name,
+        "nodes": draw(st.integers(1, 8)),
+        "axes": axes,
+        **payload,
+        "execution": {
+            "kind": "linear",
+            "base_us": draw(st.floats(0, 80)),
+            "per_byte_us": draw(st.floats(0, 1)),
+            "worst_extra_us": draw(st.sampled_from([0.0, 3.0])),
+            "grade": draw(st.sampled_from(["measured", "assumed"])),
+            "residual": draw(st.sampled_from(["none", "standard"])),
+        },
+        "read_response": draw(st.sampled_from(["split", "concatenated"])),
+        "write_response": draw(st.sampled_from(["split", "unified"])),
+        "hops": draw(st.integers(1, 5)),
+    }
+
+
+@st.composite
+def grouped(draw: st.DrawFn) -> Profile:
+    """Random profiles with one to three groups, in a chain or a tree, with each way to charge hops."""
+    tree = draw(st.booleans())
+    each = [draw(groups(name)) for name in "abc"[: draw(st.integers(1, 3))]]
+    for one in each:
+        if not tree:
+            del one["hops"]
+    return profile_of(
+        {
+            "schema_version": 1,
+            "name": "grouped",
+            "bus": {
+                "kind": "ieee1394",
+                "speed": draw(st.sampled_from(["S100", "S400"])),
+                "gap_count": draw(st.sampled_from([63, 20, "optimal"])),
+                "charge_hops": draw(st.sampled_from(["farthest", "own"])),
+                **({"max_hops": 5} if tree else {}),
+                "cycle_master": draw(st.booleans()),
+            },
+            "host": {"transaction_us": draw(st.sampled_from([0.0, 12.5]))},
+            "cycle": {
+                "period_us": draw(st.floats(300, 20_000)),
+                "slice_ratio": draw(st.floats(0.3, 1.0)),
+                "retries": draw(st.sampled_from([0, 2])),
+                "schedule": draw(st.sampled_from(["individual", "broadcast"])),
+                "broadcast_request": draw(st.sampled_from(["isochronous", "priority", "timed"])),
+            },
+            "group": each,
+            "limits": {"reserve": draw(st.sampled_from([0.0, 0.15]))},
+        }
+    )
+
+
+# --- equal groups -----------------------------------------------------------------------------------------
+
+
+@SOME
+@given(data=st.data(), parts=st.lists(st.integers(1, 20), min_size=1, max_size=4), own=st.booleans())
+def test_equal_neighbours_are_the_uniform_bus_to_the_bit(
+    data: st.DataObject, parts: list[int], own: bool, any_profile: st.SearchStrategy[Profile]
+) -> None:
+    drawn = data.draw(any_profile)
+    profile = override(
+        drawn, {"bus.nodes": sum(parts), **({"bus.charge_hops": "own"} if own and not drawn.bus.max_hops else {})}
+    )
+    split = in_groups(profile, parts)
+    assert model_names(split) == model_names(profile)
+    for model in model_names(profile):
+        one, other = figures(profile, model=model), figures(split, model=model)
+        assert other.terms == one.terms
+        whole = {key: value for key, value in one.by_key().items() if key not in {*COUNTS, "nodes_eq11"}}
+        assert {key: other.by_key()[key] for key in whole} == whole
+        assert list(cycle_of(split, model=model).events()) == list(cycle_of(profile, model=model).events())
+        for nodes, group in zip(parts, other.groups, strict=True):
+            # The others are there already; a bus that is too full with one node more of any carries none.
+            for key in ("max_nodes", "safe_nodes"):
+                most = getattr(one, key)
+                expected = None if most is None else max(most - (sum(parts) - nodes), 0)
+                assert getattr(group, key) == expected
+        assert all(getattr(other, key) is None for key in COUNTS)
+
+
+def test_equal_groups_that_are_no_neighbours_stay_apart() -> None:
+    drives, tool, _ = GANTRY.group
+    data = GANTRY.model_dump(exclude_unset=True)
+    data["group"] = [{**data["group"][0], "name": name} for name in "ab"]
+    assert len(network_of(profile_of(data)).groups) == 1
+    data["group"].insert(1, GANTRY.model_dump(exclude_unset=True)["group"][1])
+    network = network_of(profile_of(data))
+    assert [group.name for group in network.groups] == ["a", "tool", "b"]
+    assert network.nodes == 2 * drives.nodes + tool.nodes
+
+
+# --- unlike groups ----------------------------------------------------------------------------------------
+
+
+@SOME
+@given(profile=grouped())
+def test_events_add_up_to_the_terms(profile: Profile) -> None:
+    for model in model_names(profile):
+        cycle = cycle_of(profile, model=model)
+        of_events: dict[str, list[float]] = defaultdict(list)
+        for event in cycle.events():
+            of_events[event.term].append(event.us)
+        for term in cycle.terms:
+            assert fsum(of_events.pop(term.key, [])) == pytest.approx(plain(term.us), rel=1e-12, abs=1e-12)
+        assert not of_events
+
+
+@SOME
+@given(profile=grouped())
+def test_each_group_is_counted_as_a_brute_search_counts_it(profile: Profile) -> None:
+    """One node more at a time, the others as they are, each a profile of its own."""
+    model = bus_of(profile).deciding_model
+    for one in figures(profile, model=model).groups:
+        for key, fits in (("max_nodes", _fits), ("safe_nodes", _is_shown)):
+            most = getattr(one, key)
+            counts = {most, most + 1} - {0}
+            found = {nodes: fits(override(profile, {f"group.{one.name}.nodes": nodes})) for nodes in counts}
+            assert found == {nodes: nodes <= most for nodes in counts}, (one.name, key)
+        assert (one.max_axes, one.safe_axes) == tuple(
+            axes_of(profile, one.name) * (nodes or 0) for nodes in (one.max_nodes, one.safe_nodes)
+        )
+
+
+def axes_of(profile: Profile, name: str) -> int:
+    return next(one.axes for one in profile.group if one.name == name)
+
+
+def _fits(profile: Profile) -> bool:
+    cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
+    given_us = plain(cycle.network.period_us) * plain(cycle.network.slice_ratio)
+    return not bus_of(profile).broken(network_of(profile)) and bool(fits_in(cycle.required_us, available_us=given_us))
+
+
+def _is_shown(profile: Profile) -> bool:
+    cycle = cycle_of(profile, model=bus_of(profile).deciding_model)
+    given_us = plain(cycle.network.period_us) * plain(cycle.network.slice_ratio)
+    needed_us = certainty(cycle).safe_required_us
+    safe = bus_of(profile).is_safe(cycle.network)
+    return safe and not bus_of(profile).broken(network_of(profile)) and bool(fits_in(needed_us, available_us=given_us))
+
+
+@SOME
+@given(profile=grouped())
+def test_own_hops_never_take_longer_than_those_of_the_farthest(profile: Profile) -> None:
+    own, farthest = (override(profile, {"bus.charge_hops": word}) for word in ("own", "farthest"))
+    pairs = zip(cycle_of(own, model="standard").terms, cycle_of(farthest, model="standard").terms, strict=True)
+    for one, other in pairs:
+        assert plain(one.us) <= plain(other.us) + 1e-9, one.key
+
+
+@SOME
+@given(profile=grouped())
+def test_a_derivation_gives_the_figures(profile: Profile) -> None:
+    for model in model_names(profile):
+        known, derived = figures(profile, model=model).by_key(), capacity_figures(profile, model=model)
+        for key, value in known.items():
+            if key in derived:
+                assert value_of(derived[key]) == (list(value) if isinstance(value, tuple) else value), key
+            else:
+                assert value is None
+
+
+@settings(SOME, max_examples=12)
+@given(profile=grouped(), nodes=st.lists(st.integers(1, 20), min_size=2, max_size=4, unique=True))
+def test_a_sweep_gives_what_each_profile_gives(profile: Profile, nodes: list[int]) -> None:
+    name = profile.group[-1].name
+    vary = {
+        f"group.{name}.nodes": listed(nodes, name="nodes"),
+        f"group.{profile.group[0].name}.axes": listed([1, 2], name="axes"),
+    }
+    grid, models = checked_grid(profile, vary, with_circle=False), model_names(profile)
+    (block,) = sweep(profile, grid, timing_models=models)
+    names = figure_names(profile)
+    for index in range(grid.points * len(models)):
+        row = block.row(index, (*vary, *names))
+        where = override(profile, {key: int(row[key]) for key in vary})  # type: ignore[arg-type]
+        alone = figures(where, model=models[index % len(models)])
+        own = {f"group.{one.name}.{key}": getattr(one, key) for one in alone.groups for key in COUNTS}
+        for key, value in ({**alone.by_key(), **own}).items():
+            found = None if isinstance(row[key], float) and np.isnan(row[key]) else row[key]  # type: ignore[arg-type]
+            expected = list(value) if isinstance(value, tuple) else value
+            assert found == (
+                pytest.approx(expected, rel=1e-9, abs=1e-9) if isinstance(expected, float) else expected
+            ), key
+
+
+def test_the_figures_of_the_gantry_by_hand() -> None:
+    """Execution: 4 nodes of 40 B twice, one of 36 and 32 B, one read of 8 B; 0.1 us a byte."""
+    (term,) = (one for one in cycle_of(GANTRY, model="standard").terms if one.name == "execution")
+    assert term.us == pytest.approx(4 * 2 * (20 + 4.0) + (20 + 3.6) + (20 + 3.2) + (5 + 0.8))
+    found = figures(GANTRY, model="standard")
+    assert (found.nodes, found.axes, found.hops) == (6, 24, 6)
+
+
+def test_set_points_of_the_circle_arrive_at_nodes_with_axes() -> None:
+    """x is on the first node that has axes, y on the last."""
+    changes: dict[str, object] = {"servo.loop": "host", "servo.update": "on_arrival"}
+    data = override(GANTRY, changes).model_dump(exclude_unset=True)
+    last_y = loop_delays_us(profile_of(data))[1]
+    data["group"] = [*data["group"][:-1], {**data["group"][-1], "axes": 1}]
+    assert loop_delays_us(profile_of(data))[1] > last_y
+
+
+# --- what a profile may say -------------------------------------------------------------------------------
+
+
+def gantry_with(old: str, new: str) -> str:
+    text = load("gantry-24").document.text
+    assert old in text
+    return text.replace(old, new, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('name = "tool" ', 'name = "drives" ', 'group[1].name = "drives": there is a group of this name'),
+        ("axes = 0", "axes = 0\nread_bytes_per_axis = 4\nread_bytess = 1", "read_bytess: unknown key"),
+        (
+            "read_bytes = 8             # assumed\n",
+            "read_bytes_per_axis = 4\n",
+            "group.io.read_bytes_per_axis = 4: makes a payload of 0 bytes, for the group has no axes; give read_bytes",
+        ),
+        ("nodes = 4\n", "", "group.drives.nodes: missing key. Nodes of the group; for example nodes = 2"),
+        ("nodes = 4\n", "nodes = 0\n", "group.drives.nodes = 0: must be 1 or more"),
+        ("[cycle]", "nodes = 6\n[cycle]", "bus.nodes = 6: each [[group]] has its own, as group.NAME.nodes; remove one"),
+        ("[limits]", "[node]\naxes = 1\n[limits]", "node.execution: missing section"),
+        ("axes = 4\n", "axes = 4\nhops = 2\n", "group.tool.hops = 2: the order of the groups says it in a chain"),
+        (
+            'charge_hops = "own" ',
+            'charge_hops = "own"\nmax_hops = 3 ',
+            "group.drives.hops: missing key: bus.charge_hops",
+        ),
+        ('kind = "linear"\ngrade', 'kind = "linea"\ngrade', 'group.drives.execution.kind = "linea": expected'),
+    ],
+)
+def test_a_fault_of_a_group_is_named_with_its_place(old: str, new: str, said: str) -> None:
+    with pytest.raises(BusplanError) as caught:
+        validate(decode(gantry_with(old, new).encode(), name="x.toml"))
+    (problem,) = (one for one in caught.value.problems if said in one)
+    assert problem.startswith("x.toml:")
+
+
+def test_a_tree_charges_the_hops_of_its_groups() -> None:
+    text = gantry_with('charge_hops = "own" ', 'charge_hops = "own"\nmax_hops = 3 ')
+    for axes in ("axes = 5", "axes = 4", "axes = 0"):
+        text = text.replace(axes, f"{axes}\nhops = 2", 1)
+    tree = validate(decode(text.encode(), name="x.toml"))
+    phases = cycle_of(tree, model="standard").latencies()
+    assert {one.phases["hops"] for one in phases} == {2}
+    assert cycle_of(tree, model="standard").figures()["hops"] == 3
+
+
+@SOME
+@given(profile=grouped())
+def test_a_written_profile_reads_to_the_same(profile: Profile) -> None:
+    assert validate(decode(profile_text(profile).encode(), name="x")) == profile
+    assert dotted_keys(profile)["group"].value == [one.name for one in profile.group]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"group.drive.nodes": 3}, "group.drive.nodes: no group is called drive; there are drives, tool, io"),
+        ({"group.nodes": 3}, "group.nodes: no such key; give the name of one, as group.drives.nodes"),
+        ({"bus.nodes": 5}, "bus.nodes 5: each [[group]] has its own"),
+        ({"group.io.axes": -1}, "group.io.axes -1: must be 0 or more"),
+    ],
+)
+def test_a_change_of_a_group_is_checked_as_the_file(changes: dict[str, object], said: str) -> None:
+    with pytest.raises(BusplanError, match=said.replace("[", r"\[").replace("]", r"\]")):
+        override(GANTRY, changes)
+
+
+def test_groups_can_take_the_place_of_the_nodes(make: Callable[..., Profile]) -> None:
+    data = GANTRY.model_dump(exclude_unset=True)
+    with pytest.raises(BusplanError, match=r"bus\.nodes: each"):
+        override(make(), {"group": data["group"]})
+
+
+# --- what to set ------------------------------------------------------------------------------------------
+
+
+@settings(SOME, max_examples=15)
+@given(
+    profile=grouped(),
+    limits=st.fixed_dictionaries(
+        {},
+        optional={
+            "limits.max_utilisation": st.sampled_from([0.3, 0.8]),
+            "limits.min_spare_nodes": st.integers(0, 3),
+            "limits.min_spare_axes": st.integers(0, 9),
+        },
+    ),
+)
+def test_what_a_plan_writes_for_groups_passes_the_gate(profile: Profile, limits: dict[str, object]) -> None:
+    found = plan(override(profile, limits))
+    if found.recommended is None:
+        assert found.binding is not None
+        return
+    text = profile_text(found.recommended.profile).encode()
+    checked = check_document(decode(text, name="new.toml"), with_circle=False, record=False).findings
+    assert [one.message for one in checked if one.severity == "error"] == []
+
+
+def test_a_plan_names_what_it_cannot_ask_of_groups() -> None:
+    with pytest.raises(BusplanError, match=r"axes 30: the nodes of gantry-24 differ; .*group\.drives\.nodes"):
+        nodes_for_axes(GANTRY, 30)
+    with pytest.raises(BusplanError, match="nodes: there is nothing of that name to free"):
+        plan(GANTRY, free=["nodes"])
+    assert plan(GANTRY).recommended is not None
+    found = plan(GANTRY, wanted={"group.drives.nodes": 9}, free=["payload", "period"])
+    assert found.recommended is not None
+    assert set(found.recommended.changes) == {"cycle.period_us"} | {
+        f"group.{key}_bytes_per_axis" for key in ("drives.read", "drives.write", "tool.read", "tool.write")
+    }
+
+
+def test_a_plan_keeps_room_in_each_group() -> None:
+    asked = override(GANTRY, {"limits.min_spare_nodes": 2, "limits.min_spare_axes": 7})
+    found = {(room.key.removeprefix("limits."), room.words): room.network.nodes for room in rooms(asked)}
+    assert found == {
+        ("min_spare_nodes", "6 nodes of drives"): 8,
+        ("min_spare_axes", "6 nodes of drives"): 8,  # 7 axes are on two nodes of five
+        ("min_spare_nodes", "3 nodes of tool"): 8,
+        ("min_spare_axes", "3 nodes of tool"): 8,
+        ("min_spare_nodes", "3 nodes of io"): 8,  # and none has axes
+    }
+
+
+# --- each node's own way ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kind", "root", "steps"), [("request_data", None, 1), ("arbitration", None, 0), ("arbitration", "host", 1)]
+)
+def test_each_node_is_drawn_at_its_own_hops(
+    make: Callable[..., Profile], kind: str, root: str | None, steps: int
+) -> None:
+    """Arbitration goes to the root, which may lie at the end of the chain."""
+    profile = make(bus__nodes=4, bus__charge_hops="own", bus__root=root)
+    hop_us = 0.023 + 14 / 98.304
+    first_us: dict[int, float] = {}
+    for event in cycle_of(profile, model="standard").events():
+        if event.kind == kind and event.transaction == "read" and event.node is not None:
+            first_us.setdefault(event.node, event.us)
+    assert list(first_us) == [1, 2, 3, 4]
+    steps_us = [first_us[node + 1] - first_us[node] for node in (1, 2, 3)]
+    assert steps_us == pytest.approx([steps * hop_us] * 3, rel=1e-9)
+
+
+@pytest.mark.parametrize(("root", "parts"), [("host", 12), (None, 8)])
+def test_the_doubt_of_phys_is_that_of_each_nodes_own_way(
+    make: Callable[..., Profile], root: str | None, parts: int
+) -> None:
+    """Three nodes: 1 + 2 + 3 hops instead of 3 * 3, for the six parts of a read's and of a write's packets.
+
+    Two of the six arbitrate, and do so over the own way only where the host is the root.
+    """
+    own, farthest = (
+        next(doubt for doubt in cycle_of(one, model="standard").doubts() if doubt.key == "bus.phy_delay_us")
+        for one in (make(bus__nodes=3, bus__charge_hops="own", bus__root=root), make(bus__nodes=3))
+    )
+    each_us = float(PHY_DELAY_HALF_WIDTH_US) / 3**0.5
+    assert farthest.us - own.us == pytest.approx(parts * (9 - 6) * each_us, rel=1e-9)

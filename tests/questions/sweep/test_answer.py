@@ -1,0 +1,191 @@
+"""A sweep as columns: the rows of the document, as arrays."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+import busplan
+from busplan.questions.sweep import MOST_POINTS
+from busplan.questions.sweep.blocks import figure_names
+
+GRID: Mapping[str, Any] = {
+    "bus.gap_count": [63, "optimal"],
+    "cycle.period_us": np.linspace(100, 400, 4),
+    "bus.nodes": (1, 3),
+}
+
+
+@pytest.mark.parametrize("models", [["paper", "standard"], ["standard"], ["standard", "paper"]])
+def test_columns_are_the_rows_of_the_document(models: list[Any]) -> None:
+    answer = busplan.sweep("paper-4ms", vary=GRID, timing_model=models)
+    document = answer.to_dict()
+    assert (document["points"], document["complete"], document["timing_models"]) == (16, True, models)
+    assert len(answer) == len(document["rows"]) == 16 * len(models)
+    assert list(answer) == list(answer.columns) == list(document["rows"][0]) == [*GRID, *figure_names(answer.profile)]
+    for name, column in dict(answer).items():
+        expected = [row[name] for row in document["rows"]]
+        if column.dtype.kind == "U":
+            # A word that is missing, as the verdict of the paper is, is no word.
+            expected = [" ".join(one) if isinstance(one, list) else "" if one is None else str(one) for one in expected]
+            assert column.tolist() == expected
+        else:
+            wanted = [float("nan") if one is None else one for one in expected]
+            np.testing.assert_array_equal(column, wanted)
+            assert {type(one) for one in column.tolist()} <= {float, *map(type, expected)}
+        assert column.shape == (len(answer),)
+
+
+def test_numbers_are_numbers_and_words_are_text() -> None:
+    answer = busplan.sweep("paper-4ms", vary=GRID)
+    kinds = {name: answer[name].dtype.kind for name in answer}
+    words = {
+        *("bus.gap_count", "timing_model", "binding_term", "limited_by", "exceeded", "not_shown", "circle_refused_by"),
+        *("safe_limited_by", "verdict"),
+    }
+    assert {name for name, kind in kinds.items() if kind == "U"} == words
+    assert (kinds["max_axes"], kinds["margin_us"], kinds["fits"], kinds["bus.nodes"]) == ("i", "f", "b", "i")
+    assert kinds["gap_count"] == "i"
+
+
+def test_figures_of_the_verdict_are_the_deciding_models_alone() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]})
+    paper, standard = answer["timing_model"] == "paper", answer["timing_model"] == "standard"
+    for name in ("bias_us", "margin_corrected_us", "uncertainty_us", "safe_required_us", "safe_nodes", "safe_axes"):
+        assert np.isnan(answer[name][paper]).all()
+        assert not np.isnan(answer[name][standard]).any()
+    assert answer["verdict"].tolist() == ["", "fits", "", "does not fit"]
+    assert answer["safe_limited_by"].tolist() == ["", "time", "", "time"]
+    alone = busplan.sweep("paper-4ms", vary={"bus.nodes": [2, 17]}, timing_model=["standard"])
+    assert alone["safe_nodes"].dtype.kind == "i"  # where none is missing, counts are whole
+
+
+def test_a_point_is_what_capacity_says_of_it() -> None:
+    periods = range(250, 4001, 750)
+    answer = busplan.sweep("paper-4ms", vary={"cycle.period_us": periods}, timing_model=["standard"])
+    found = busplan.capacity("paper-4ms", period_us=periods, timing_model=["standard"]).results
+    for name in ("max_axes", "margin_us", "limited_by", "fits", "safe_axes", "safe_required_us", "verdict"):
+        assert answer[name].tolist() == [getattr(one, name) for one in found]
+
+
+@pytest.mark.parametrize(
+    "values", [range(250, 1001, 250), [250, 500, 750, 1000], np.arange(250, 1001, 250), np.linspace(250, 1000, 4)]
+)
+def test_values_in_any_form_are_those_of_the_text(values: Any) -> None:
+    wanted = busplan.sweep("paper-4ms", vary={"cycle.period_us": "250:1000:250"})
+    assert busplan.sweep("paper-4ms", vary={"cycle.period_us": values}).to_json() == wanted.to_json()
+
+
+def test_whole_numbers_as_floats_count_nodes() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": np.linspace(1, 3, 3)}, timing_model=["paper"])
+    assert answer["bus.nodes"].tolist() == [1, 2, 3]
+
+
+def test_many_blocks_are_one_table() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"cycle.nonperiodic_us": range(20_000)}, timing_model=["paper"])
+    assert len(answer.blocks) > 1
+    assert answer["cycle.nonperiodic_us"].tolist() == list(range(20_000))
+    assert [row["margin_us"] for row in answer.to_dict()["rows"]] == answer["margin_us"].tolist()
+
+
+def test_an_array_is_the_callers_own() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1, 2]})
+    answer["max_axes"][:] = -1
+    answer["bus.nodes"][:] = -1
+    assert answer["max_axes"].min() > 0
+    assert answer["bus.nodes"].tolist() == [1, 1, 2, 2]
+
+
+def test_circle_tests_add_their_columns() -> None:
+    vary = {"cycle.period_us": [100.0, 4000.0], "circle.radius_mm": [10.0]}
+    answer = busplan.sweep("paper-4ms", vary=vary, circle=True)
+    assert answer.columns[-1] == "passed"
+    (result,) = busplan.circle_test(busplan.load_profile("paper-4ms", changes={"circle.radius_mm": 10.0})).results
+    assert np.isnan(answer["max_contour_error_mm"][:2]).all()
+    assert answer["max_contour_error_mm"][2] == result.max_contour_error_mm
+    assert answer["passed"].tolist() == [False, False, result.passed, result.passed]
+    assert answer.to_dict()["rows"][0]["max_contour_error_mm"] is None
+    assert "The circle holds every tolerance at" in str(answer)
+
+
+def test_circles_without_a_contour_tolerance_are_not_judged() -> None:
+    vary = {"circle.radius_mm": [10.0], "servo.position_gain_per_s": [50.0, 30_000.0]}
+    both = str(busplan.sweep("paper-two-node", vary=vary, circle=True))
+    assert "The circle is not judged at 1: no contour tolerance is asked for." in both
+    assert "The circle holds every tolerance at 0 " in both
+    one = str(busplan.sweep("paper-two-node", vary={"circle.radius_mm": [10.0]}, circle=True))
+    assert "not judged" in one
+    assert "holds every tolerance" not in one
+    judged = str(busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0]}, circle=True))
+    assert "not judged" not in judged
+
+
+def test_a_figure_that_no_circle_has_is_a_column_of_nan() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10.0, 20.0]}, circle=True)
+    assert np.isnan(answer["circular_deviation_mm"]).all()
+    assert answer.to_dict()["rows"][0]["circular_deviation_mm"] is None
+
+
+def test_a_column_that_is_not_there_is_a_key_error() -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": [1]})
+    with pytest.raises(KeyError, match=r"no column 'axis'; there are bus\.nodes, timing_model"):
+        _ = answer["axis"]
+    assert "axis" not in answer
+    assert "max_axes" in answer
+
+
+def test_the_text_is_the_table_of_the_command() -> None:
+    lines = str(busplan.sweep("paper-4ms", vary={"bus.nodes": "1:16"})).splitlines()
+    assert lines[1] == "20 of 32 rows."
+    # Two of the heading, an empty one, the names with a rule below: every unit is in its name.
+    assert len(lines) == 2 + 1 + 2 + 20
+    assert lines[3].split()[-4:] == ["max_axes", "safe_axes", "safe_limited_by", "verdict"]
+    assert lines[5].split() == ["1", "paper", "102.955", "2000.000", "1897.045", "-", "-", "64", "-", "-", "-"]
+
+
+@pytest.mark.parametrize(
+    ("vary", "options", "message"),
+    [
+        ({}, {}, "vary {}: expected keys of the profile and their values"),
+        ({"bus.nods": [1]}, {}, "vary bus.nods: no such key of this profile; did you mean bus.nodes?"),
+        ({"bus.nodes": []}, {}, "vary bus.nodes: no values; give at least one"),
+        ({"bus.nodes": range(0)}, {}, "vary bus.nodes: no values; give at least one"),
+        ({"bus.nodes": 3}, {}, "vary bus.nodes 3: expected several values, as a list"),
+        ({"bus.nodes": "1:x"}, {}, "vary bus.nodes=1:x: 'x' is not a number"),
+        ({"bus.nodes": "2:1"}, {}, "vary bus.nodes=2:1: steps of 1 never lead from 2 to 1"),
+        ({"bus.nodes": [1, 1]}, {}, "vary bus.nodes: 1 is given twice"),
+        ({"bus.nodes": [1, 2.5]}, {}, "bus.nodes 2.5: expected a whole number"),
+        ({"bus.nodes": [True]}, {}, "vary bus.nodes: True is not a finite number"),
+        ({"bus.nodes": range(10**30, 10**30 + 2)}, {}, "vary bus.nodes: numbers of"),
+        ({"cycle.period_us": np.array([1.0, np.nan])}, {}, "vary cycle.period_us: nan is not a finite number"),
+        ({"cycle.period_us": np.ones((2, 2))}, {}, "vary cycle.period_us: [1.0, 1.0] is not a finite number"),
+        ({"cycle.period_us": range(1, MOST_POINTS + 2)}, {}, "more than the 2,000,000 that are kept in memory"),
+        ({"cycle.period_us": "1:1e9", "bus.nodes": "1:10000"}, {}, "vary: 10,000,000,000,000 points are more than"),
+        (
+            {"servo.drive_lag_us": [1]},
+            {},
+            "vary servo.drive_lag_us: no figure of capacity depends on it; add circle=True",
+        ),
+        ({"cycle.period_us": range(1, 1002)}, {"circle": True}, "that are run without force=True"),
+        ({"cycle.period_us": [1050]}, {"circle": True}, "at cycle.period_us = 1050: servo.step_us = 100.0"),
+    ],
+)
+def test_what_makes_no_sweep_is_refused(vary: Any, options: Any, message: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        busplan.sweep("paper-4ms", vary=vary, **options)
+
+
+def test_a_truth_that_is_missing_is_none_beside_the_others() -> None:
+    own = {
+        "servo": {"position_gain_per_s": 50.0},
+        "circle": {"radius_mm": 5.0, "feed_mm_per_min": 3000.0, "ramp_periods": 5},
+    }
+    profile = busplan.load_profile("paper-two-node", changes=own)
+    # At 100 us the cycle does not fit, which fails; at 2 ms nothing is asked of the circle.
+    found = busplan.sweep(profile, vary={"cycle.period_us": [100, 2000]}, timing_model=["standard"], circle=True)
+    assert list(found["passed"]) == [False, None]
+    judged = busplan.load_profile("paper-two-node", changes={**own, "tolerance.max_contour_error_mm": 1.0})
+    found = busplan.sweep(judged, vary={"cycle.period_us": [100, 2000]}, timing_model=["standard"], circle=True)
+    assert found["passed"].tolist() == [False, True]

@@ -1,0 +1,138 @@
+"""What every answer can do: it is frozen, shows itself, and can be pickled."""
+
+import pickle
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import busplan
+from busplan.questions.base.answer import Answer
+
+ANSWERS: dict[str, Callable[[busplan.Profile], Answer]] = {
+    "latency": busplan.latency,
+    "capacity": busplan.capacity,
+    "circle_test": busplan.circle_test,
+    "plan": busplan.plan,
+    "timeline": busplan.timeline,
+    "check": lambda _profile: busplan.check("paper-1ms"),
+    "sweep": lambda profile: busplan.sweep(profile, vary={"bus.gap_count": [63, "optimal"], "bus.nodes": "1:3"}),
+    "map": busplan.map_,
+    "compare": lambda profile: busplan.compare(profile, buses=["ieee1394", "can"]),
+    "diff": lambda profile: busplan.diff(profile, "paper-optimal-gap", circle=False),
+    "explain": lambda profile: busplan.explain(profile, "margin_us"),
+    "explain all": busplan.explain,
+    "calibrate": lambda profile: busplan.calibrate(profile, "table-1.csv"),
+    "report": lambda profile: busplan.report(profile, circle=False),
+}
+
+
+@pytest.fixture(scope="module", params=ANSWERS)
+def answer(request: pytest.FixtureRequest) -> Answer:
+    return ANSWERS[request.param](busplan.load_profile("paper-1ms"))
+
+
+def test_nothing_of_an_answer_can_be_set(answer: Answer) -> None:
+    names = [name for name in dir(answer) if not name.startswith("_")]
+    assert {"to_dict", "to_json"} < set(names)
+    for name in [*names, "new"]:
+        with pytest.raises((AttributeError, TypeError)):
+            setattr(answer, name, None)
+    with pytest.raises((AttributeError, TypeError)):
+        del answer.to_dict
+
+
+def test_a_changed_document_changes_no_answer(answer: Answer) -> None:
+    before = answer.to_json()
+    document = answer.to_dict()
+    for value in document.values():
+        if isinstance(value, list | dict):
+            value.clear()
+    assert answer.to_json() == before
+    assert answer.to_dict() != document
+
+
+def test_an_answer_can_be_pickled(answer: Answer) -> None:
+    copy = pickle.loads(pickle.dumps(answer))
+    assert (type(copy), copy.to_json(), str(copy)) == (type(answer), answer.to_json(), str(answer))
+
+
+def test_records_are_frozen() -> None:
+    found = busplan.capacity("paper-4ms")
+    with pytest.raises(AttributeError):
+        found.results[0].max_axes = 99  # type: ignore[misc]
+    with pytest.raises(ValueError, match="frozen"):
+        found.profile.bus.nodes = 99  # type: ignore[misc]
+
+
+def test_figures_of_one_kind_of_bus_are_frozen_plain_and_hashable() -> None:
+    phases = busplan.latency("paper-4ms").transactions[-1].phases
+    before = dict(phases)
+    with pytest.raises(AttributeError, match="does not change"):
+        phases.latency_us = 0
+    with pytest.raises(TypeError):
+        phases["latency_us"] = 0
+    assert dict(phases) == before
+    assert {type(value) for value in phases.values()} <= {int, float}
+    assert len({busplan.capacity("paper-4ms").results[0], busplan.capacity("paper-4ms").results[0]}) == 1
+
+
+def test_the_same_question_has_the_same_answer() -> None:
+    assert busplan.capacity("paper-4ms") == busplan.capacity("paper-4ms")
+    assert busplan.capacity("paper-4ms") != busplan.capacity("paper-1ms")
+
+
+HEADLINES = {
+    "latency": "<LatencyAnswer: paper-1ms: farthest of 2 nodes, 2 hops, gap count 63>",
+    # 263.320 us of 500 us by the standard, a bias of 8 * 0.827 us; the paper says 207.117 us.
+    "capacity": "<CapacityAnswer: paper-1ms at 1 ms: fits. Margin 230.064 us +/- 6.311 us of 500.000 us, less a bias "
+    "of 6.616 us. Largest doubt: execution time, 54% of U squared.>",
+    "circle_test": "<CircleTestAnswer: paper-1ms at 1 ms and 10000 mm/min: the circle holds every tolerance.>",
+    "plan": "<PlanAnswer: paper-1ms with 2 nodes (8 axes) at 1 ms: nothing to change; it fits with a margin of 230.064 "
+    "us +/- 6.311 us and passes the circle.>",
+    "timeline": "<TimelineAnswer: paper-1ms at 1 ms: 292.883 us to spare, 41.4% of 500.000 us used by the paper model, "
+    "which decides nothing.>",
+    "check": "<CheckAnswer: checked 1 profile: 0 errors, 0 warnings>",
+    "sweep": "<SweepAnswer: paper-1ms: 6 points; 6 fit by the closed form of the paper model, 6 shown to fit (standard "
+    "model).>",
+    "map": "<MapAnswer: paper-1ms: 57 of 180 settings are shown to fit. This design (8 axes, period 1 ms): fits.>",
+    "compare": "<CompareAnswer: paper-1ms at 1 ms: shown to fit on 1 of 2 kinds of bus: IEEE 1394.>",
+    "diff": "<DiffAnswer: B is better in 16 figures: corrected margin, safe nodes, safe axes, smallest safe period and "
+    "12 more.>",
+    "explain": "<ExplainAnswer: margin_us of paper-1ms at 1 ms, paper model: 292.8825 us>",
+    "explain all": "<ExplainAnswer: paper-1ms: 44 assumptions behind its figures>",
+    "calibrate": "<CalibrateAnswer: paper-1ms: Table: the median at each payload, 4 to 1024 bytes.>",
+    "report": "<ReportAnswer: paper-1ms: fits>",
+}
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_it_shows_its_verdict(name: str) -> None:
+    assert repr(ANSWERS[name](busplan.load_profile("paper-1ms"))) == HEADLINES[name]
+
+
+def test_a_notebook_draws_a_map() -> None:
+    found = busplan.map_(busplan.load_profile("paper-4ms", changes={"name": "<b>&x"}))
+    drawn = found._repr_svg_() or ""
+    assert drawn.startswith("<svg ")
+    assert "&lt;b&gt;&amp;x" in drawn
+    assert "<b>" not in drawn
+    assert found.own is not None
+    assert (found.own.state, len(found.cells), found.regions[0].cells) == ("fits", 270, 104)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x": ["bus.nodes"]}, "x ['bus.nodes']: expected one key and its values"),
+        ({"y": {"bus.nodes": [1], "node.axes": [1]}}, "expected one key and its values"),
+        ({"x": {"bus.nodes": 3}}, "x bus.nodes 3: expected several values"),
+        ({"x": {"bus.nodes": "1:x"}}, "x bus.nodes=1:x: 'x' is not a number"),
+        ({"x": {"bus.nodes": range(1, 90)}}, "x bus.nodes: 89 values; a map shows up to 64 of a key"),
+        ({"x": {"circle.radius_mm": [9]}}, "add circle=True to run circle tests"),
+    ],
+)
+def test_a_map_of_nonsense_is_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(busplan.BusplanError, match=re.escape(message)):
+        busplan.map_("paper-4ms", **arguments)

@@ -1,0 +1,132 @@
+"""Each answer's document is the one that the command writes with `--format json`."""
+
+import json
+from collections.abc import Callable
+from itertools import cycle
+from pathlib import Path
+from subprocess import CompletedProcess
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import busplan
+from busplan.cli import app
+from busplan.questions.base.answer import Answer
+
+# One of each other class of bus, and one of groups.
+OTHERS = ("dvrk", "can-servo-8", "ethercat-servo-8", "sercos3-servo-8")
+EVERY: dict[str, Callable[[str], Answer]] = {
+    "latency": busplan.latency,
+    "capacity": busplan.capacity,
+    "circle-test": busplan.circle_test,
+    "plan": busplan.plan,
+    "timeline": busplan.timeline,
+    "check": busplan.check,
+    "map": busplan.map_,
+    "compare": busplan.compare,
+    "explain": busplan.explain,
+    "report --no-circle": lambda profile: busplan.report(profile, circle=False),
+}
+OPTIONS: dict[str, Callable[[], Answer]] = {
+    "latency paper-4ms --payload 4,16 --timing standard": lambda: busplan.latency(
+        "paper-4ms", payload_bytes=[4, 16], timing_model=["standard"]
+    ),
+    "latency paper-4ms --set bus.nodes=5 --set bus.gap_count=optimal": lambda: busplan.latency(
+        busplan.load_profile("paper-4ms", changes={"bus.nodes": 5, "bus.gap_count": "optimal"})
+    ),
+    "capacity paper-1ms --period 600us --period 0.25ms --timing paper": lambda: busplan.capacity(
+        "paper-1ms", period_us=[600, 250], timing_model="paper"
+    ),
+    "circle-test paper-1ms --set circle.radius_mm=20 --period 1ms --period 100us --contributions": lambda: (
+        busplan.circle_test(
+            busplan.load_profile("paper-1ms", changes={"circle.radius_mm": 20.0}),
+            period_us=[1000, 100],
+            contributions=True,
+        )
+    ),
+    "plan paper-1ms --nodes 6 --period 500us --set bus.gap_count=63 --max-circles 2": lambda: busplan.plan(
+        "paper-1ms", nodes=6, period_us=500, gap_count=63, max_circles=2
+    ),
+    "plan paper-1ms --axes 15 --set limits.reserve=0.125 --free responses,gap_count --no-circle": lambda: busplan.plan(
+        "paper-1ms", axes=15, reserve=0.125, free=["gap_count", "responses"], circle=False
+    ),
+    "timeline paper-1ms --timing standard --from 50us --to 0.1ms": lambda: busplan.timeline(
+        "paper-1ms", timing_model="standard", from_us=50, to_us=100
+    ),
+    "map paper-1ms --x axes=4:16:4 --y bus.gap_count=7,63,optimal": lambda: busplan.map_(
+        "paper-1ms", x={"axes": range(4, 17, 4)}, y={"bus.gap_count": [7, 63, "optimal"]}
+    ),
+    "compare can-servo-8 --buses can,ieee1394 --circle": lambda: busplan.compare(
+        "can-servo-8", buses=["can", "ieee1394"], circle=True
+    ),
+    "compare paper-1ms --buses can --set bus.nodes=3": lambda: busplan.compare(
+        busplan.load_profile("paper-1ms", changes={"bus.nodes": 3}), buses="can"
+    ),
+    "timeline paper-1ms --transaction write:2": lambda: busplan.timeline("paper-1ms", transaction=("write", 2)),
+    "check paper-4ms nowhere.toml --no-circle": lambda: busplan.check(["paper-4ms", "nowhere.toml"], circle=False),
+    "sweep paper-4ms --vary cycle.period_us=125:1000:*2 --timing paper": lambda: busplan.sweep(
+        "paper-4ms", vary={"cycle.period_us": "125:1000:*2"}, timing_model="paper"
+    ),
+    "sweep paper-4ms --vary circle.radius_mm=10,20 --vary cycle.period_us=200,4000 --circle --jobs 1": lambda: (
+        busplan.sweep("paper-4ms", vary={"circle.radius_mm": [10, 20], "cycle.period_us": [200.0, 4000.0]}, circle=True)
+    ),
+    "sweep paper-1ms --vary bus.nodes=1:4 --vary bus.gap_count=63,optimal": lambda: busplan.sweep(
+        "paper-1ms", vary={"bus.nodes": range(1, 5), "bus.gap_count": [63, "optimal"]}
+    ),
+    "diff paper-1ms paper-optimal-gap": lambda: busplan.diff("paper-1ms", "paper-optimal-gap"),
+    "diff paper-4ms paper-dma --timing standard --no-circle": lambda: busplan.diff(
+        "paper-4ms", "paper-dma", timing_model="standard", circle=False
+    ),
+    "explain paper-4ms required_us --period 1ms --period 500us --timing both": lambda: busplan.explain(
+        "paper-4ms", "required_us", period_us=[1000, 500], timing_model=["paper", "standard"]
+    ),
+    "explain paper-4ms latency.latency_us --transaction read --timing standard": lambda: busplan.explain(
+        "paper-4ms", "latency.latency_us", transaction="read", timing_model="standard"
+    ),
+    "evidence": busplan.evidence,
+    "evidence can": lambda: busplan.evidence("can"),
+    "calibrate paper-two-node table-1.csv --form linear --timing paper": lambda: busplan.calibrate(
+        "paper-two-node", "table-1.csv", form="linear", timing_model="paper"
+    ),
+    "report sercos2-servo-8 sercos3-servo-8 --set bus.nodes=3 --no-circle --title Two": lambda: busplan.report(
+        [busplan.load_profile(name, changes={"bus.nodes": 3}) for name in ("sercos2-servo-8", "sercos3-servo-8")],
+        circle=False,
+        title="Two",
+    ),
+}
+
+
+def printed(line: str) -> Any:
+    done = CliRunner().invoke(app, [*line.split(), "--format", "json"], prog_name="busplan")
+    assert done.stdout, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    # What command and function do alike does not hang on the bus: each is asked of two, and every bus of some.
+    [(command, name) for command, other in zip(EVERY, cycle(OTHERS), strict=False) for name in ("paper-1ms", other)],
+)
+def test_of_every_class_of_bus(command: str, name: str) -> None:
+    first, *rest = command.split(" ", 1)
+    assert EVERY[command](name).to_dict() == printed(" ".join((first, name, *rest)))
+
+
+@pytest.mark.parametrize("line", OPTIONS)
+def test_with_the_options_of_the_command(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    document = printed(line)
+    # In Python the changes are the profile's.
+    if "--set" in line and not line.startswith("report"):
+        document.pop("changes", None)
+    assert OPTIONS[line]().to_dict() == document
+
+
+@pytest.mark.parametrize("name", ["latency", "capacity", "plan", "timeline"])
+def test_the_text_is_what_the_command_prints(
+    run: Callable[..., CompletedProcess[str]], name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    answer = EVERY[name]("sercos3-servo-8")
+    assert f"{answer}\n" == run(name, "sercos3-servo-8").stdout
+    assert capfd.readouterr() == ("", "")

@@ -1,0 +1,129 @@
+"""`import busplan`: what it loads and when, and what names it has."""
+
+import pkgutil
+import subprocess
+import sys
+from functools import cache
+from importlib import import_module
+
+import pytest
+
+import busplan
+
+HEAVY = {"numpy", "pydantic", "rich", "typer", "click", "resvg_py", "scipy", "tomllib", "tomli_w", "json"}
+FUNCTIONS = tuple(name for name in busplan.__all__ if name.islower() and not name.startswith("__"))
+WITH_NUMPY = ("evidence", "sweep", "map_", "report")
+WITHOUT = tuple(name for name in FUNCTIONS if name not in WITH_NUMPY)
+
+
+CAPACITY = """\
+sys.argv = ['busplan', 'capacity', 'paper-4ms']
+from busplan.__main__ import main
+try:
+    main()
+except SystemExit:
+    pass"""
+
+
+@cache
+def loaded(program: str) -> set[str]:
+    """Modules that a fresh interpreter has after a program."""
+    return written(f"import sys\n{program}\nprint('\\n', *sys.modules)")[-1]
+
+
+def written(program: str) -> list[set[str]]:
+    """The words of each line that a fresh interpreter writes."""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return [set(line.split()) for line in done.stdout.splitlines()]
+
+
+def test_the_package_alone_loads_nothing() -> None:
+    found = loaded("import busplan; busplan.__version__; dir(busplan)")
+    assert not found & HEAVY
+    assert {name for name in found if name.startswith("busplan")} == {"busplan"}
+
+
+def test_an_error_or_a_type_loads_no_analysis() -> None:
+    assert {name for name in loaded("import busplan; busplan.BusplanError") if name.startswith("busplan")} == {
+        "busplan",
+        "busplan.errors",
+    }
+    assert not loaded("import busplan; busplan.Profile") & {"numpy", "busplan.questions", "busplan.forms"}
+
+
+def test_a_name_loads_what_it_needs() -> None:
+    # Each that needs more in a process of its own, which has loaded what the others go without.
+    without, *with_numpy = written(
+        "import os, sys, busplan\n"
+        f"for name in {WITHOUT}:\n"
+        "    getattr(busplan, name)\n"
+        "print(*sys.modules, flush=True)\n"
+        f"for name in {WITH_NUMPY}:\n"
+        "    if not os.fork():\n"
+        "        getattr(busplan, name)\n"
+        "        print(*sys.modules, flush=True)\n"
+        "        os._exit(0)\n"
+        "    assert os.wait()[1] == 0\n"
+    )
+    assert "numpy" not in without
+    assert ["numpy" in found for found in with_numpy] == [True] * len(WITH_NUMPY)
+    for found in (without, *with_numpy):
+        assert not found & {"typer", "rich", "resvg_py", "busplan.cli"}
+
+
+def test_what_simulates_nothing_loads_no_numpy() -> None:
+    calls = [
+        "latency('paper-4ms')",
+        "capacity('paper-4ms', sensitivity=True)",
+        "timeline('paper-4ms')",
+        "plan('paper-4ms', circle=False)",
+        "check('paper-4ms', circle=False)",
+        "diff('paper-4ms', 'paper-dma', circle=False)",
+        "compare('paper-4ms')",
+        "explain('paper-4ms', 'required_us')",
+        "calibrate('paper-two-node', 'table-1.csv')",
+    ]
+    program = "".join(f"\nstr(busplan.{call}.to_dict())" for call in calls)
+    assert not loaded(f"import busplan{program}") & {"numpy", "typer", "rich", "resvg_py"}
+
+
+def test_all_names_are_there_and_listed() -> None:
+    assert set(busplan.__all__) <= set(dir(busplan))
+    for name in busplan.__all__:
+        assert getattr(busplan, name) is getattr(busplan, name)
+    for name in FUNCTIONS:
+        function = getattr(busplan, name)
+        assert (function.__name__, function.__module__.startswith(("busplan.questions.", "busplan.gate."))) == (
+            name,
+            True,
+        )
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="module 'busplan' has no attribute 'nope'"):
+        _ = busplan.nope  # type: ignore[attr-defined]
+    with pytest.raises(ImportError):
+        from busplan import nope  # type: ignore[attr-defined] # noqa: F401, PLC0415
+
+
+def test_functions_stay_functions_whatever_submodules_are_loaded() -> None:
+    names = [name for _, name, _ in pkgutil.walk_packages(busplan.__path__, "busplan.") if "__main__" not in name]
+    # A submodule of that name would take its place as soon as it is imported.
+    assert not {name.removeprefix("busplan.") for name in names} & set(busplan.__all__)
+    for name in names:
+        import_module(name)
+    assert all(callable(getattr(busplan, name)) for name in FUNCTIONS)
+
+
+def test_a_star_import_gives_every_name() -> None:
+    given: dict[str, object] = {}
+    exec("from busplan import *", given)
+    assert {name: given.get(name) for name in busplan.__all__} == {
+        name: getattr(busplan, name) for name in busplan.__all__
+    }
+
+
+def test_capacity_alone_does_not_load_what_moves_the_margin() -> None:
+    found = loaded(CAPACITY)
+    assert not {name for name in found if "sensitivity" in name or "bottleneck" in name or name == "xml.etree"}
+    assert "xml.etree" not in loaded("import busplan; busplan.capacity('paper-4ms').to_dict()")

@@ -1,0 +1,88 @@
+"""What `busplan paper`, `profiles` and `rule` say."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from busplan.cli.profiles_report import profiles_report
+from busplan.forms import render
+from busplan.forms.blocks import Chapter, Report, ShownValue, Snippet, Table
+from busplan.gate.registry import NEVER_SUPPRESSED, all_rules
+from busplan.gate.rules_report import rule_report, rules_report
+from busplan.profile.shipped import load, shipped_names
+from busplan.questions.circle.roundness import circle_test
+from busplan.questions.evidence.figures import kind_evidence, paper_evidence
+from busplan.questions.evidence.paper import CIRCLE_PROFILES
+from busplan.questions.evidence.report import evidence_document, evidence_report, paper_document, paper_report
+
+ValuesIn = Callable[[object], Iterator[ShownValue]]
+
+
+def test_paper_has_every_comparison_once(values_of_the_document: Callable[[Report], int], values_in: ValuesIn) -> None:
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    sections = paper_evidence(circles=lambda: circles)
+    report = paper_report(sections)
+    figures = paper_document(sections)["figures"]
+    shown = [(value.key, value.value) for value in values_in(tuple(report.blocks()))]
+    assert len(shown) == values_of_the_document(report)
+    for key in ("computed", "residual", "relative_residual"):
+        assert Counter(own for name, own in shown if name == key) == Counter(one[key] for one in figures)
+    blocks = [block for block in report.blocks() if isinstance(block, Chapter)]
+    assert [str(block.title.parts[0]) for block in blocks] == [section.title for section in sections]
+    assert [block.blocks[0].parts[0] for block in blocks] == [section.note for section in sections]  # type: ignore[union-attr]
+
+
+def test_no_residual_of_the_paper_is_rounding_dust() -> None:
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    text = render(paper_report(paper_evidence(circles=lambda: circles)), "table")
+    assert "e-" not in text.replace("time-", "")
+    assert "-0.0 " not in text
+    assert "-0.0\n" not in text
+    row = "no payload  us         3.11  published        3.104   -0.0064  -0.2                3.110    0.0000  0.0\n"
+    assert row in text
+
+
+def test_evidence_has_every_comparison_once(
+    values_of_the_document: Callable[[Report], int], values_in: ValuesIn
+) -> None:
+    circles = [circle_test(load(name).profile).results[0] for name in CIRCLE_PROFILES]
+    kinds = [kind_evidence("ieee1394", circles=lambda: circles)]
+    report, figures = evidence_report(kinds), evidence_document(kinds)["figures"]
+    shown = [value.value for value in values_in(tuple(report.blocks())) if value.key == "computed"]
+    assert values_of_the_document(report) > len(shown)
+    assert Counter(shown) == Counter(one["computed"] for one in figures)
+    assert {one["data"] for one in figures} == {"paper", "dvrk", "ieee1394"}
+
+
+def test_each_profile_is_a_section() -> None:
+    report = profiles_report([load(name).profile for name in shipped_names()])
+    text = render(report, "table")
+    assert "paper-two-node: 1 node at 4 ms, paper model leads\n" in text
+    assert "\n\n\n" not in text
+    assert "### Shipped profiles\n\n#### `can-servo-8`" in render(report, "markdown")
+
+
+def test_the_rules_are_one_table() -> None:
+    rules = list(all_rules().values())
+    (table,) = rules_report(rules).blocks()
+    assert isinstance(table, Table)
+    assert [row.cells[0][0] for row in table.rows] == [rule.code for rule in rules]
+    # An answer is read as often as somebody asks.
+    report = rules_report(rules)
+    assert render(report, "table") == render(report, "table")
+
+
+@pytest.mark.parametrize("code", all_rules())
+def test_a_rule_is_explained_with_what_suppresses_it(code: str, values_in: ValuesIn) -> None:
+    rule = all_rules()[code]
+    report = rule_report(rule)
+    text = render(report, "table")
+    assert text.startswith(f"{code} {rule.name} ({rule.severity}): {rule.summary}\n{rule.explanation}\n")
+    snippets = [block for block in report.blocks() if isinstance(block, Snippet)]
+    if code in NEVER_SUPPRESSED:
+        assert text.endswith("\nIt cannot be suppressed.\n")
+        assert snippets == []
+    else:
+        assert snippets == [Snippet((f"# busplan: ignore[{code}] reason",))]
+    assert not any(isinstance(value, ShownValue) for value in values_in(tuple(report.blocks())))

@@ -1,0 +1,99 @@
+"""What a notebook and a file get: tables and charts of the HTML form, pictures, pages."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import pytest
+
+import busplan
+from busplan.questions.base.answer import Answer
+
+
+def test_a_notebook_shows_tables_and_charts_and_no_name_is_markup() -> None:
+    found = busplan.capacity(busplan.load_profile("paper-4ms", changes={"name": "<b>&x"}), sensitivity=True)
+    shown = found._repr_html_()
+    assert "<b>" not in shown
+    assert "&lt;b&gt;&amp;x</bdi> at " in shown
+    assert shown.count("<table") == 2
+    assert shown.count("<svg ") == 1
+    assert f'<data value="{found.results[1].margin_us!r}"' in shown
+
+
+def test_the_styles_of_a_notebook_reach_nothing_outside() -> None:
+    shown = busplan.timeline("paper-4ms")._repr_html_()
+    (style,) = re.findall(r"<style>\n\.busplan\.busplan \{\n(.*?)\n\}\n</style>", shown, re.DOTALL)
+    # All rules are nested: outside the two braces stands none, and none is of the root of the page.
+    assert style.count("{") == style.count("}")
+    assert ":root" not in style
+    assert "<html" not in shown
+    assert "<script" not in shown
+
+
+PICTURES: dict[str, Callable[[], Answer]] = {
+    "circle_test": lambda: busplan.circle_test("paper-4ms"),
+    "timeline": lambda: busplan.timeline("paper-4ms"),
+    "map": lambda: busplan.map_("paper-4ms", x={"axes": range(4, 41, 4)}),
+    "capacity": lambda: busplan.capacity("paper-4ms", sensitivity=True),
+    "compare": lambda: busplan.compare("paper-4ms"),
+}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_an_answer_with_a_picture_gives_it_with_its_colours(name: str, tmp_path: Path) -> None:
+    answer = PICTURES[name]()
+    drawn = answer._repr_svg_()
+    assert drawn is not None
+    root = fromstring(drawn)
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert root.findall("{http://www.w3.org/2000/svg}style")
+    assert "prefers-color-scheme" in drawn
+    answer.save(tmp_path / "x.svg")
+    assert (tmp_path / "x.svg").read_text(encoding="utf-8") == drawn
+
+
+def test_an_answer_without_a_picture_gives_none() -> None:
+    assert busplan.capacity("paper-4ms")._repr_svg_() is None
+    assert busplan.diff("paper-4ms", "paper-1ms", circle=False)._repr_svg_() is None
+
+
+def test_a_page_is_text_and_is_saved_in_the_form_of_its_ending(tmp_path: Path) -> None:
+    page = busplan.report(["sercos2-servo-8", "sercos3-servo-8"], circle=False, title="Two <lines>")
+    html = page.html
+    assert html.startswith("<!DOCTYPE html>")
+    assert "<h1>Two &lt;lines&gt;</h1>" in html
+    for ending, text in ((".html", html), (".txt", f"{page}\n"), (".json", page.to_json())):
+        page.save(tmp_path / f"page{ending}")
+        assert (tmp_path / f"page{ending}").read_text(encoding="utf-8") == text
+    assert [one.verdict.deciding.verdict for one in page.answers] == ["fits", "fits"]
+
+
+def test_every_row_of_a_sweep_is_saved(tmp_path: Path) -> None:
+    answer = busplan.sweep("paper-4ms", vary={"bus.nodes": "1:30"})
+    answer.save(tmp_path / "rows.csv")
+    assert len((tmp_path / "rows.csv").read_text(encoding="utf-8").splitlines()) == 61
+    answer.save(str(tmp_path / "rows.json"))
+    assert json.loads((tmp_path / "rows.json").read_text(encoding="utf-8")) == answer.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "busplan latency sercos2-servo-8 --format json"),
+        ({"bus.nodes": 3}, "busplan latency sercos2-servo-8 --set bus.nodes=3 --format json"),
+        ({"name": "mine"}, "busplan latency mine.toml --format json"),
+    ],
+)
+def test_the_commands_of_a_page_give_its_profile(changes: dict[str, object], words: str) -> None:
+    page = busplan.report(busplan.load_profile("sercos2-servo-8", changes=changes), circle=False)
+    assert f"$ {words}\n" in str(page)
+
+
+def test_figures_that_are_worse_are_named_with_a_tolerance() -> None:
+    found = busplan.diff("paper-optimal-gap", "paper-1ms", timing_model="standard", circle=False)
+    keys = [one.figure.key for one in found.regressions()]
+    assert "margin_us" in keys
+    assert "margin_us" not in [one.figure.key for one in found.regressions(tolerance_percent=50)]
+    assert busplan.diff("paper-1ms", "paper-1ms").same

@@ -1,0 +1,292 @@
+"""The drawings of a timeline: to scale, whole, and safe with any name."""
+
+import re
+from collections.abc import Callable, Iterator
+from xml.etree import ElementTree as ET
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from busplan.buses import kind_named
+from busplan.buses.parts import IDLE
+from busplan.forms import html, markdown, terminal
+from busplan.forms.blocks import Report, ShownValue
+from busplan.forms.columns import sentence_text
+from busplan.forms.raster import png
+from busplan.forms.scale import ticks
+from busplan.profile.shipped import load
+from busplan.profile.toml import override
+from busplan.questions.fit.figures import capacity
+from busplan.questions.timeline import svg
+from busplan.questions.timeline.events import Schedule, schedule, totals, zoom
+from busplan.questions.timeline.lanes import node_lanes, stretches
+from busplan.questions.timeline.report import (
+    headline,
+    timeline_chart,
+    timeline_document,
+    timeline_records,
+    timeline_report,
+    totals_table,
+)
+
+ValuesIn = Callable[[object], Iterator[ShownValue]]
+
+SVG = "{http://www.w3.org/2000/svg}"
+HOSTILE = '<b>$x_1$ & %%{init: {"theme":"dark"}}%%; ]]> "q" # end: </svg>機械'
+
+
+def plan(**changes: object) -> Schedule:
+    return schedule(override(load("paper-4ms").profile, {key.replace("__", "."): v for key, v in changes.items()}))
+
+
+def drawn(one: Schedule, width: int | None = None) -> list[str]:
+    return terminal.text(timeline_report(one), width=width).splitlines()
+
+
+def title(one: Schedule) -> str:
+    return sentence_text(headline(one))
+
+
+def timeline_svg(one: Schedule) -> str:
+    return svg.timeline_svg(one, title=title(one))
+
+
+def row(lines: list[str], label: str) -> str:
+    return next(line.split("|")[1] for line in lines if line.split("|")[0].strip() == label)
+
+
+def test_every_kind_has_its_own_mark() -> None:
+    bus = kind_named("ieee1394")
+    kinds = (*bus.event_kinds, IDLE)
+    assert len({kind.mark for kind in kinds}) == len(kinds) == 17
+    # The strip of the whole slice has whole transactions, and what belongs to no node.
+    strip = (bus.event_kind("sync"), *bus.stretch_kinds, bus.event_kind("nonperiodic"), IDLE)
+    assert len({kind.mark for kind in strip}) == len(strip) == 5
+    assert all(kind.mark.isascii() for kind in (*kinds, *strip))
+
+
+def test_the_request_is_the_hosts_and_its_acknowledge_the_nodes() -> None:
+    assert [one.label for one in plan().events[1:10]] == [
+        "host arbitration",
+        "host data",
+        "node acknowledge",
+        "node execution",
+        "node arbitration",
+        "node data",
+        "host acknowledge",
+        "subaction gap",
+        "arbitration reset gap",
+    ]
+
+
+@pytest.mark.parametrize("width", [60, 80, 132])
+@pytest.mark.parametrize("nodes", [1, 2, 16, 62])
+def test_a_drawing_fits_the_width_and_is_ascii(width: int, nodes: int) -> None:
+    lines = drawn(plan(bus__nodes=nodes, bus__max_hops=3, cycle__nonperiodic_us=50.0), width)
+    bars = [line for line in lines if line.count("|") == 2]
+    assert len(bars) >= min(nodes, 20)
+    assert {len(line) for line in bars} == {width}
+    assert all(line.isascii() for line in lines)
+
+
+def test_a_drawing_is_to_scale() -> None:
+    one = plan(bus__nodes=8)
+    lines = drawn(one, 132)
+    strip = row(lines, "cycle")
+    for mark, kinds in {"R": "read", "W": "write", "~": "idle"}.items():
+        part_us = sum(part.event.duration_us for part in stretches(one.events) if part.kind == kinds)
+        assert strip.count(mark) == pytest.approx(part_us / 4000 * len(strip), abs=1.01)
+    assert strip.count("-") == pytest.approx(len(strip) / 2, abs=1.01)
+    for number in range(1, 9):
+        own = [event for event in one.events if event.node == number]
+        lane = row(lines, f"node {number}")
+        column_us = one.used_us / len(lane)
+        assert len(lane) - len(lane.lstrip()) == int(own[0].start_us / column_us)
+        assert len(lane.rstrip()) - 1 == pytest.approx(own[-1].end_us / column_us, abs=1.01)
+        execution_us = sum(event.duration_us for event in own if event.kind == "execution")
+        assert lane.count("=") == pytest.approx(execution_us / column_us, abs=2.01)
+
+
+def test_a_column_shows_what_takes_most_of_it() -> None:
+    # 2.9 us a column: arbitration takes 2.4 us of the first, and execution most of the second behind 1.5 us of others.
+    assert row(drawn(plan()), "node 1").split() == ["a=============a.::", "aa============a.:::"]
+
+
+def test_an_overrun_is_said_and_seen() -> None:
+    one = plan(cycle__period_us=300.0)
+    lines = drawn(one)
+    said = "57.117 us short, 207.117 us needed of 150.000 us by the paper model, which decides nothing."
+    assert lines[0] == f"paper-4ms at 300 us: {said}"
+    assert headline(one).state == "fails"
+    over = row(lines, "over")
+    assert over.strip() == "!" * over.count("!")
+    for name, beyond_us in {"over": 57.117, "paper": 57.117, "standard": 113.320}.items():
+        assert row(lines, name).count("!") / len(over) == pytest.approx(beyond_us / 300, abs=0.03)
+    assert "idle" not in "\n".join(lines)
+    assert "beyond the slice, 57.117 us: 150.000 to 207.117 us" in timeline_svg(one)
+    document = timeline_document(one)
+    assert (document["fits"], document["exceeded"]) == (False, ["time"])
+    assert document["margin_us"] < 0
+    whole = "\n".join(drawn(plan()))
+    assert "beyond" not in whole + timeline_svg(plan())
+
+
+@pytest.mark.parametrize("period_us", [4000.0, 550.0, 500.0, 300.0, 250.0, 100.0])
+def test_the_period_is_whole_with_its_slice_and_both_margins(period_us: float) -> None:
+    one = plan(cycle__period_us=period_us)
+    found = {each.timing_model: each for each in capacity(one.profile).results}
+    assert [each["margin_us"] for each in timeline_document(one)["margins"]] == [
+        each.margin_us for each in found.values()
+    ]
+    lines, drawn_svg = drawn(one)[1 if one.figures.circle_refused_by else 0 :], timeline_svg(one)
+    end_us = max(period_us, *(each.required_us for each in found.values()))
+    assert lines[4].startswith(f"The period of {period_us:.3f} us")
+    rects = {
+        rect.findtext(f"{SVG}title") or "": (rect.get("x") or "", rect.get("width") or "")
+        for rect in ET.fromstring(drawn_svg).iter(f"{SVG}rect")
+    }
+    for model, each in found.items():
+        margin = f"margin {each.margin_us:.3f} us" if each.margin_us >= 0 else f"{-each.margin_us:.3f} us short"
+        words = f"{model}: {each.required_us:.3f} us needed, {margin}"
+        assert words in drawn_svg
+        assert f"{each.margin_us:.3f} us by the {model} model" in lines[1]
+        bars = row(lines, model)
+        share = min(each.required_us, each.available_us) / end_us
+        assert bars.count("#") / len(bars) == pytest.approx(share, abs=0.03)
+        assert bars.count(".") / len(bars) == pytest.approx(max(0, each.margin_us) / end_us, abs=0.03)
+        (width,) = (width for title, (_, width) in rects.items() if title.startswith(f"needed by the {model} model"))
+        assert float(width.rstrip("%")) == pytest.approx(100 * share, rel=1e-3)
+    behind = [x for title, (x, _) in rects.items() if title.startswith("rest of the period,")]
+    assert len(behind) == (period_us > one.end_us)
+    assert [float(x.rstrip("%")) for x in behind] == pytest.approx([100 * one.end_us / end_us] * len(behind), rel=1e-3)
+
+
+def test_an_unsafe_gap_count_is_warned_of() -> None:
+    one = plan(bus__gap_count=5)
+    assert any("gap count 5 is unsafe" in line for line in drawn(one))
+    assert "gap count 5 is unsafe" in timeline_document(one)["warnings"][0]
+
+
+def test_a_single_transaction_is_drawn_event_by_event() -> None:
+    lines = drawn(zoom(plan(), transaction=("write", 2)))
+    assert any(line.startswith("The write of node 2, 155.438 to 207.117 us") for line in lines)
+    assert re.search(r"^node execution +36\.733 \| +=+ +\|$", "\n".join(lines), re.MULTILINE)
+    assert row(lines, "window").strip() == "^^"
+    short = drawn(zoom(plan(), from_us=10.0, to_us=10.001))
+    assert row(short, "window").strip() == "^"
+
+
+@pytest.mark.parametrize(
+    "one",
+    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__nodes=62)],
+    ids=["whole", "overrun", "window", "many"],
+)
+def test_svg_bars_are_the_events(one: Schedule) -> None:
+    root = ET.fromstring(timeline_svg(one))
+    assert root.tag == f"{SVG}svg"
+    assert root.get("width") == "100%"
+    style = root.findtext(f"{SVG}style")
+    assert style is not None
+    assert "prefers-color-scheme:dark" in style
+    tips = [rect.findtext(f"{SVG}title") or "" for rect in root.iter(f"{SVG}rect")]
+    executions = [tip for tip in tips if "node execution" in tip]
+    assert len(executions) == sum(event.kind == "execution" for event in one.events)
+    widths = [
+        float((rect.get("width") or "").rstrip("%"))
+        for rect in root.iter(f"{SVG}rect")
+        if "node execution" in (rect.findtext(f"{SVG}title") or "")
+    ]
+    whole_us = (one.used_us if one.is_whole else one.to_us) - one.from_us
+    wanted = [event.duration_us / whole_us * 100 for event in one.events if event.kind == "execution"]
+    assert widths == pytest.approx(wanted, rel=1e-2)
+
+
+def test_hostile_names_are_text_in_every_form() -> None:
+    one = plan(name=HOSTILE)
+    root = ET.fromstring(timeline_svg(one))
+    assert (root.findtext(f"{SVG}title") or "").startswith(HOSTILE)
+    assert {element.tag.removeprefix(SVG) for element in root.iter()} <= {
+        *("svg", "title", "desc", "style", "rect", "line", "text")
+    }
+    assert png(timeline_svg(one)).startswith(b"\x89PNG")
+
+
+def test_png_is_the_same_for_the_same_schedule() -> None:
+    assert png(timeline_svg(zoom(plan(), to_us=60.0))) == png(timeline_svg(zoom(plan(), to_us=60.0)))
+
+
+def test_documents_hold_the_schedules_own_numbers() -> None:
+    one = zoom(plan(), to_us=50.0)
+    document = timeline_document(one)
+    assert [(row["start_us"], row["end_us"]) for row in document["events"]] == [one[1:] for one in spans(one)]
+    assert document["required_us"] == one.figures.required_us
+    assert [row["share"] for row in document["totals"]] == [part.share for part in totals(one)]
+    assert {row["profile"] for row in timeline_records(one)} == {"paper-4ms"}
+
+
+@pytest.mark.parametrize(
+    "one",
+    [plan(), plan(cycle__period_us=300.0), zoom(plan(), from_us=100.0, to_us=180.0), plan(bus__gap_count=5)],
+    ids=["whole", "overrun", "window", "unsafe"],
+)
+def test_figures_of_the_answer_stand_in_its_document(
+    one: Schedule, values_of_the_document: Callable[[Report], int], values_in: ValuesIn
+) -> None:
+    short = not one.figures.fits
+    head = {"period_us", "required_us", "available_us"} if short else {"period_us", "margin_us", "available_us"}
+    assert values_of_the_document(timeline_report(one)) == 3 * len(totals(one))
+    assert head <= {value.key for value in values_in(headline(one))}
+
+
+def test_the_table_says_what_takes_how_much_of_what() -> None:
+    window = zoom(plan(), from_us=100.0, to_us=180.0)
+    captions = [totals_table(one).caption for one in (plan(), window, plan(cycle__period_us=300.0))]
+    assert [sentence_text(one) for one in captions if one] == [
+        "What takes the slice, 2000.000 us",
+        "What takes the window, 80.000 us",
+        "What takes the cycle, 207.117 us",
+    ]
+    lines = drawn(plan())
+    assert lines[-2].split() == [":", "arbitration", "reset", "gap", "(10)", "4", "21.047", "1.05"]
+
+
+def test_a_page_and_markdown_have_the_drawing_and_the_totals() -> None:
+    report = timeline_report(plan(name=HOSTILE))
+    text = markdown.text(report)
+    assert "```text\nThe period of 4000.000 us" in text
+    assert "| arbitration | " in text
+    page = html.page(report)
+    assert page.count('<svg xmlns="http://www.w3.org/2000/svg" class="chart timeline"') == 1
+    assert page.count(".chart.timeline .track{") == 1
+    assert '<data value="8">8</data>' in page
+    assert HOSTILE not in page
+
+
+def test_a_page_of_many_events_says_that_a_bar_is_a_transaction() -> None:
+    many = plan(bus__nodes=62, bus__max_hops=3)
+    legend = timeline_chart(many).legend
+    assert legend is not None
+    assert sentence_text(legend) == "A bar is a whole transaction."
+    assert timeline_chart(plan()).legend is None
+
+
+def spans(one: Schedule) -> list[tuple[str, float, float]]:
+    return [(event.kind, event.start_us, event.end_us) for event in one.events]
+
+
+def test_bus_lane_comes_first_and_nodes_in_their_turn() -> None:
+    one = plan(bus__nodes=12)
+    assert [lane.label for lane in node_lanes(one)] == ["bus", *(f"node {number}" for number in range(1, 13))]
+    assert [lane.label for lane in node_lanes(zoom(one, transaction=("write", 11)))] == ["node 11"]
+
+
+@settings(max_examples=200, deadline=None)
+@given(start=st.floats(0.0, 1e6), width=st.floats(1e-3, 1e6), most=st.integers(1, 12))
+def test_ticks_are_round_inside_the_window_and_few(start: float, width: float, most: int) -> None:
+    end = start + width
+    marks = ticks(start, end, most=most)
+    assert len(marks) <= most
+    assert all(start - width * 1e-6 <= mark.at <= end + width * 1e-6 for mark in marks)
+    assert len({mark.label for mark in marks}) == len(marks)
+    assert all(float(mark.label) == pytest.approx(mark.at, abs=width * 1e-6) for mark in marks)
