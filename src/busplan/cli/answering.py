@@ -109,7 +109,7 @@ def naming_option(*arguments: str) -> Iterator[None]:
         Names of arguments.
     """
     names = "|".join(arguments)
-    argument = re.compile(rf"^(?P<name>{names})(?= )|\b(?P<flag>{names})=True\b")
+    argument = re.compile(rf"^(?P<name>{names})(?=[ :])|\b(?P<flag>{names})=True\b")
     try:
         yield
     except BusplanError as error:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from busplan.cli.answering import naming_option
 from busplan.cli.changes import load_changed, takes_changes
 from busplan.cli.destinations import profile_files, require_apart
 from busplan.cli.options import (
@@ -175,7 +176,7 @@ def sweep_command(
     require_apart(outputs, inputs=profile_files(profile))
     plot_form_ = None if plot is None else plot_form(plot)
     from busplan.cli.workers import available_processors
-    from busplan.questions.sweep import Names, checked_sweep
+    from busplan.questions.sweep import checked_sweep
 
     loaded = load_changed(profile, changes)
     varied = parse_axes(vary or [])
@@ -185,16 +186,16 @@ def sweep_command(
     sort_by, _, order = (sort or "").partition(":")
     if order not in {"", "asc"}:
         raise BusplanError(f"--sort {sort}: expected a column, or a column and :asc for the smallest first")
-    asked = checked_sweep(
-        loaded,
-        varied,
-        timing_models=None if timing == ALL_MODELS else [timing],
-        circle=circle,
-        summary=summary,
-        force=force,
-        changes=changes,
-        names=Names("--vary", "--timing", "--circle", "--summary", "--force"),
-    )
+    with naming_option("vary", "timing_model", "circle", "summary", "force"):
+        asked = checked_sweep(
+            loaded,
+            varied,
+            timing_models=None if timing == ALL_MODELS else [timing],
+            circle=circle,
+            summary=summary,
+            force=force,
+            changes=changes,
+        )
     _require_number(asked, {"--sort": sort_by or None, "--figure": figure})
     chosen = _columns(asked, columns, short=form in TOP_FORMS, sort_by=sort_by)
     run_sweep(

@@ -19,7 +19,7 @@ from busplan.forms.blocks import Report
 from busplan.forms.csv_rows import spelled
 from busplan.questions.base.answer import Answer
 from busplan.questions.base.inputs import Models, ProfileLike, checked_models, load_profile
-from busplan.questions.sweep.asked import Names, Sweep, checked_sweep
+from busplan.questions.sweep.asked import Sweep, checked_sweep
 from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.circle_run import sweep_blocks
 from busplan.questions.sweep.execution import Here, Work
@@ -34,7 +34,6 @@ __all__ = [
     "Digest",
     "FigureData",
     "Here",
-    "Names",
     "SweepAnswer",
     "Work",
     "axis_values",

@@ -1,7 +1,7 @@
 """What is asked of a sweep, checked."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from busplan.buses.figure import Figure, by_key
 from busplan.profile.changes import NO_CHANGES, KeyChanges
@@ -52,20 +52,6 @@ class Sweep(NamedTuple):
         return (self.grid if self.seeds is None else Grid({**self.grid.axes, SEED: self.seeds})).each_point()
 
 
-class Names(NamedTuple):
-    """Names of arguments in messages."""
-
-    vary: str = "vary"
-    timing: str = "timing_model"
-    circle: str = "circle=True"
-    summary: str = "summary=True"
-    force: str = "force=True"
-
-
-ARGUMENTS: Final = Names()
-"""Those of the Python interface."""
-
-
 def checked_sweep(
     profile: Profile,
     vary: Mapping[str, str | Iterable[object]],
@@ -75,7 +61,6 @@ def checked_sweep(
     summary: bool,
     force: bool,
     changes: KeyChanges = NO_CHANGES,
-    names: Names = ARGUMENTS,
 ) -> Sweep:
     """Check what is asked of a sweep.
 
@@ -91,8 +76,6 @@ def checked_sweep(
         Run circle tests, summarise them over seeds, and run any number of them.
     changes
         The changes of the profile, for the answer to name them.
-    names
-        Names of these in messages.
 
     Returns
     -------
@@ -104,14 +87,14 @@ def checked_sweep(
     BusplanError
         As `axis_values`, `checked_grid`, `without_seed`, `grid_models` and `require_few`.
     """
-    axes = {key: axis_values(profile, key, given, name=names.vary) for key, given in vary.items()}
-    grid = checked_grid(profile, axes, with_circle=circle, option=names.vary, circle_option=names.circle)
-    grid, seeds = without_seed(grid, option=names.summary) if summary else (grid, None)
-    models = grid_models(profile, grid, timing_models, name=names.timing)
+    axes = {key: axis_values(profile, key, given, name="vary") for key, given in vary.items()}
+    grid = checked_grid(profile, axes, with_circle=circle, option="vary", circle_option="circle=True")
+    grid, seeds = without_seed(grid, option="summary=True") if summary else (grid, None)
+    models = grid_models(profile, grid, timing_models, name="timing_model")
     of_circle = (SUMMARY_COLUMNS if summary else CIRCLE_COLUMNS) if circle else ()
     sweep = Sweep(profile, grid, models, (*grid.axes, *figure_names(profile), *of_circle), seeds, changes, circle)
     if circle and not force:
-        require_few(grid, seeds=sweep.tests_each, option=names.circle, consent=names.force)
+        require_few(grid, seeds=sweep.tests_each, option="circle=True", consent="force=True")
     return sweep
 
 
