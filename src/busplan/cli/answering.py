@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 _KEY_AND_VALUE: Final = re.compile(r"\b[a-z][a-z_.]* = \S")
 _NARROWEST: Final = 40
 """Least width to lay out for; a narrower terminal breaks the lines itself."""
+_OPTIONS: Final = {"timing_model": "timing"}
+"""Names of options that are not those of their arguments."""
 NOTHING_REFUSED: Final[Mapping[Form, str]] = MappingProxyType({})
 
 
@@ -95,6 +97,31 @@ def naming(changes: KeyChanges) -> Iterator[None]:
         if not changes.words or isinstance(error, PlacedError | WorkerLostError):
             raise
         raise BusplanError(*(_naming(problem, changes) for problem in error.problems)) from None
+
+
+@contextmanager
+def naming_option(*arguments: str) -> Iterator[None]:
+    """Name arguments of a public function as options in its errors: buses, --buses; circle=True, --circle.
+
+    Parameters
+    ----------
+    *arguments
+        Names of arguments.
+    """
+    names = "|".join(arguments)
+    argument = re.compile(rf"^(?P<name>{names})(?= )|\b(?P<flag>{names})=True\b")
+    try:
+        yield
+    except BusplanError as error:
+        problems = [argument.sub(_option, problem) for problem in error.problems]
+        if problems == [*error.problems]:
+            raise
+        raise BusplanError(*problems) from None
+
+
+def _option(argument: re.Match[str]) -> str:
+    name = argument["name"] or argument["flag"]
+    return f"--{_OPTIONS.get(name, name)}"
 
 
 def _naming(problem: str, changes: KeyChanges) -> str:

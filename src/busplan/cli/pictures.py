@@ -1,18 +1,20 @@
 """The form of an answer that may also be a picture, and the title of that."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
+from busplan.cli.answering import answer, naming
+from busplan.cli.destinations import require_apart
 from busplan.cli.options import AnyForm, form_of_file
 from busplan.cli.output import refuse_terminal, write_document
 from busplan.errors import BusplanError
 from busplan.extras import require_resvg
-from busplan.forms import PICTURES, Picture, ending_expected
+from busplan.forms import PICTURES, Form, Picture, ending_expected
 from busplan.profile.changes import KeyChanges
 
 if TYPE_CHECKING:
-    from busplan.forms.blocks import Sentence
+    from busplan.forms.blocks import Report, Sentence
 
 
 PICTURE_FORMAT_HELP: Final = (
@@ -74,6 +76,59 @@ def write_picture(svg: str, form: Picture, output: Path | None) -> None:
     from busplan.forms.raster import picture
 
     write_document(picture(svg, form), output)
+
+
+class Drawn(Protocol):
+    """An answer that has a picture."""
+
+    def report(self) -> "Report":
+        """The answer in blocks."""
+
+    def svg(self, *, note: str = "") -> str:
+        """The picture."""
+
+
+def show_drawn(
+    find: Callable[[], Drawn],
+    form: Form | Picture,
+    output: Path | None,
+    *,
+    inputs: Iterable[Path],
+    changes: KeyChanges,
+    is_whole: bool,
+) -> None:
+    """Write an answer, as a picture or as a report.
+
+    Parameters
+    ----------
+    find
+        Function that gives the answer.
+    form
+        As `picture_form` chose it.
+    output, inputs, changes, is_whole
+        As for `answer`.
+
+    Raises
+    ------
+    BusplanError
+        It cannot be written, or there is nothing to draw.
+    """
+    match form:
+        case "svg" | "png":
+            require_apart({"--output": output}, inputs=inputs)
+            with naming(changes):
+                write_picture(find().svg(note=_changes_words(changes)), form, output)
+        case _:
+            with answer(form, output, inputs=inputs, changes=changes, is_whole=is_whole) as give:
+                give(find().report())
+
+
+def _changes_words(changes: KeyChanges) -> str:
+    """What was set, in the title of a picture that is a file of its own."""
+    from busplan.forms.columns import sentence_text
+    from busplan.questions.words.documents import changes_sentences
+
+    return " ".join(map(sentence_text, changes_sentences(changes)))
 
 
 def picture_title(headline: "Sentence", changes: KeyChanges) -> str:

@@ -31,36 +31,34 @@ def parse_axes(texts: list[str], *, profile: "Profile") -> dict[str, "Values"]:
     """
     if not texts:
         raise BusplanError("--vary: nothing to vary; give a key of the profile and its values, as bus.nodes=1:62")
+    from busplan.questions.sweep import axis_values
+
     axes: dict[str, Values] = {}
     for text in texts:
-        key, values = parse_axis(text, profile=profile, option="--vary")
+        key, words = parse_axis(text, option="--vary")
+        values = axis_values(profile, key, words, name="--vary")
         if key in axes:
             raise BusplanError(f"--vary {text}: {key} is varied already; give all its values at once")
         axes[key] = values
     return axes
 
 
-def parse_axis(text: str, *, profile: "Profile", option: str) -> "tuple[str, Values]":
-    """Parse one KEY=VALUES.
+def parse_axis(text: str, *, option: str) -> tuple[str, str]:
+    """Parse one KEY=VALUES: the key, and the text of its values.
 
     Parameters
     ----------
     text
         Value of the option.
-    profile
-        As in `parse_axes`.
     option
         Name of the option.
 
     Raises
     ------
     BusplanError
-        Not KEY=VALUES, or invalid values.
+        Not KEY=VALUES.
     """
-    from busplan.profile.kinds import words_of
-    from busplan.questions.sweep.values import parse_values
-
-    key, equals, spec = (part.strip() for part in text.partition("="))
-    if not equals or not key or not spec:
+    key, equals, values = (part.strip() for part in text.partition("="))
+    if not equals or not key or not values:
         raise BusplanError(f"{option} {text}: expected KEY=VALUES, as bus.nodes=1:62 or cycle.period_us=250,500,1000")
-    return key, parse_values(spec, name=f"{option} {text}", words=words_of(profile, key))
+    return key, values

@@ -20,7 +20,7 @@ from busplan.questions.sweep import blocks as analysis
 from busplan.questions.sweep.asked import Names, Sweep, checked_sweep
 from busplan.questions.sweep.blocks import Column, SweepBlock
 from busplan.questions.sweep.circle_run import circle_blocks, require_circles
-from busplan.questions.sweep.execution import Here
+from busplan.questions.sweep.execution import Here, require_executor
 from busplan.questions.sweep.grid import Array, Grid, Values
 from busplan.questions.sweep.plot import FigureData, require_drawable
 from busplan.questions.sweep.top import Tally, TopRows, default_columns, sweep_report
@@ -195,9 +195,7 @@ def sweep(
     >>> answer["limited_by"].tolist(), len(answer)
     (['time', 'time', 'time'], 3)
     """
-    if executor is not None and not (circle and isinstance(executor, Executor)):
-        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
-        raise BusplanError(f"executor{wrong}")
+    require_executor(executor, circle=circle)
     network = load_profile(profile)
     models = None if timing_model is None else checked_models(timing_model, network)
     if not isinstance(vary, Mapping) or not vary or not all(isinstance(key, str) for key in vary):

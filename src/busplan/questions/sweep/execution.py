@@ -6,6 +6,8 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from itertools import islice
 from typing import Final, TypeVar
 
+from busplan.errors import BusplanError
+
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
@@ -34,6 +36,19 @@ class Here(Executor):
         except Exception as error:  # noqa: BLE001 - who asks for the result gets it
             future.set_exception(error)
         return future
+
+
+def require_executor(executor: object, *, circle: bool) -> None:
+    """Refuse an executor that is none, or that has no circle tests to run.
+
+    Raises
+    ------
+    BusplanError
+        Not a `concurrent.futures.Executor`, or given without circle tests.
+    """
+    if executor is not None and not (circle and isinstance(executor, Executor)):
+        wrong = f" {executor!r}: expected a concurrent.futures.Executor" if circle else ": goes with circle=True"
+        raise BusplanError(f"executor{wrong}")
 
 
 def unknown(_task: object) -> None:
