@@ -392,7 +392,15 @@ def test_every_command_has_its_own_help_with_an_example(run: Run, command: str) 
             ("latency", "paper-4ms", "--format", "xml"),
             "invalid value for '--format': 'xml' is not one of 'table', 'markdown'",
         ),
-        (("latency", "paper-4ms", "--period", "4ms"), "no such option: --period"),
+        (
+            ("latency", "paper-4ms", "--period", "4ms"),
+            "busplan latency: no such option: --period; --set cycle.period_us=... changes it for this run",
+        ),
+        (
+            ("circle-test", "paper-4ms", "--feed", "9"),
+            "no such option: --feed; --set circle.feed_mm_per_min=... changes",
+        ),
+        (("schema", "--nodes", "9"), "no such option: --nodes; `busplan schema --help` says more"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else None,
 )

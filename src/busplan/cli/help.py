@@ -1,5 +1,6 @@
 """Layout of --help: plain argument names, whole sentences for commands, and the exit codes."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from typing import Any, Final
@@ -23,13 +24,27 @@ _COMPLETION: Final = {
 
 
 @contextmanager
-def _usage_in_our_form(command: str) -> Iterator[None]:
+def _usage_in_our_form(command: str, *, takes_set: bool = False) -> Iterator[None]:
     """Raise errors of the option parser as the program's own, on one line."""
     try:
         yield
     except TyperException as error:
         words = error.format_message().rstrip(".").replace("Value error, ", "").replace("Input should", "must")
-        raise BusplanError(f"{command}: {words[:1].lower()}{words[1:]}; `{command} --help` says more") from None
+        unknown = re.search(r"option: --([a-z-]+)", words) if takes_set else None
+        key = _key_named(unknown[1].replace("-", "_")) if unknown else None
+        hint = f"`{command} --help` says more"
+        if key:
+            words, hint = words.partition(" (")[0], f"--set {key}=... changes it for this run"
+        raise BusplanError(f"{command}: {words[:1].lower()}{words[1:]}; {hint}") from None
+
+
+def _key_named(name: str) -> str | None:
+    """The key of a profile that has a name, but for its unit; the first one, or none."""
+    from busplan.buses import kind_names
+    from busplan.profile.kinds import profile_model, value_keys
+
+    keys = (key for kind in kind_names() for key in value_keys(profile_model(kind), {}))
+    return next((key for key in keys if f"{key.rpartition('.')[2]}_".startswith(f"{name}_")), None)
 
 
 class PlainCommand(TyperCommand):
@@ -42,7 +57,8 @@ class PlainCommand(TyperCommand):
 
     def make_context(self, info_name: str | None, *arguments: Any, **settings: Any) -> Any:
         """Parse the command line of the command."""
-        with _usage_in_our_form(f"busplan {info_name}"):
+        takes_set = any("--set" in param.opts for param in self.params)
+        with _usage_in_our_form(f"busplan {info_name}", takes_set=takes_set):
             return super().make_context(info_name, *arguments, **settings)
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:

@@ -173,7 +173,7 @@ def _swept(profile: Profile, settings: Mapping[Place, MapPoint]) -> Iterator[tup
     places: dict[tuple[object, ...], Place] = {tuple(one.changes.values()): at for at, one in settings.items()}
     model = bus_of(profile).deciding_model
     for grid in _grids(settings.values()):
-        for block in sweep(profile, grid, timing_models=[model]):
+        for block in sweep(profile, grid, timing_models=[model], with_counts=False):
             for index in range(block.chunk.points):
                 point = tuple(block.chunk.point(index).values())
                 yield places[point], block.row(index, CELL_FIGURES)

@@ -114,6 +114,7 @@ def sweep(
     *,
     timing_models: Sequence[str],
     chunk_points: int = CHUNK_POINTS,
+    with_counts: bool = True,
 ) -> Iterator[SweepBlock]:
     """Compute all figures of `capacity` over a grid.
 
@@ -127,6 +128,8 @@ def sweep(
         Timing models, in this order.
     chunk_points
         Largest number of points computed at once.
+    with_counts
+        Whether blocks have the most nodes and axes, which take the cycle at other numbers of nodes.
 
     Yields
     ------
@@ -139,9 +142,9 @@ def sweep(
     """
     causes_at = lru_cache(_CAUSES_KEPT)(partial(_causes, profile))
     for chunk in grid.chunks(chunk_points):
-        found = {model: _figures(profile, chunk.values, model) for model in timing_models}
+        found = {model: _figures(profile, chunk.values, model, with_counts=with_counts) for model in timing_models}
         decides = bus_of(profile).deciding_model
-        own = found[decides] if decides in found else _figures(profile, chunk.values, decides)
+        own = found[decides] if decides in found else _figures(profile, chunk.values, decides, with_counts=False)
         refused = {CIRCLE_REFUSED_BY.key: _refused(profile, chunk, own[FITS.key].values, causes_at)}
         yield SweepBlock(
             chunk,
@@ -158,17 +161,17 @@ def _varied(values: Array) -> Column:
     )
 
 
-def _figures(profile: Profile, values: Mapping[str, Array], model: str) -> dict[str, Column]:
+def _figures(profile: Profile, values: Mapping[str, Array], model: str, *, with_counts: bool) -> dict[str, Column]:
     """All figures of a chunk under one timing model."""
     for number, (key, own) in enumerate(values.items()):
         if own.dtype == object and own.size > 1:
             # Words among numbers: compute each value by itself and join the results along the axis.
             parts = [
-                _figures(profile, {**values, key: np.take(own, [index], axis=number)}, model)
+                _figures(profile, {**values, key: np.take(own, [index], axis=number)}, model, with_counts=with_counts)
                 for index in range(own.size)
             ]
             return {name: _joined([part[name] for part in parts], axis=number) for name in parts[0]}
-    return _columns(_at(profile, values), model, axes=len(values))
+    return _columns(_at(profile, values), model, axes=len(values), with_counts=with_counts)
 
 
 def _joined(parts: list[Column], *, axis: int) -> Column:
@@ -183,7 +186,7 @@ def _at(profile: Profile, values: Mapping[str, Array]) -> Profile:
     return profile
 
 
-def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
+def _columns(where: Profile, model: str, *, axes: int, with_counts: bool) -> dict[str, Column]:
     bus, network = bus_of(where), network_of(where)
     cycle = bus.cycle(network, model=model)
     figures = numeric_figures(cycle)
@@ -195,7 +198,7 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     numbers |= {"fits": np.equal(exceeded.values, 0)}
     own = _certainty(cycle, codes) if model == bus.deciding_model else _UNDECIDED
     words = {
-        **_counts(network, limits, model=model),
+        **(_counts(network, limits, model=model) if with_counts else {}),
         "timing_model": Column(np.zeros((), np.uint8), (model,)),
         "binding_term": Column(_largest([term.us for term in cycle.terms]), tuple(term.name for term in cycle.terms)),
         "exceeded": exceeded,
@@ -205,7 +208,7 @@ def _columns(where: Profile, model: str, *, axes: int) -> dict[str, Column]:
     found = {
         key: words[key] if key in words else _number(numbers[key], sorts[key])
         for key in figure_names(network.profile)
-        if key != CIRCLE_REFUSED_BY.key
+        if key != CIRCLE_REFUSED_BY.key and (with_counts or key.rpartition(".")[2] not in COUNTS)
     }
     return {name: column._replace(values=_with_axes(column.values, axes)) for name, column in found.items()}
 
